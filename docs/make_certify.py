@@ -45,15 +45,15 @@ def main() -> None:
     for name, (kind, options) in ROWS.items():
         with tempfile.TemporaryDirectory() as folder:
             command = [sys.executable, "-m", "phigen", "certify", name, *options, "-o", folder, "--json", "-q"]
-            done = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
-        pairs = zip(done["bound"], done["observed"], strict=True)
+            document = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+        pairs = zip(document["bound"], document["observed"], strict=True)
         ratios = [bound / observed for bound, observed in pairs if observed > 0]
-        ulps = [u for u in done["bound_in_ulps"] if u > UNCHANGED]
-        row = (name, kind, done["boxes"], f"{done['seconds']:.2f}", _range(ulps), _range(ratios))
+        ulps = [u for u in document["bound_in_ulps"] if u > UNCHANGED]
+        row = (name, kind, document["boxes"], f"{document['seconds']:.2f}", _range(ulps), _range(ratios))
         lines.append(f"| {' | '.join(map(str, row))} |")
         print(lines[-1], flush=True)
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    after = rest.partition(END)[2]
+    before, _, following = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    after = following.partition(END)[2]
     PAGE.write_text(before + BEGIN + "\n" + "\n".join(lines) + "\n\n" + END + after, encoding="utf-8")
 
 

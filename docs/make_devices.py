@@ -55,12 +55,12 @@ def rows() -> Iterator[str]:
         program = compilation_of(name, order=order, profile="small").program
         (text,) = emit(program, "device", "phigen build").values()
         begin = time.perf_counter()
-        own = kernels_of(text, name)
-        seconds = (time.perf_counter() - begin) / len(own)
+        kernels = kernels_of(text, name)
+        seconds = (time.perf_counter() - begin) / len(kernels)
         shared = ["", "", ""]
         if f"{name}_COMMON" in text:
             shared = columns(kernels_of(f"#define {name}_COMMON\n{text}", name))
-        values = [*columns(own), *shared, f"{seconds:.1f}"]
+        values = [*columns(kernels), *shared, f"{seconds:.1f}"]
         yield f"| {name} | {program.order} | {program.step.kind.name} | {program.dimension} | {' | '.join(values)} |"
 
 

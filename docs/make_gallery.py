@@ -87,43 +87,47 @@ def source(name: str) -> Spec:
     return spec.load(resources.bundled()[name])
 
 
-def longest_run(found: Spec) -> Run:
+def longest_run(specification: Spec) -> Run:
     """The run with the most steps; the first of several."""
-    return max(found.runs.values(), key=lambda run: run.steps)
+    return max(specification.runs.values(), key=lambda run: run.steps)
 
 
-def start_of(found: Spec, run: Run) -> float | None:
+def start_of(specification: Spec, run: Run) -> float | None:
     """The time at the start of a run, None without a time."""
-    return float(run.start) if found.time else None
+    return float(run.start) if specification.time else None
 
 
-def seed_of(found: Spec, run: Run) -> int | None:
+def seed_of(specification: Spec, run: Run) -> int | None:
     """The seed of the noise of a run, None without noise."""
-    return run.seed if found.noise else None
+    return run.seed if specification.noise else None
 
 
 def facts(name: str) -> dict[str, Any]:
     """Facts on a system for its entry: structure, method, formulas, and errors of its longest run."""
-    found = source(name)
-    compilation = compilation_of(found)
-    solver, run = solver_of(compilation), longest_run(found)
-    parameters = found.parameters_of(run)
+    specification = source(name)
+    compilation = compilation_of(specification)
+    solver, run = solver_of(compilation), longest_run(specification)
+    parameters = specification.parameters_of(run)
     x0, h = np.array([float(v) for v in run.initial]), float(run.step)
-    about: dict[str, Any] = {"t0": start_of(found, run), "seed": seed_of(found, run), "parameters": parameters}
-    own = solver.integrate(x0, h, run.steps, run.stride, **about)
-    summaries = [summarise("phigen", compilation.system, run, parameters, own.t, own.x)]
+    arguments: dict[str, Any] = {
+        "t0": start_of(specification, run),
+        "seed": seed_of(specification, run),
+        "parameters": parameters,
+    }
+    trajectory = solver.integrate(x0, h, run.steps, run.stride, **arguments)
+    summaries = [summarise("phigen", compilation.system, run, parameters, trajectory.t, trajectory.x)]
     for method in [m for m in run.compare if m in TABLEAUX]:
         try:
-            if found.time:
+            if specification.time:
                 x = of_classical(method, solver, parameters, float(run.start)).rows(x0, h, run.steps, run.stride)
             else:
                 x = rows_along(started(method, compilation, x0, parameters), h, run.steps, run.stride, None)
         except BackendError as error:
             x = error.states
-        summaries.append(summarise(method.upper(), compilation.system, run, parameters, own.t[: len(x)], x))
+        summaries.append(summarise(method.upper(), compilation.system, run, parameters, trajectory.t[: len(x)], x))
     return {
-        "sha256": found.source_sha256,
-        "structure": kind_of_structure(found),
+        "sha256": specification.source_sha256,
+        "structure": kind_of_structure(specification),
         "method": compilation.label,
         "order": solver.order,
         "hamiltonian": readable_one(compilation.system.hamiltonian, None),
@@ -144,19 +148,23 @@ def _errors(summary: Summary) -> dict[str, float]:
 
 def draw(name: str) -> None:
     """Draw the figures of a system."""
-    found = source(name)
-    compilation = compilation_of(found)
-    solver, run = solver_of(compilation), longest_run(found)
-    parameters = found.parameters_of(run)
+    specification = source(name)
+    compilation = compilation_of(specification)
+    solver, run = solver_of(compilation), longest_run(specification)
+    parameters = specification.parameters_of(run)
     # Many panels make a large file: from five dimensions on fewer steps, from ten on no level surfaces.
-    steps = min(run.steps, DRAWN if found.dimension <= 4 else DRAWN // 2)
-    casimirs = compilation.system.casimirs if found.dimension <= 9 else {}
-    about: dict[str, Any] = {"t0": start_of(found, run), "seed": seed_of(found, run), "parameters": parameters}
-    trajectory = solver.integrate(run.initial, float(run.step), steps, **about)
+    steps = min(run.steps, DRAWN if specification.dimension <= 4 else DRAWN // 2)
+    casimirs = compilation.system.casimirs if specification.dimension <= 9 else {}
+    arguments: dict[str, Any] = {
+        "t0": start_of(specification, run),
+        "seed": seed_of(specification, run),
+        "parameters": parameters,
+    }
+    trajectory = solver.integrate(run.initial, float(run.step), steps, **arguments)
     while len(trajectory) > SHORTEST and not _is_curve(trajectory):
-        trajectory = solver.integrate(run.initial, float(run.step), trajectory.steps // 2, **about)
+        trajectory = solver.integrate(run.initial, float(run.step), trajectory.steps // 2, **arguments)
     save_for_pages(figures.trajectory_figure(trajectory, casimirs), FIGURES / f"{name}.svg")
-    if sections := _sections(found, solver):
+    if sections := _sections(specification, solver):
         save_for_pages(figures.section_figure(sections, solver.coordinates), FIGURES / f"{name}_section.svg")
 
 
@@ -166,13 +174,16 @@ def _is_curve(trajectory: Trajectory) -> bool:
     return all(joins(trajectory.x[:, [trajectory.coordinates.index(c) for c in panel]]) for panel in panels)
 
 
-def _sections(found: Spec, solver: Solver) -> dict[str, Any]:
+def _sections(specification: Spec, solver: Solver) -> dict[str, Any]:
     """Crossings of each run that has a section. In three dimensions these are isolated points, and are left out."""
     sections = {}
-    for run in found.runs.values():
-        if run.section is not None and (found.dimension > 3 or found.time):
-            parameters = found.parameters_of(run)
-            g, begin = function_of(run.section, solver.coordinates, parameters, found.time), start_of(found, run)
+    for run in specification.runs.values():
+        if run.section is not None and (specification.dimension > 3 or specification.time):
+            parameters = specification.parameters_of(run)
+            g, begin = (
+                function_of(run.section, solver.coordinates, parameters, specification.time),
+                start_of(specification, run),
+            )
             points = solver.section(run.initial, float(run.step), run.steps, g, t0=begin, parameters=parameters).x
             sections[f"{run.name}: {readable_one(run.section, None)} = 0"] = points[:CROSSINGS]
     return sections
@@ -180,22 +191,27 @@ def _sections(found: Spec, solver: Solver) -> dict[str, Any]:
 
 def lattice_facts(name: str) -> dict[str, Any]:
     """Facts on a lattice for its entry; also draws its figure."""
-    found = source(name)
-    compilation = compilation_of(found)
-    solver, run = lattice_solver_of(compilation), longest_run(found)
-    start = start_of_lattice(found, run)
-    about: dict[str, Any] = {"seed": seed_of(found, run), "t0": float(run.start) if found.time else None}
-    made = solver.integrate(start.state, float(run.step), run.steps, run.stride, parameters=start.arguments, **about)
-    errors = errors_of(compilation.cell, made)
-    thin = max(1, len(made) // FRAMES)
-    rows = {name: getattr(made, name)[::thin] for name in ("t", "x", "energy", "observed")}
-    few = replace(made, **rows)
+    specification = source(name)
+    compilation = compilation_of(specification)
+    solver, run = lattice_solver_of(compilation), longest_run(specification)
+    start = start_of_lattice(specification, run)
+    arguments: dict[str, Any] = {
+        "seed": seed_of(specification, run),
+        "t0": float(run.start) if specification.time else None,
+    }
+    trajectory = solver.integrate(
+        start.state, float(run.step), run.steps, run.stride, parameters=start.arguments, **arguments
+    )
+    errors = errors_of(compilation.cell, trajectory)
+    thin = max(1, len(trajectory) // FRAMES)
+    rows = {name: getattr(trajectory, name)[::thin] for name in ("t", "x", "energy", "observed")}
+    few = replace(trajectory, **rows)
     names = run.lattice.names if run.lattice else ()
     thin_errors = {quantity: e[::thin] for quantity, e in errors.items()}
-    drawn = lattice_figure(few, thin_errors, "", dots=SMALL, site_names=names)
-    save_for_pages(drawn, FIGURES / f"{name}.svg")
+    figure = lattice_figure(few, thin_errors, "", dots=SMALL, site_names=names)
+    save_for_pages(figure, FIGURES / f"{name}.svg")
     return {
-        "sha256": found.source_sha256,
+        "sha256": specification.source_sha256,
         "structure": described(compilation.cell),
         "method": compilation.label,
         "order": solver.order,
@@ -208,12 +224,12 @@ def lattice_facts(name: str) -> dict[str, Any]:
     }
 
 
-def page(known: dict[str, dict[str, Any]]) -> str:
+def page(facts_by_name: dict[str, dict[str, Any]]) -> str:
     """Text of the page, from the specs and from the facts on each."""
-    listed = [f"| [{name}](#{name}) | {known[name]['structure']} | {source(name).title} |" for name in lattices()]
-    more = "\n".join([LATTICES, "| spec | sites | system |", "|---|---|---|", *listed])
-    entries = [_lattice_entry(source(name), known[name]) for name in lattices()]
-    return "\n".join([_systems(known), more, *entries])
+    rows = [f"| [{name}](#{name}) | {facts_by_name[name]['structure']} | {source(name).title} |" for name in lattices()]
+    more = "\n".join([LATTICES, "| spec | sites | system |", "|---|---|---|", *rows])
+    entries = [_lattice_entry(source(name), facts_by_name[name]) for name in lattices()]
+    return "\n".join([_systems(facts_by_name), more, *entries])
 
 
 def thumbnail(name: str) -> str:
@@ -223,7 +239,7 @@ def thumbnail(name: str) -> str:
     return f'<a href="#{name}">{image}</a>'
 
 
-def _systems(known: dict[str, dict[str, Any]]) -> str:
+def _systems(facts_by_name: dict[str, dict[str, Any]]) -> str:
     rows = [f"| [{name}](#{name}) | {len(source(name).coordinates)} | {source(name).title} |" for name in names()]
     contents = "\n".join(["| spec | dimension | system |", "|---|---|---|", *rows])
     return "\n".join(
@@ -232,42 +248,42 @@ def _systems(known: dict[str, dict[str, Any]]) -> str:
             *map(thumbnail, [*names(), *lattices()]),
             SYSTEMS,
             contents,
-            *(_entry(source(name), known[name]) for name in names()),
+            *(_entry(source(name), facts_by_name[name]) for name in names()),
         ]
     )
 
 
-def _lattice_entry(found: Spec, fact: dict[str, Any]) -> str:
-    run = longest_run(found)
-    image = f"![{found.title}: a run over space and time](figures/gallery/{found.name}.svg)"
-    about = f"Sites: {fact['structure']}. Method: {fact['method']}, order {fact['order']}."
+def _lattice_entry(specification: Spec, fact: dict[str, Any]) -> str:
+    run = longest_run(specification)
+    image = f"![{specification.title}: a run over space and time](figures/gallery/{specification.name}.svg)"
+    method_text = f"Sites: {fact['structure']}. Method: {fact['method']}, order {fact['order']}."
     length = f"Run `{run.name}`: {' × '.join(map(str, fact['sites']))} sites, {run.steps} steps of {float(run.step):g}."
-    shown = [line if len(line) <= LONGEST else line.split(" = ")[0] + " = …" for line in fact["formulas"]]
+    formulas = [line if len(line) <= LONGEST else line.split(" = ")[0] + " = …" for line in fact["formulas"]]
     return "\n\n".join(
-        ["", f"## {found.name}", f"**{found.title}.** {found.description}", image,
-         "```text\n" + "\n".join(shown) + "\n```", f"{about} {length}", _table(fact["errors"])]
+        ["", f"## {specification.name}", f"**{specification.title}.** {specification.description}", image,
+         "```text\n" + "\n".join(formulas) + "\n```", f"{method_text} {length}", _table(fact["errors"])]
     )  # fmt: skip
 
 
-def _entry(found: Spec, fact: dict[str, Any]) -> str:
-    run = longest_run(found)
-    images = [f"![{found.title}: a trajectory](figures/gallery/{found.name}.svg)"]
-    if (FIGURES / f"{found.name}_section.svg").exists():
-        images.append(f"![{found.title}: a Poincaré section](figures/gallery/{found.name}_section.svg)")
+def _entry(specification: Spec, fact: dict[str, Any]) -> str:
+    run = longest_run(specification)
+    images = [f"![{specification.title}: a trajectory](figures/gallery/{specification.name}.svg)"]
+    if (FIGURES / f"{specification.name}_section.svg").exists():
+        images.append(f"![{specification.title}: a Poincaré section](figures/gallery/{specification.name}_section.svg)")
     lines = [f"H = {fact['hamiltonian']}", *(f"{name} = {e}" for name, e in fact["casimirs"].items())]
-    shown = [line if len(line) <= LONGEST else line.split(" = ")[0] + " = …" for line in lines]
-    about = f"π: {fact['structure']}. Method: {fact['method']}, order {fact['order']}."
+    formulas = [line if len(line) <= LONGEST else line.split(" = ")[0] + " = …" for line in lines]
+    method_text = f"π: {fact['structure']}. Method: {fact['method']}, order {fact['order']}."
     length = f"Run `{run.name}`: {run.steps} steps of {float(run.step):g}."
     return "\n\n".join(
-        ["", f"## {found.name}", f"**{found.title}.** {found.description}", "\n".join(images),
-         "```text\n" + "\n".join(shown) + "\n```", f"{about} {length}", _table(fact["errors"])]
+        ["", f"## {specification.name}", f"**{specification.title}.** {specification.description}", "\n".join(images),
+         "```text\n" + "\n".join(formulas) + "\n```", f"{method_text} {length}", _table(fact["errors"])]
     )  # fmt: skip
 
 
 def _table(errors: dict[str, dict[str, float]]) -> str:
     head = ["largest error", *errors]
     quantities = next(iter(errors.values()))
-    body = [[q, *(_shown(found[q]) for found in errors.values())] for q in quantities]
+    body = [[q, *(_shown(column[q]) for column in errors.values())] for q in quantities]
     return "\n".join(f"| {' | '.join(row)} |" for row in [head, ["---"] * len(head), *body])
 
 
@@ -282,17 +298,17 @@ def main(chosen: list[str]) -> None:
     for stray in FIGURES.glob("*.svg"):
         if not chosen:
             stray.unlink()
-    known = json.loads(FACTS.read_text(encoding="utf-8")) if FACTS.exists() else {}
+    facts_by_name = json.loads(FACTS.read_text(encoding="utf-8")) if FACTS.exists() else {}
     for name in chosen or [*names(), *lattices()]:
         print(name, file=sys.stderr)
         if name in lattices():
-            known[name] = lattice_facts(name)
+            facts_by_name[name] = lattice_facts(name)
         else:
-            known[name] = facts(name)
+            facts_by_name[name] = facts(name)
             draw(name)
-    known = {name: known[name] for name in [*names(), *lattices()]}
-    FACTS.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    PAGE.write_text(page(known), encoding="utf-8")
+    facts_by_name = {name: facts_by_name[name] for name in [*names(), *lattices()]}
+    FACTS.write_text(json.dumps(facts_by_name, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    PAGE.write_text(page(facts_by_name), encoding="utf-8")
 
 
 if __name__ == "__main__":

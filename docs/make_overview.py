@@ -50,8 +50,8 @@ def courses(compilation: Compilation, end: float) -> dict[str, tuple[Trajectory,
     states = rows_along(course, STEP / RK4_STEPS, ROWS * stride * RK4_STEPS, stride * RK4_STEPS, None)
     theirs = trajectory_of(solver, ours.t, states, STEP / RK4_STEPS, parameters)
     return {
-        label: (whole, solver.integrate(whole.x[-1], STEP / 12, 12 * LAST))
-        for label, whole in ((PHIGEN, ours), (RK4, theirs))
+        label: (method_run, solver.integrate(method_run.x[-1], STEP / 12, 12 * LAST))
+        for label, method_run in ((PHIGEN, ours), (RK4, theirs))
     }
 
 
@@ -73,8 +73,8 @@ def figure(runs: dict[str, tuple[Trajectory, Trajectory]], compilation: Compilat
     panels = [("energy error", lambda t: t.energy), ("Casimir error", lambda t: t.casimirs["C"])]
     for number, (title, values) in enumerate(panels, 1):
         axes = curves.add_subplot(1, 2, number)
-        for index, (label, (whole, _)) in enumerate(runs.items()):
-            t, error = log_spaced_maxima(whole.t[1:], relative(values(whole))[1:])
+        for index, (label, (run, _)) in enumerate(runs.items()):
+            t, error = log_spaced_maxima(run.t[1:], relative(values(run))[1:])
             axes.loglog(t, np.maximum(error, 2.0**-53), color=SERIES[index], linestyle=LINES[index], label=label)
         axes.axhline(1.0, **MARK)
         axes.set(title=title, xlabel="t", ylim=(1e-17, 10))

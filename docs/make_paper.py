@@ -28,13 +28,13 @@ def with_tables(page: str, entries: list[dict]) -> str:
 
 def main(chosen: list[str]) -> None:
     """These figures, all by default."""
-    known = {entry["figure"]: entry for entry in json.loads(FACTS.read_text(encoding="utf-8"))}
+    facts_by_figure = {entry["figure"]: entry for entry in json.loads(FACTS.read_text(encoding="utf-8"))}
     for name in chosen or PLATES:
         print(name, file=sys.stderr)
         plate = PLATES[name]()
         save_for_pages(plate.figure, FIGURES / f"{name}.svg")
-        known |= {entry["figure"]: entry for entry in described({name: plate})}
-    entries = [known[name] for name in PLATES]
+        facts_by_figure |= {entry["figure"]: entry for entry in described({name: plate})}
+    entries = [facts_by_figure[name] for name in PLATES]
     # Later digits differ from compiler to compiler.
     for finding in [finding for entry in entries for finding in entry["findings"]]:
         finding["measured"] = float(f"{finding['measured']:.4g}")

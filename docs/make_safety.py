@@ -87,8 +87,8 @@ def misra(compilation: Compilation) -> Counter[str]:
         for file, text in emit(compilation.program, "c", "").items():
             (folder / file).write_text(text, encoding="utf-8")
         command = ["cppcheck", "--addon=misra", "--std=c99", "-q", "--template={id}", f"{name}.c"]
-        done = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
-    return Counter(re.findall(r"^misra-c2012-([\d.]+)$", done.stderr, re.M))
+        process = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+    return Counter(re.findall(r"^misra-c2012-([\d.]+)$", process.stderr, re.M))
 
 
 def row_of_bounds(name: str) -> str:

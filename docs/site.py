@@ -56,13 +56,13 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
 @cache
 def panels() -> dict[str, str]:
     """The pages of the panels by the names of the systems: of the longest run, as in the gallery."""
-    found = {}
+    pages = {}
     for name, path in resources.bundled().items():
         if CHOSEN is None or name in CHOSEN.split():
             spec = specs.load(path)
             with suppress(NoPanelError):
-                found[name] = panel_page(compile_spec(spec), max(spec.runs.values(), key=lambda run: run.steps))
-    return found
+                pages[name] = panel_page(compile_spec(spec), max(spec.runs.values(), key=lambda run: run.steps))
+    return pages
 
 
 def _with_panels(markdown: str) -> Iterator[str]:
@@ -70,9 +70,9 @@ def _with_panels(markdown: str) -> Iterator[str]:
     begin, *parts = _HEADING.split(markdown)
     yield begin
     for name, text in zip(parts[::2], parts[1::2], strict=True):
-        about, figure, rest = text.partition("\n![")
+        introduction, figure, following = text.partition("\n![")
         panel = f'\n<details data-live="live/{name}.html"><summary>Run it here, beside RK4</summary></details>\n'
-        yield f"## {name}{about}{panel if name in panels() else ''}{figure}{rest}"
+        yield f"## {name}{introduction}{panel if name in panels() else ''}{figure}{following}"
 
 
 def _from_root(link: re.Match[str]) -> str:

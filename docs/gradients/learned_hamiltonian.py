@@ -32,20 +32,22 @@ def rows(solver, starts, coefficients, steps=STEPS):
 
 def loss(coefficients, solver, starts, records):
     """The mean of squares of what is not explained, and its gradient: one run back for all records."""
-    rest = rows(solver, starts, coefficients) - records
+    residuals = rows(solver, starts, coefficients) - records
     parameters = dict(zip(NAMES, coefficients, strict=True))
-    bars = solver.pullback(starts, STEP, STEPS, 2 * rest / rest.size, STRIDE, parameters=parameters).parameters_bar
-    return np.mean(rest**2), np.array([bars[name] for name in NAMES])
+    bars = solver.pullback(
+        starts, STEP, STEPS, 2 * residuals / residuals.size, STRIDE, parameters=parameters
+    ).parameters_bar
+    return np.mean(residuals**2), np.array([bars[name] for name in NAMES])
 
 
 def learned(solver, starts, records):
     """The coefficients, and the losses on the way, from H = x3²/4."""
     losses = []
-    found = minimize(
+    fit = minimize(
         loss, np.zeros(len(NAMES)), (solver, starts, records), jac=True, method="BFGS", options={"gtol": 1e-7},
         callback=lambda c: losses.append(loss(c, solver, starts, records)[0]),
     )  # fmt: skip
-    return found.x, losses
+    return fit.x, losses
 
 
 @styled
@@ -57,9 +59,9 @@ def drawn(solver, start, coefficients, losses):
     left, right = figure.subplots(1, 2, width_ratios=(1.8, 1))
     steps = 10 * STEPS
     t = STEP * STRIDE * np.arange(steps // STRIDE + 1)
-    for own, style, label in ((TRUE, {"color": SERIES[1], "linewidth": 2.6, "alpha": 0.4}, "truth"),
+    for curve, style, label in ((TRUE, {"color": SERIES[1], "linewidth": 2.6, "alpha": 0.4}, "truth"),
                               (coefficients, {"color": SERIES[0], "linewidth": 0.9}, "prediction")):  # fmt: skip
-        left.plot(t, rows(solver, start[np.newaxis], own, steps)[:, 0, 0], label=label, **style)
+        left.plot(t, rows(solver, start[np.newaxis], curve, steps)[:, 0, 0], label=label, **style)
     left.axvspan(0, STEP * STEPS, color="#8b98a9", alpha=0.2, linewidth=0, label="length of a record")
     left.set(xlabel="t", ylabel="x1", ylim=(0.3, 1.3))
     left.legend(loc="upper right", ncols=3)

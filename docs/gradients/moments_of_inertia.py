@@ -26,19 +26,19 @@ def velocities(solver, unknown, samples):
 def loss(unknown, solver, record):
     """Half the sum of squares of what is not explained, in units of the noise, and its gradient: one run back."""
     moments, samples = np.array([*unknown[:2], I3]), len(record)
-    rest = (velocities(solver, unknown, samples) - record) / NOISE**2
+    residuals = (velocities(solver, unknown, samples) - record) / NOISE**2
     run = {"h": STEP, "steps": STRIDE * (samples - 1), "stride": STRIDE, "I1": unknown[0], "I2": unknown[1], "I3": I3}
-    x, start_bar, bars = solver.pullback(unknown[2:], cotangent=rest / moments, **run)
-    direct = -np.sum(rest * x, axis=0) / moments**2  # ω depends on I beside x
-    return 0.5 * NOISE**2 * np.sum(rest**2), np.array([bars["I1"] + direct[0], bars["I2"] + direct[1], *start_bar])
+    x, start_bar, bars = solver.pullback(unknown[2:], cotangent=residuals / moments, **run)
+    direct = -np.sum(residuals * x, axis=0) / moments**2  # ω depends on I beside x
+    return 0.5 * NOISE**2 * np.sum(residuals**2), np.array([bars["I1"] + direct[0], bars["I2"] + direct[1], *start_bar])
 
 
 def fitted(solver, record):
     """The unknowns, their standard deviations, and how many gradients that took: first of a short record."""
     unknown, gradients = GUESS, 0
     for samples in (15, 40, len(record)):
-        found = minimize(loss, unknown, (solver, record[:samples]), jac=True, method="BFGS", options={"gtol": 1e-3})
-        unknown, gradients = found.x, gradients + found.njev
+        fit = minimize(loss, unknown, (solver, record[:samples]), jac=True, method="BFGS", options={"gtol": 1e-3})
+        unknown, gradients = fit.x, gradients + fit.njev
     width = 1e-5  # the Hessian, by differences of gradients
     sides = [[loss(unknown + s * width * e, solver, record)[1] for s in (1, -1)] for e in np.eye(5)]
     hessian = np.array([(a - b) / (2 * width) for a, b in sides])
