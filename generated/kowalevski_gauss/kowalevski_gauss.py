@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 72 additions, 93 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 11417cdc767b9b21f3149623b9778bc0fd5fbdabaa4964faa3c2bd149960fe61
+# body-sha256: cc3f02f6eb99c5d4b255135aefe857b80358a31a98363d41c4574fd36f819b09
 import numpy as np
 
 VERSION = "0.1.0"
@@ -309,8 +309,11 @@ def _factors_at(fractions):
 
 
 def _interpolated(stage, x, increments, fractions):
-    """Return states at fractions of a step that ends at x, (fractions, DIM), from its increments in the frame of x."""
-    offsets = np.moveaxis(increments @ _factors_at(fractions).T, -1, 1)[:, :, 0]
+    """Return states at fractions of a step that ends at x, (fractions, DIM), from its increments in the frame of x.
+
+    Increments of the step before may follow.
+    """
+    offsets = np.moveaxis(increments[..., : len(NODES)] @ _factors_at(fractions).T, -1, 1)[:, :, 0]
     return x + _stage_change(stage[0], _point(stage, np.repeat(x, len(fractions), axis=0))[:, 0], offsets)
 
 

@@ -61,6 +61,11 @@ class AttitudeState(NamedTuple):
         return cls(arrays["first"], float(arrays["begun"]), arrays["element"], arrays["lost"], rate)
 
 
+def _memory_name(stage: int, part: int) -> str:
+    """Name of an array of a saved session: a part of the memory of a stage."""
+    return f"memory_{stage}_{part}"
+
+
 class NumpySession:
     """A session that holds the variables of the module's ``integrate``. See `phigen.runtime.session.Session`."""
 
@@ -257,12 +262,12 @@ class NumpySession:
         """See `Session`."""
         buffer = io.BytesIO()
         gauge = np.empty(0) if self._gauge is None else self._gauge
-        memory = np.array(self._memory)
+        memory = {_memory_name(k, j): part for k, pair in enumerate(self._memory) for j, part in enumerate(pair)}
         clock: dict[str, Any] = {"t": self._t, "counted": self._counted, "h": self._h, "steps": self.steps}
         clock["draws"] = np.array([self._draws.seed, self._draws.member, self._draws.step], dtype=np.uint64)
         clock["passed"] = np.array(self._passed)
         attitude_arrays = {} if self._turned is None else self._turned.arrays()
-        arrays = {"x": self._x, "carry": self._carry, "memory": memory, "gauge": gauge, **attitude_arrays}
+        arrays = {"x": self._x, "carry": self._carry, "gauge": gauge, **memory, **attitude_arrays}
         np.savez(buffer, allow_pickle=False, **arrays, **clock)
         return buffer.getvalue()
 
@@ -277,7 +282,9 @@ class NumpySession:
             session._turned = AttitudeState.from_arrays(archive) if "first" in archive else None
             if np.isfinite(archive["h"]):
                 session._prepare(float(archive["h"]))
-                session._memory = [(pair[0], pair[1]) for pair in archive["memory"]]
+                session._memory = [
+                    (archive[_memory_name(k, 0)], archive[_memory_name(k, 1)]) for k in range(len(session._stages))
+                ]
             session._t, session._counted = float(archive["t"]), int(archive["counted"])
             session._passed = (archive["passed"][0], archive["passed"][1])
         return session

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import RawC, compiled, files, first_run, javascript, small
+from support import RawC, compiled, files, first_run, javascript, small, solver
 
 STEPS = 200
 
@@ -40,3 +40,16 @@ def test_steps_of_regular_motion_take_four_sweeps(count):
     run = first_run(compilation)
     x0 = [float(v) for v in run.initial]
     assert count(compilation, x0, 4 * float(run.step)) <= 4.1 * STEPS
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_stored_sessions_continue_with_the_increments_of_two_steps(target):
+    compilation = compiled("so4_manakov", 12, "gauss")
+    run = first_run(compilation)
+    h, backend = 4 * float(run.step), solver(compilation, target).backend
+    whole, part = (backend.start(np.array([float(v) for v in run.initial]), {}) for _ in range(2))
+    whole.advance(h, 9)
+    part.advance(h, 4)
+    restored = backend.restored(part.saved(), {})
+    restored.advance(h, 5)
+    assert restored.state().tolist() == whole.state().tolist()
