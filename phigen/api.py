@@ -12,6 +12,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, TypeAlias, Unpack, overload
 
@@ -236,7 +237,9 @@ def interface_of(program: Program) -> Interface:
     )
     step = program.step.swept
     if step is None:
-        return interface
+        from phigen.targets.device.members import ensemble_launch
+
+        return replace(interface, ensemble=ensemble_launch(program))
     from phigen.targets.device.launches import launches
 
     sites = step.sites

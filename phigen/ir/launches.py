@@ -1,9 +1,23 @@
-"""Launches of the kernels of a lattice on a device, as plain data."""
+"""Launches of the kernels of a solver on a device, as plain data."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class EnsembleLaunch:
+    """The kernel of an ensemble: the usual number of work items in a ``group``, and numbers of values.
+
+    ``predictors`` are the values of a member in shared memory, ``coefficients`` those that members with the same
+    parameters, step and gauge can share; 0 if there are none. ``gauges`` are the factors of a gauge.
+    """
+
+    group: int = 0
+    predictors: int = 0
+    coefficients: int = 0
+    gauges: int = 0
 
 
 @dataclass(frozen=True)

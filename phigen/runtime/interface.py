@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from phigen.ir.launches import LatticeLaunches
+from phigen.ir.launches import EnsembleLaunch, LatticeLaunches
 
 Floats = NDArray[np.float64]
 
@@ -60,6 +60,7 @@ class Interface:
     draws: int = 0  # number of increments of the noise in a step
     single: bool = False  # whether the C computes in single precision
     observables: tuple[str, ...] = ()
+    ensemble: EnsembleLaunch = field(default_factory=EnsembleLaunch)  # of the kernel of devices
 
     @property
     def dimension(self) -> int:

@@ -7,15 +7,17 @@ and the source of the solver in its attributes.
 
 from __future__ import annotations
 
+import builtins
+import collections.abc
 import hashlib
 import json
 import shutil
 import uuid
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, is_dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -169,12 +171,26 @@ def open_job(path: str) -> Job:
 
 def interface_of(about: Mapping[str, Any]) -> Interface:
     """Return an interface from plain data."""
-    interface_type = LatticeInterface if "axes" in about else Interface
-    kinds = {f.name: str(f.type) for f in fields(interface_type)}
-    makers: dict[str, Callable[[Any], Any]] = {"tuple": tuple, "frozenset": frozenset}
-    return interface_type(
-        **{k: makers.get(kinds[k].partition("[")[0], lambda v: v)(value) for k, value in about.items()}
-    )
+    interface: Interface = _restored(LatticeInterface if "axes" in about else Interface, about)
+    return interface
+
+
+def _restored(kind: Any, value: Any) -> Any:
+    """Return a value of a type from the data that JSON has of it: records, tuples, sets and mappings."""
+    if is_dataclass(kind):
+        hints = get_type_hints(kind)
+        return kind(**{name: _restored(hints[name], each) for name, each in value.items()})  # type: ignore[operator]
+    within = get_args(kind)
+    match get_origin(kind):
+        case builtins.tuple if len(within) == 2 and within[1] is ...:
+            return tuple(_restored(within[0], each) for each in value)
+        case builtins.tuple:
+            return tuple(_restored(each_kind, each) for each_kind, each in zip(within, value, strict=True))
+        case builtins.frozenset:
+            return frozenset(value)
+        case collections.abc.Mapping:
+            return {key: _restored(within[1], each) for key, each in value.items()}
+    return value
 
 
 def waiting(job: Job) -> list[int]:

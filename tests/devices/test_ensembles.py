@@ -1,6 +1,8 @@
 """Ensembles on devices, by OpenCL on the processor, against C."""
 
+import math
 import pickle
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +12,7 @@ from systems import spec_of
 
 import phigen
 from phigen import resources
-from phigen.api import compilation_of
+from phigen.api import compilation_of, interface_of
 from phigen.compiler import emit
 from phigen.errors import DeviceError, PhigenWarning
 from phigen.runtime.devices import opencl
@@ -206,6 +208,35 @@ def test_an_array_that_exceeds_the_memory_of_the_device_is_one():
     device = opencl.device()
     with pytest.raises(OutOfMemoryError):
         device.empty(2 * device.largest + device.memory)
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("rigid_body", {}),
+        ("henon_heiles", {"order": 6}),
+        ("rigid_body", {"order": 4, "scheme": "splitting"}),
+        ("pendulum_euler", {}),
+        ("thermal_spin", {}),
+        ("kowalevski_gauss", {}),
+        ("nambu_pendulum", {}),
+    ],
+)
+def test_sizes_of_kernels_are_those_of_the_generated_code(name, options):
+    """The numbers of the interface and the constants in the header have the same sources."""
+    program = compilation_of(name, profile="small", **options).program
+    (text,) = emit(program, "device", "phigen build").values()
+
+    def constants(*names):
+        found = {n: re.search(rf"{program.name}_{n} =? ?(\d+)", text) for n in names}
+        return [int(match[1]) for match in found.values() if match]
+
+    launch = interface_of(program).ensemble
+    assert constants("GROUP") == [launch.group]
+    shared = math.prod(constants("STAGES", "DIFFERENCES", "DIM")) if f"{program.name}_LENT" in text else 0
+    assert launch.predictors == shared
+    common = math.prod(constants("STAGES", "COEFFICIENTS")) if f"{program.name}_COMMON" in text else 0
+    assert (launch.coefficients, launch.gauges) == (common, sum(constants("GAUGES")))
 
 
 def test_steps_that_a_card_runs_slowly_are_warned_of(body, x0, monkeypatch):

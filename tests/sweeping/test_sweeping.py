@@ -17,7 +17,7 @@ from click.testing import CliRunner
 import phigen
 from phigen import resources
 from phigen import spec as specs
-from phigen.api import compilation_of
+from phigen.api import compilation_of, interface_of
 from phigen.errors import FileError, MissingPackageError, SpecError
 from phigen.spec.model import Axis, SweepSettings
 from phigen.spec.sweeps import end_of_its_own
@@ -625,6 +625,23 @@ def drawn(store, monkeypatch, shown=None):
     monkeypatch.setattr(sweep_map, "save", lambda figure, path, origin: figures.append(figure))
     sweep_map.draw(store, store.with_suffix(".svg"), shown)
     return figures[0].get_axes()
+
+
+def test_interfaces_come_back_from_a_store():
+    """With the launches of the kernels of devices, which are records within records."""
+    for source in (BODY, SPRINGS):
+        about = interface_of(compilation_of(specs.loads(source)).program)
+        stored = store.made_by(about, {}, "", "")["interface"]
+        assert store.interface_of(stored) == about
+
+
+@pytest.mark.slow
+def test_lattices_of_a_sweep_run_on_a_device(cluster):
+    pytest.importorskip("pyopencl")
+    setting = {"over": {"k": [1.0, 2.0]}, "scheduler": cluster.scheduler_address}
+    ours, theirs = (phigen.sweep(specs.loads(SPRINGS), target=target, **setting) for target in ("opencl", "numpy"))
+    assert (ours.status == 0).all()
+    np.testing.assert_allclose(ours.final, theirs.final, rtol=0, atol=1e-13)
 
 
 def test_logarithmic_axes_and_large_energy_errors_are_seen(cluster, tmp_path, monkeypatch):

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import math
-import re
 import warnings
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Any, cast
 
 import numpy as np
@@ -185,13 +182,12 @@ class DeviceSolver:
 
     def _group(self) -> dict[str, int]:
         """Return the definition of a smaller group, if predictors need more shared memory than the device has."""
-        name, header = self.interface.name, self._header
-        if f"{name}_LENT = " not in header:
+        launch = self.interface.ensemble
+        if not launch.predictors:
             return {}
-        sizes = re.findall(rf"{name}_(?:STAGES =|DIFFERENCES =|DIM) (\d+)", header)
-        fitting = self.device.shared // (np.dtype(self._real).itemsize * math.prod(map(int, sizes)))
-        (usual,) = map(int, re.findall(rf"#define {name}_GROUP (\d+)", header))
-        return {f"{name}_GROUP": 1 << max(0, fitting.bit_length() - 1)} if fitting < usual else {}
+        fitting = self.device.shared // (np.dtype(self._real).itemsize * launch.predictors)
+        smaller = {f"{self.interface.name}_GROUP": 1 << max(0, fitting.bit_length() - 1)}
+        return smaller if fitting < launch.group else {}
 
     def _warn_of_local_memory(self, kernel: Any) -> None:
         """Warn of steps that are slow because the registers of a card are too few for their values."""
@@ -204,12 +200,11 @@ class DeviceSolver:
         """Whether all members have the same parameters, step and gauge, and their kernel can share coefficients."""
         same = np.ndim(members.h) == 0 and not any(np.ndim(v) for v in members.parameters.values())
         has_chosen_gauge = self._holds_gauge and self._gauge is None
-        return same and not has_chosen_gauge and f"{self.interface.name}_COMMON" in self._header
+        return bool(same and not has_chosen_gauge and self.interface.ensemble.coefficients)
 
     def _coefficients(self, members: Members) -> Any:
         """Return the coefficients of all members as an argument of their kernel."""
-        numbers = re.findall(rf"{self.interface.name}_(?:STAGES|COEFFICIENTS) = (\d+)", self._header)
-        coefficients = np.empty(math.prod(map(int, numbers)), self._real)
+        coefficients = np.empty(self.interface.ensemble.coefficients, self._real)
         buffer = self.device.empty(coefficients.nbytes)
         parameters, h = (self._shared_or_each(v)[0] for v in (self._parameters(members), np.atleast_1d(members.h)))
         gauge = [self._gauge_argument()] if self._holds_gauge else []
@@ -221,9 +216,9 @@ class DeviceSolver:
         """Return a buffer of the gauge of all members, None for gauges chosen at their starts."""
         return None if self._gauge is None else self._written(np.array(self._gauge, self._real))
 
-    @cached_property
+    @property
     def _holds_gauge(self) -> bool:
-        return f"{self.interface.name}_GAUGES" in self._header
+        return self.interface.ensemble.gauges > 0
 
     def _parameters(self, members: Members) -> Floats:
         """Return the parameters (members or 1, parameters); a system without any has one unused number."""

@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any
 
 from phigen.errors import Diagnostic, SpecError
-from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import OVERLOADED, Program
 from phigen.targets.c import emitter as c
 from phigen.targets.c.amalgamation import Amalgam
@@ -21,6 +20,7 @@ from phigen.targets.c.real import real_of, rendered
 from phigen.targets.c.step_text import text_of
 from phigen.targets.device import lattice
 from phigen.targets.device.dialect import qualified
+from phigen.targets.device.members import group_size, has_common_coefficients
 from phigen.targets.device.registers import spilling
 from phigen.targets.header import header_lines, sealed
 
@@ -52,34 +52,6 @@ def for_devices(program: Program) -> Program:
     real = OVERLOADED if program.single else program.extras.real
     extras = replace(program.extras, tangent=False, adjoint=False, modified_hamiltonian=0, real=real)
     return replace(program, step=step, extras=extras, modified=None, attitude=None, lanes=False, profile="small")
-
-
-#: Bytes of shared memory of a work group that all cards have; bytes of the predictors for one coordinate of a stage.
-_SHARED, _OF_PREDICTOR = 48 * 1024, 8 * PredictorPolicy().differences
-
-#: Sizes of work groups, the largest first: 128 hides memory latency better than 256 if work items use many registers.
-_GROUPS = (128, 64, 32, 16, 8, 4, 2, 1)
-
-
-def group_size(program: Program) -> int:
-    """Return the largest number of work items in a group whose predictors fit into shared memory."""
-    if not program.step.kind.predicted or program.step.kind.collocates or program.noise:
-        return _GROUPS[0]
-    of_item = _OF_PREDICTOR * program.dimension * len(program.fractions)
-    return next((size for size in _GROUPS if size * of_item <= _SHARED), _GROUPS[-1])
-
-
-#: Bytes of coefficients that a kernel of CUDA can receive: all its arguments have at most 4,096.
-_COMMON_BYTES = 3_840
-
-
-def has_common_coefficients(program: Program) -> bool:
-    """Whether members with the same parameters, step and gauge may share the coefficients of their steps."""
-    step = program.step
-    if step.swept or step.refresh or step.kind.collocates or step.path is not None or program.monitor:
-        return False
-    size = 4 if program.single else 8
-    return 0 < size * step.coefficients * len(program.fractions) <= _COMMON_BYTES
 
 
 def text_of_device(program: Program) -> str:
