@@ -178,13 +178,14 @@ def test_javascript_has_the_same_observables(case, tmp_path):
     text, _, parameters = CASES[case]
     spec = phigen.spec.loads(text)
     trajectory = phigen.compile(spec, target="numpy").run(**parameters)
-    (module,) = emit(compile_spec(spec).program, "js", "").values()
+    program = compile_spec(spec).program
+    (module,) = emit(program, "js", "").values()
     path = tmp_path / f"{spec.name}.mjs"
     path.write_text(module)
     listed_parameters = {k: np.ravel(v).tolist() if np.ndim(v) else v for k, v in trajectory.parameters.items()}
     options = {"x0": trajectory.x[-1].ravel().tolist(), "sizes": list(trajectory.x.shape[2:])}
     options |= {"bonds": listed_parameters.pop("bonds")} if "bonds" in listed_parameters else {}
-    options |= {"params": listed_parameters, "t0": float(trajectory.t[-1])}
+    options |= {"params": listed_parameters} | ({"t0": float(trajectory.t[-1])} if program.time else {})
     body = f"""const s = new module.Solver({json.dumps(options)});
     const {{ OBSERVABLES, OBSERVED_FIELDS: fields = [] }} = module.Solver;
     return [OBSERVABLES, [...s.observables()], fields, fields.length ? [...s.observedFields()] : []];"""
