@@ -14,6 +14,7 @@ from support import BODY
 from tools import WARNINGS, run, tool
 
 import phigen
+from phigen import resources
 from phigen.cli import group
 from phigen.fmu.archive import archive, binaries
 from phigen.fmu.platforms import FLAGS, PLATFORMS, compilers
@@ -94,6 +95,13 @@ def test_descriptions_and_declarations_are_those_of_the_standard(source, tmp_pat
     run([tool("gcc"), "-std=c99", *WARNINGS, "-fsyntax-only", f"{name}_fmi.c"], tmp_path)
     run([tool("gcc"), "-std=c99", f"-I{HEADERS}", "-fsyntax-only", "all.c"], tmp_path)
     run([tool("g++"), "-x", "c++", "-fsyntax-only", f"{name}_fmi.c"], tmp_path)
+
+
+def test_functions_of_fmi_are_short():
+    """The functions of both versions, comments included."""
+    texts = [path.read_text(encoding="utf-8") for path in (resources.templates() / "c/runtime").glob("fmu*.c")]
+    assert len(texts) == 3
+    assert sum(line.strip() != "" for text in texts for line in text.split("\n")) < 600
 
 
 def test_text_of_the_spec_arrives_as_it_is(body):
@@ -289,7 +297,12 @@ def test_noise_takes_its_seed_and_whole_steps_only(tmp_path):
     def after(seed):
         with running(paths[3], tmp_path / str(seed)) as instance:
             instance.raw.reset()
-            instance.raw.setInt32([instance.numbers["solver.seed"]], [seed])
+            number = instance.numbers["solver.seed"]
+            instance.raw.setInt32([number], [seed])
+            assert instance.raw.getInt32([number]) == [seed]
+            for put, value in [(instance.raw.setInt32, -1), (instance.raw.setFloat64, 3.0)]:
+                with pytest.raises(Exception, match="error"):
+                    put([number], [value])
             instance.raw.enterInitializationMode(startTime=0.0)
             instance.raw.exitInitializationMode()
             with pytest.raises(Exception, match="discard"):

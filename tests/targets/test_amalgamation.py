@@ -161,7 +161,12 @@ static int n_short(void) { return 1; } /* on one line */
 static int n_behind(void)
 {
     return n_never();
-}"""
+}
+
+/* Called by a macro of two lines. */
+static int n_by_macro(void) { return 1; }
+#define N_MACRO(name) \\
+    int name(void) { return n_by_macro(); }"""
 
 
 def test_functions_without_use_are_left_out_with_what_is_said_of_them():
@@ -179,6 +184,10 @@ def test_functions_without_use_are_left_out_with_what_is_said_of_them():
         "int foreign(void);",
         "int n_defined(void) { return n_called() + n_short(); }",
         "static int n_short(void) { return 1; } /* on one line */",
+        "/* Called by a macro of two lines. */",
+        "static int n_by_macro(void) { return 1; }",
+        "#define N_MACRO(name) \\",
+        "    int name(void) { return n_by_macro(); }",
     ]
 
 

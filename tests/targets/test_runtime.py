@@ -216,3 +216,13 @@ def test_a_function_on_a_line_that_is_too_long_gets_lines_of_its_own():
         f"    return *{'x' * 20} > 0.0;",
         "}",
     ]
+
+
+def test_long_lines_of_macros_end_with_backslashes():
+    name = "f" * 60
+    macro = f"#define N_SET(type) \\\n    void {name}(type x) \\\n    {{ \\\n        {name}(x, {name}); \\\n    }}"
+    lines = fitted(f"{macro}\nint after;").split("\n")
+    assert max(map(len, lines)) <= WIDTH
+    assert [line.endswith(" \\") for line in lines] == [True] * (len(lines) - 2) + [False] * 2
+    words = " ".join(line.removesuffix("\\") for line in lines).split()
+    assert words == f"{macro}\nint after;".replace("\\", " ").split()

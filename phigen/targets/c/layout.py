@@ -45,11 +45,15 @@ def _lines(lines: list[str]) -> Iterator[str]:
         end = k
         if lines[k].lstrip().startswith("/*"):
             end = next(j for j in range(k, len(lines)) if "*/" in lines[j])
-        elif not lines[k].startswith("#"):
+        elif lines[k].startswith("#"):
+            end = next(j for j in range(k, len(lines)) if not lines[j].endswith("\\"))
+        else:
             end = _statement(lines, k)
         block, k = lines[k : end + 1], end + 1
         if max(map(len, block)) <= WIDTH:
             yield from block
+        elif block[0].endswith("\\"):
+            yield from _macro(block)
         elif block[0].startswith("#") and "/*" not in block[0]:
             *first, last = textwrap.wrap(block[0], WIDTH - 2, subsequent_indent="    ", break_on_hyphens=False)
             yield from (*(f"{line} \\" for line in first), last)
@@ -60,6 +64,14 @@ def _lines(lines: list[str]) -> Iterator[str]:
             yield from _code(whole)
             if _FUNCTION.fullmatch(whole) and k < len(lines) and lines[k]:
                 yield ""
+
+
+def _macro(lines: list[str]) -> Iterator[str]:
+    """Yield the lines of a macro, with long lines broken as other code is."""
+    for line in lines:
+        *first, last = _code(line.removesuffix(" \\"), WIDTH - 2)
+        yield from (f"{part} \\" for part in first)
+        yield f"{last} \\" if line.endswith(" \\") else last
 
 
 def _statement(lines: list[str], first: int) -> int:
@@ -94,7 +106,7 @@ def _indent(line: str) -> str:
 _FUNCTION = re.compile(r"(\S.*\)) \{ (.*;) \}")
 
 
-def _code(line: str) -> Iterator[str]:
+def _code(line: str, width: int = WIDTH) -> Iterator[str]:
     if function := _FUNCTION.fullmatch(line):
         yield from (*_code(function[1]), "{", *_code(f"    {function[2]}"), "}")
         return
@@ -103,9 +115,9 @@ def _code(line: str) -> Iterator[str]:
         yield from comment(match[2], _indent(line))
         line = match[1]
     further = _indent(line) + "    "
-    while len(line) > WIDTH:
-        place = max(_places(line, len(further)), default=(0, 0))[1]
-        if place == 0 and "(" in line[:WIDTH]:
+    while len(line) > width:
+        place = max(_places(line, len(further), width), default=(0, 0))[1]
+        if place == 0 and "(" in line[:width]:
             place = line.index("(") + 1
         if place == 0:
             break
@@ -114,11 +126,11 @@ def _code(line: str) -> Iterator[str]:
     yield line
 
 
-def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
+def _places(line: str, least: int, width: int) -> Iterator[tuple[int, int]]:
     """Yield the columns at which a line may be broken, each after its score; the highest score is the best."""
     depth, index, head = 0, 0, re.match(r" *(for|if|while) \(", line)
     line = _STRING.sub(lambda match: "'" * len(match[0]), line)
-    for k, c in enumerate(line[: WIDTH + 1]):
+    for k, c in enumerate(line[: width + 1]):
         depth += (c in "({") - (c in ")}")
         index += (c == "[") - (c == "]")
         if c != " " or k <= least:
@@ -130,4 +142,4 @@ def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
         assigned = line[k - 1] == "=" and line[k - 2] not in "<>=!"
         if line[k - 1] in ",;" or assigned or operator or after_loop or label:
             bound = _BOUND.get(operator[1], 0) if operator else 12 * assigned
-            yield k - _DEPTH * depth - _INDEX * index - bound + (WIDTH if after_loop else 0), k
+            yield k - _DEPTH * depth - _INDEX * index - bound + (width if after_loop else 0), k

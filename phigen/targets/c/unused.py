@@ -51,8 +51,17 @@ def _types(lines: Sequence[str], declarations: Iterable[Function]) -> set[int]:
 
 
 def _names_used(text: str) -> set[str]:
-    """The names in a text, without names of members; of directives, the names in their first lines."""
-    return used_names(text) | {name for line in text.splitlines() if line.startswith("#") for name in names(line)}
+    """Return the names in a text, without names of members; of directives all names, in all their lines."""
+    return used_names(text).union(*map(names, _directives(text)))
+
+
+def _directives(text: str) -> Iterator[str]:
+    """Yield the lines of directives of the preprocessor, with those that a backslash continues."""
+    continued = False
+    for line in text.splitlines():
+        if continued or line.startswith("#"):
+            yield line
+            continued = line.endswith("\\")
 
 
 def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str]) -> set[str]:

@@ -9,8 +9,8 @@
 #include "solver.h"
 #include "fmu_model.h"
 
-/* ---- Types of FMI, if the headers of the standard are not included before. Types that are other names of types of C,
-   such as fmi3Float64 of double, are written as these. ---- */
+/* ---- Types of FMI, unless headers of the standard are included before; other names of C types, such as fmi3Float64 of
+   double, are written as these C types ---- */
 
 #ifndef fmi3Functions_h
 typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
@@ -37,13 +37,8 @@ typedef struct {
 
 /* ---- The model between communication points ---- */
 
-/* A communication point counts as a grid point of whole steps if it is within this fraction of a step: sums of rounded
-   step sizes are not exact multiples of them. */
-static const double phi_fmu_slack = 1e-9;
-/* Most whole steps in a communication step: the number fits a size_t on every machine. */
-static const double phi_fmu_most_steps = 1e9;
-/* Whether a part of a step can be made: increments of the noise belong to whole steps. */
-static const bool phi_fmu_divisible = PHI_FMU_SEED == PHI_FMU_ATTITUDE;
+static const double phi_fmu_slack = 1e-9;     /* fraction of a step that counts as rounding of a communication point */
+static const double phi_fmu_most_steps = 1e9; /* most whole steps in a communication step; it fits any size_t */
 
 /* Modes of an FMU, as bits: a call may be allowed in several modes. */
 enum { PHI_INSTANTIATED = 1, PHI_INITIALISING = 2, PHI_STEPPING = 4, PHI_AT_EVENT = 8, PHI_TERMINATED = 16 };
@@ -137,7 +132,7 @@ static phi_status phi_fmu_part(phi_fmu_state *f, double target)
     for (int k = 0; k < 50; ++k) {
         const double missing = target - phi_fmu_time(f, &f->now);
         if (fabs(missing) <= phi_fmu_tolerance(f, target)) return PHI_OK;
-        if (!phi_fmu_divisible) return PHI_BAD_ARGUMENT;
+        if (PHI_FMU_SEED != PHI_FMU_ATTITUDE) return PHI_BAD_ARGUMENT; /* noise has increments for whole steps only */
         part = fmin(fmax(part + PHI_IN_TAU(missing, f->now), 0.0), f->step);
         f->now = f->grid;
         const phi_status status = phi_step(&f->now, (phi_real)part);
@@ -148,10 +143,10 @@ static phi_status phi_fmu_part(phi_fmu_state *f, double target)
 
 /* ---- Variables, by their value references ---- */
 
-static bool phi_fmu_within(uint32_t variable, uint32_t first, uint32_t end)
-{
-    return variable >= first && variable < end;
-}
+static bool phi_fmu_within(uint32_t variable, uint32_t first, uint32_t end) { return variable >= first && variable < end; }
+
+/* Whether a variable is the seed, which exists with noise only, and is the only whole number. */
+static bool phi_fmu_is_whole(uint32_t variable) { return phi_fmu_within(variable, PHI_FMU_SEED, PHI_FMU_ATTITUDE); }
 
 /* Return the place of a variable that the state stores as a number of the solver; NULL for other variables. */
 static phi_real *phi_fmu_place(phi_fmu_state *f, uint32_t variable)
@@ -160,12 +155,10 @@ static phi_real *phi_fmu_place(phi_fmu_state *f, uint32_t variable)
     if (phi_fmu_within(variable, PHI_FMU_PARAMETER, PHI_FMU_STEP))
         return (phi_real *)(void *)&f->now.params + (variable - PHI_FMU_PARAMETER);
 #if PHI_ATTITUDE
-    if (phi_fmu_within(variable, PHI_FMU_ATTITUDE, PHI_FMU_POSITION))
-        return &f->now.attitude[variable - PHI_FMU_ATTITUDE];
+    if (phi_fmu_within(variable, PHI_FMU_ATTITUDE, PHI_FMU_POSITION)) return &f->now.attitude[variable - PHI_FMU_ATTITUDE];
 #endif
 #if PHI_POSITION
-    if (phi_fmu_within(variable, PHI_FMU_POSITION, PHI_FMU_ENERGY))
-        return &f->now.position[variable - PHI_FMU_POSITION];
+    if (phi_fmu_within(variable, PHI_FMU_POSITION, PHI_FMU_ENERGY)) return &f->now.position[variable - PHI_FMU_POSITION];
 #endif
     return NULL;
 }
@@ -179,6 +172,7 @@ static bool phi_fmu_get(phi_fmu_state *f, uint32_t variable, double *value)
     if (place != NULL) *value = (double)*place;
     else if (variable == PHI_FMU_TIME) *value = f->time;
     else if (variable == PHI_FMU_STEP) *value = f->step;
+    else if (phi_fmu_is_whole(variable)) *value = f->seed;
     else if (variable == PHI_FMU_ENERGY)
         *value = (double)phi_hamiltonian(&s->params PHI_AND_T((phi_real)f->time), s->x);
     else if (phi_fmu_within(variable, PHI_FMU_CASIMIR, PHI_FMU_OBSERVABLE)) {
@@ -204,85 +198,63 @@ static bool phi_fmu_set(phi_fmu_state *f, uint32_t variable, double value)
     if (!isfinite(value) || !allowed) return false;
     if (place != NULL) *place = (phi_real)value;
     else if (variable == PHI_FMU_STEP && value > 0.0) f->step = value;
+    else if (phi_fmu_is_whole(variable) && value >= 0.0) f->seed = (int32_t)value;
     else return false;
     return true;
 }
 
-/* Whether a variable is the seed, which exists with noise only, and is the only whole number. */
-static bool phi_fmu_is_whole(uint32_t variable) { return phi_fmu_within(variable, PHI_FMU_SEED, PHI_FMU_ATTITUDE); }
-
-/* ---- States as bytes ---- */
-
-/* Copy of a state, with a checksum of both the state and the token of the FMU. It can be read on machines of the same kind
-   only. */
-typedef struct {
-    uint64_t checksum;
-    phi_fmu_state state;
-} phi_fmu_saved;
-
-/* The checksum FNV-1a. */
-static uint64_t phi_fmu_checksum(const phi_fmu_state *f)
+/* The checksum FNV-1a of the bytes of a state and of the token. */
+static uint64_t phi_fmu_checksum(const unsigned char *state)
 {
-    const unsigned char *bytes = (const unsigned char *)f;
     uint64_t sum = 14695981039346656037u;
     for (size_t k = 0; k < sizeof phi_token; ++k) sum = (sum ^ (unsigned char)phi_token[k]) * 1099511628211u;
-    for (size_t k = 0; k < sizeof *f; ++k) sum = (sum ^ bytes[k]) * 1099511628211u;
+    for (size_t k = 0; k < sizeof(phi_fmu_state); ++k) sum = (sum ^ state[k]) * 1099511628211u;
     return sum;
-}
-
-static void phi_fmu_save(const phi_fmu_state *f, phi_fmu_saved *saved)
-{
-    memcpy(&saved->state, f, sizeof *f);
-    saved->checksum = phi_fmu_checksum(&saved->state);
-}
-
-/* Copy bytes to a saved state. Returns false if they are not a state of this FMU. */
-static bool phi_fmu_read(phi_fmu_saved *saved, const void *bytes, size_t count)
-{
-    if (bytes == NULL || count != sizeof *saved) return false;
-    memcpy(saved, bytes, sizeof *saved);
-    return saved->checksum == phi_fmu_checksum(&saved->state);
 }
 
 /* ---- Instances ---- */
 
+/* Functions of the environment, NULL for those that it does not have. */
+typedef struct {
+    void *environment;        /* the first argument of each function */
+    fmi2CallbackLogger log_2; /* logger for FMI 2.0 */
+    fmi3LogMessageCallback log_3;
+    fmi3IntermediateUpdateCallback update; /* called after whole steps */
+} phi_fmu_callbacks;
+
 typedef struct {
     phi_fmu_state state;
+    phi_fmu_callbacks callbacks;
     char *name;
-    void *environment;
-    fmi2CallbackLogger log_2; /* logger of the environment for FMI 2.0, or NULL */
-    fmi3LogMessageCallback log_3;
-    fmi3IntermediateUpdateCallback update; /* callback for whole steps, or NULL */
     bool logging, may_return_early;
 } phi_fmu;
 
 /* Report the reason of a failed call to the environment. */
-static void phi_fmu_say(const phi_fmu *instance, const char *message)
+static void phi_fmu_say(const phi_fmu_callbacks *to, const char *name, const char *message)
 {
-    void *environment = instance->environment;
-    if (!instance->logging) return;
-    if (instance->log_2 != NULL)
-        instance->log_2(environment, instance->name, fmi2Error, "logStatusError", "%s", message);
-    if (instance->log_3 != NULL) instance->log_3(environment, fmi3Error, "logStatusError", message);
+    if (to->log_2 != NULL) to->log_2(to->environment, name, fmi2Error, "logStatusError", "%s", message);
+    if (to->log_3 != NULL) to->log_3(to->environment, fmi3Error, "logStatusError", message);
 }
 
 /* Allocate an instance, with its name behind it. Returns NULL without memory, or if the token is that of another FMU. */
-static phi_fmu *phi_fmu_instantiate(const char *name, const char *token, void *environment, bool logging)
+static phi_fmu *phi_fmu_instantiate(const char *name, const char *token, const phi_fmu_callbacks *callbacks, bool logging)
 {
-    if (token == NULL || strcmp(token, phi_token) != 0) return NULL;
     const size_t letters = name == NULL ? 0 : strlen(name);
-    phi_fmu *instance = (phi_fmu *)calloc(1, sizeof *instance + letters + 1);
-    if (instance == NULL) return NULL;
+    const bool ours = token != NULL && strcmp(token, phi_token) == 0;
+    phi_fmu *instance = ours ? (phi_fmu *)calloc(1, sizeof *instance + letters + 1) : NULL;
+    if (instance == NULL) {
+        phi_fmu_say(callbacks, name, "wrong instantiation token, no memory, or not for co-simulation");
+        return NULL;
+    }
     instance->name = (char *)(instance + 1);
     if (letters > 0) memcpy(instance->name, name, letters);
-    instance->environment = environment;
+    instance->callbacks = *callbacks;
     instance->logging = logging;
     phi_fmu_reset(&instance->state);
     return instance;
 }
 
-/* Whether a communication step may start at this time with this size: both finite, the time is the present
-   communication point, and the step ends at the stop time or before it. */
+/* Whether a communication step may start at this time, the present communication point, and ends by the stop time. */
 static bool phi_fmu_may_step(const phi_fmu_state *f, double from, double size)
 {
     if (f->mode != PHI_STEPPING || !isfinite(from) || !(size >= 0.0) || !isfinite(size)) return false;
@@ -293,9 +265,10 @@ static bool phi_fmu_may_step(const phi_fmu_state *f, double from, double size)
 /* Report a whole step to the environment; return whether it ends the communication step there. */
 static bool phi_fmu_ends(const phi_fmu *instance, double time)
 {
+    const phi_fmu_callbacks *to = &instance->callbacks;
     bool early = false;
     double until = time;
-    instance->update(instance->environment, time, false, true, true, instance->may_return_early, &early, &until);
+    to->update(to->environment, time, false, true, true, instance->may_return_early, &early, &until);
     return early && instance->may_return_early && until <= time;
 }
 
@@ -304,6 +277,7 @@ static phi_status phi_fmu_do_step(phi_fmu *instance, double target)
 {
     phi_fmu_state *f = &instance->state;
     const phi_fmu_state before = *f;
+    const bool reports = instance->callbacks.update != NULL;
     phi_status status = PHI_OK;
     bool ends = false;
 #if PHI_PARAMETERS
@@ -312,8 +286,8 @@ static phi_status phi_fmu_do_step(phi_fmu *instance, double target)
         if (status == PHI_OK) phi_fmu_begin_grid(f);
     }
 #endif
-    if (instance->update == NULL && status == PHI_OK) status = phi_fmu_whole_steps(f, target, phi_fmu_most_steps);
-    while (instance->update != NULL && !ends && status == PHI_OK) {
+    if (!reports && status == PHI_OK) status = phi_fmu_whole_steps(f, target, phi_fmu_most_steps);
+    while (reports && !ends && status == PHI_OK) {
         const size_t done = f->grid.steps;
         status = phi_fmu_whole_steps(f, target, 1.0);
         if (f->grid.steps == done) break;
@@ -325,9 +299,7 @@ static phi_status phi_fmu_do_step(phi_fmu *instance, double target)
         status = phi_fmu_part(f, target);
         f->time = target;
     }
-    if (status == PHI_OK) return PHI_OK;
-    *f = before;
-    phi_fmu_say(instance, phi_status_string(status));
+    if (status != PHI_OK) *f = before;
     return status;
 }
 #include "fmu3.c"

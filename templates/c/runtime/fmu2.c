@@ -17,14 +17,10 @@ FMI_SHARED const char *FMI2_NAME(GetVersion)(void) { return "2.0"; }
 FMI_SHARED void *FMI2_NAME(Instantiate)(const char *name, fmi2Type type, const char *guid, const char *resources,
     const fmi2CallbackFunctions *functions, int visible, int logging)
 {
-    const fmi2CallbackLogger log = functions == NULL ? NULL : functions->logger;
-    void *environment = functions == NULL ? NULL : functions->componentEnvironment;
-    phi_fmu *instance =
-        type == fmi2CoSimulation ? phi_fmu_instantiate(name, guid, environment, logging != 0) : NULL;
-    if (instance != NULL) instance->log_2 = log;
-    else if (log != NULL)
-        log(environment, name, fmi2Error, "logStatusError", "wrong GUID, no memory, or not for co-simulation");
-    return instance;
+    phi_fmu_callbacks callbacks = { NULL, NULL, NULL, NULL };
+    if (functions != NULL) callbacks.environment = functions->componentEnvironment;
+    if (functions != NULL) callbacks.log_2 = functions->logger;
+    return phi_fmu_instantiate(name, type == fmi2CoSimulation ? guid : NULL, &callbacks, logging != 0);
 }
 
 FMI_SHARED void FMI2_NAME(FreeInstance)(void *of) { free(of); }
@@ -38,10 +34,7 @@ FMI2_STATUS(SetupExperiment)(void *of, int has_tolerance, double tolerance, doub
     return (fmi2Status)status;
 }
 
-FMI2_STATUS(EnterInitializationMode)(void *of)
-{
-    return (fmi2Status)phi_fmi3_enter(of, PHI_INSTANTIATED, PHI_INITIALISING);
-}
+FMI2_STATUS(EnterInitializationMode)(void *of) { return (fmi2Status)phi_fmi3_enter(of, PHI_INSTANTIATED, PHI_INITIALISING); }
 
 /* Functions of both versions: name in 2.0, name in 3.0, parameters, arguments. */
 #define FMI2_SAME(name, name3, parameters, arguments) \
@@ -66,10 +59,7 @@ FMI2_SAME(DeSerializeFMUstate, DeserializeFMUState, (void *of, const char bytes[
 
 /* Types without variables, and derivatives: calls for 0 variables succeed, all others fail. */
 #define FMI2_NONE(name, parameters) \
-    FMI2_STATUS(name) parameters \
-    { \
-        return (fmi2Status)phi_fmi3_none(of, n); \
-    }
+    FMI2_STATUS(name) parameters { return (fmi2Status)phi_fmi3_none(of, n); }
 FMI2_NONE(GetBoolean, (FMI2_VARIABLES, int x[]))
 FMI2_NONE(SetBoolean, (FMI2_VARIABLES, const int x[]))
 FMI2_NONE(GetString, (FMI2_VARIABLES, const char *x[]))

@@ -30,7 +30,8 @@ FMI_SHARED const char *FMI3_NAME(GetVersion)(void) { return "3.0"; }
 /* Return OK if a condition holds; else report the reason why a call failed. */
 static fmi3Status phi_fmi3_demand(bool condition, void *of, const char *reason)
 {
-    if (!condition && of != NULL) phi_fmu_say((phi_fmu *)of, reason);
+    const phi_fmu *instance = (const phi_fmu *)of;
+    if (!condition && of != NULL && instance->logging) phi_fmu_say(&instance->callbacks, instance->name, reason);
     return condition ? fmi3OK : fmi3Error;
 }
 
@@ -54,30 +55,19 @@ FMI_SHARED void *FMI3_NAME(InstantiateCoSimulation)(const char *name, const char
     bool visible, bool logging, bool events, bool early, const uint32_t required[], size_t count, void *environment,
     fmi3LogMessageCallback log, fmi3IntermediateUpdateCallback update)
 {
-    phi_fmu *instance = phi_fmu_instantiate(name, token, environment, logging);
-    if (instance == NULL) {
-        if (log != NULL) log(environment, fmi3Error, "logStatusError", "wrong instantiation token, or no memory");
-        return NULL;
-    }
-    instance->log_3 = log;
-    instance->update = update;
-    instance->may_return_early = early;
+    const phi_fmu_callbacks callbacks = { environment, NULL, log, update };
+    phi_fmu *instance = phi_fmu_instantiate(name, token, &callbacks, logging);
+    if (instance != NULL) instance->may_return_early = early;
     return instance;
 }
 
 /* There are no instances of other kinds. */
-FMI_SHARED void *FMI3_NAME(InstantiateModelExchange)(const char *name, const char *token, const char *resources,
-    bool visible, bool logging, void *environment, fmi3LogMessageCallback log)
-{
-    return NULL;
-}
-
-FMI_SHARED void *FMI3_NAME(InstantiateScheduledExecution)(const char *name, const char *token, const char *resources,
-    bool visible, bool logging, void *environment, fmi3LogMessageCallback log, void (*clock)(void *environment),
-    void (*lock)(void), void (*unlock)(void))
-{
-    return NULL;
-}
+#define FMI3_NO_INSTANCE(kind, parameters) \
+    FMI_SHARED void *FMI3_NAME(Instantiate##kind) parameters { return NULL; }
+#define FMI3_INSTANCE const char *name, const char *token, const char *resources, bool visible, bool logging
+FMI3_NO_INSTANCE(ModelExchange, (FMI3_INSTANCE, void *environment, fmi3LogMessageCallback log))
+FMI3_NO_INSTANCE(ScheduledExecution, (FMI3_INSTANCE, void *environment, fmi3LogMessageCallback log,
+    void (*clock)(void *environment), void (*lock)(void), void (*unlock)(void)))
 
 FMI_SHARED void FMI3_NAME(FreeInstance)(void *of) { free(of); }
 
@@ -116,59 +106,43 @@ FMI3_STATUS(Reset)(void *of)
 
 #define FMI3_VARIABLES void *of, const uint32_t v[], size_t n
 
-FMI3_STATUS(GetFloat64)(FMI3_VARIABLES, double x[], size_t m)
-{
-    bool exist = of != NULL && n == m;
-    for (size_t k = 0; exist && k < n; ++k) exist = phi_fmu_get(phi_fmi3_state(of), v[k], &x[k]);
-    return phi_fmi3_demand(exist, of, "no such variable");
-}
+/* Values of one type: `is` says whether variable v[k] has this type. There are variables of the types Float64 and Int32
+   only; for all types, calls for 0 variables succeed. */
+#define FMI3_VALUES(type, of_c, is) \
+    FMI3_STATUS(Get##type)(FMI3_VARIABLES, of_c x[], size_t m) \
+    { \
+        double value = 0.0; \
+        bool exist = of != NULL && n == m; \
+        for (size_t k = 0; exist && k < n; ++k) { \
+            exist = (is) && phi_fmu_get(phi_fmi3_state(of), v[k], &value); \
+            if (exist) x[k] = (of_c)value; \
+        } \
+        return phi_fmi3_demand(exist, of, "no such variable"); \
+    } \
+    FMI3_STATUS(Set##type)(FMI3_VARIABLES, const of_c x[], size_t m) \
+    { \
+        bool allowed = of != NULL && n == m; \
+        for (size_t k = 0; allowed && k < n; ++k) \
+            allowed = (is) && phi_fmu_set(phi_fmi3_state(of), v[k], (double)x[k]); \
+        return phi_fmi3_demand(allowed, of, "the variable cannot be set now, or to this value"); \
+    }
+FMI3_VALUES(Float64, double, !phi_fmu_is_whole(v[k]))
+FMI3_VALUES(Int32, int32_t, phi_fmu_is_whole(v[k]))
+FMI3_VALUES(Float32, float, false)
+FMI3_VALUES(Int8, int8_t, false)
+FMI3_VALUES(UInt8, uint8_t, false)
+FMI3_VALUES(Int16, int16_t, false)
+FMI3_VALUES(UInt16, uint16_t, false)
+FMI3_VALUES(UInt32, uint32_t, false)
+FMI3_VALUES(Int64, int64_t, false)
+FMI3_VALUES(UInt64, uint64_t, false)
+FMI3_VALUES(Boolean, bool, false)
 
-FMI3_STATUS(SetFloat64)(FMI3_VARIABLES, const double x[], size_t m)
-{
-    bool allowed = of != NULL && n == m;
-    for (size_t k = 0; allowed && k < n; ++k) allowed = phi_fmu_set(phi_fmi3_state(of), v[k], x[k]);
-    return phi_fmi3_demand(allowed, of, "the variable cannot be set now, or to this value");
-}
-
-FMI3_STATUS(GetInt32)(FMI3_VARIABLES, int32_t x[], size_t m)
-{
-    bool exist = of != NULL && n == m;
-    for (size_t k = 0; exist && k < n; ++k) exist = phi_fmu_is_whole(v[k]);
-    for (size_t k = 0; exist && k < n; ++k) x[k] = phi_fmi3_state(of)->seed;
-    return phi_fmi3_demand(exist, of, "no such variable");
-}
-
-FMI3_STATUS(SetInt32)(FMI3_VARIABLES, const int32_t x[], size_t m)
-{
-    bool allowed = of != NULL && n == m && phi_fmi3_state(of)->mode <= PHI_INITIALISING;
-    for (size_t k = 0; allowed && k < n; ++k) allowed = phi_fmu_is_whole(v[k]) && x[k] >= 0;
-    for (size_t k = 0; allowed && k < n; ++k) phi_fmi3_state(of)->seed = x[k];
-    return phi_fmi3_demand(allowed, of, "the variable cannot be set now, or to this value");
-}
-
-/* Types without variables: calls for 0 variables succeed, all others fail. */
+/* Types without variables, whose values are no numbers. */
 static fmi3Status phi_fmi3_none(void *of, size_t n) { return phi_fmi3_demand(of != NULL && n == 0, of, "no such variable"); }
 
 FMI3_STATUS(GetString)(FMI3_VARIABLES, const char *x[], size_t m) { return phi_fmi3_none(of, n | m); }
 FMI3_STATUS(SetString)(FMI3_VARIABLES, const char *const x[], size_t m) { return phi_fmi3_none(of, n | m); }
-#define FMI3_NONE(type, of_c) \
-    FMI3_STATUS(Get##type)(FMI3_VARIABLES, of_c x[], size_t m) \
-    { \
-        return phi_fmi3_none(of, n | m); \
-    } \
-    FMI3_STATUS(Set##type)(FMI3_VARIABLES, const of_c x[], size_t m) \
-    { \
-        return phi_fmi3_none(of, n | m); \
-    }
-FMI3_NONE(Float32, float)
-FMI3_NONE(Int8, int8_t)
-FMI3_NONE(UInt8, uint8_t)
-FMI3_NONE(Int16, int16_t)
-FMI3_NONE(UInt16, uint16_t)
-FMI3_NONE(UInt32, uint32_t)
-FMI3_NONE(Int64, int64_t)
-FMI3_NONE(UInt64, uint64_t)
-FMI3_NONE(Boolean, bool)
 
 /* Functions for model exchange, scheduled execution, clocks, binary variables, arrays and derivatives: always refused. */
 #define FMI3_ABSENT(name, parameters) \
@@ -180,10 +154,9 @@ FMI3_ABSENT(SetClock, (FMI3_VARIABLES, const bool x[]))
 FMI3_ABSENT(GetNumberOfVariableDependencies, (void *of, uint32_t v, size_t *n))
 FMI3_ABSENT(GetVariableDependencies, (void *of, uint32_t v, size_t at[], uint32_t on[], size_t at_on[],
     fmi3DependencyKind kinds[], size_t n))
-FMI3_ABSENT(GetDirectionalDerivative, (FMI3_VARIABLES, const uint32_t by[], size_t m, const double seed[], size_t k,
-    double x[], size_t l))
-FMI3_ABSENT(GetAdjointDerivative, (FMI3_VARIABLES, const uint32_t by[], size_t m, const double seed[], size_t k,
-    double x[], size_t l))
+#define FMI3_BY const uint32_t by[], size_t m, const double seed[], size_t k
+FMI3_ABSENT(GetDirectionalDerivative, (FMI3_VARIABLES, FMI3_BY, double x[], size_t l))
+FMI3_ABSENT(GetAdjointDerivative, (FMI3_VARIABLES, FMI3_BY, double x[], size_t l))
 FMI3_ABSENT(EnterConfigurationMode, (void *of))
 FMI3_ABSENT(ExitConfigurationMode, (void *of))
 FMI3_ABSENT(GetIntervalDecimal, (FMI3_VARIABLES, double x[], fmi3IntervalQualifier q[]))
@@ -218,18 +191,28 @@ FMI3_STATUS(UpdateDiscreteStates)(void *of, bool *again, bool *terminate, bool *
     return fmi3OK;
 }
 
+/* ---- States, and states as bytes, which end with a checksum and can be read on machines of the same kind only ---- */
+
+enum { PHI_FMU_BYTES = sizeof(phi_fmu_state) + sizeof(uint64_t) };
+
+/* Copy a state to *to, which is allocated if it is NULL. */
+static fmi3Status phi_fmi3_copy(void *of, const void *state, void **to)
+{
+    if (*to == NULL) *to = malloc(sizeof(phi_fmu_state));
+    if (*to != NULL) memcpy(*to, state, sizeof(phi_fmu_state));
+    return phi_fmi3_demand(*to != NULL, of, "no memory");
+}
+
 FMI3_STATUS(GetFMUState)(void *of, void **state)
 {
     if (of == NULL || state == NULL) return fmi3Error;
-    if (*state == NULL) *state = malloc(sizeof(phi_fmu_saved));
-    if (*state != NULL) phi_fmu_save(phi_fmi3_state(of), (phi_fmu_saved *)*state);
-    return phi_fmi3_demand(*state != NULL, of, "no memory");
+    return phi_fmi3_copy(of, phi_fmi3_state(of), state);
 }
 
 FMI3_STATUS(SetFMUState)(void *of, void *state)
 {
     if (of == NULL || state == NULL) return fmi3Error;
-    memcpy(phi_fmi3_state(of), &((phi_fmu_saved *)state)->state, sizeof(phi_fmu_state));
+    memcpy(phi_fmi3_state(of), state, sizeof(phi_fmu_state));
     return fmi3OK;
 }
 
@@ -244,27 +227,29 @@ FMI3_STATUS(FreeFMUState)(void *of, void **state)
 FMI3_STATUS(SerializedFMUStateSize)(void *of, void *state, size_t *size)
 {
     if (of == NULL || state == NULL || size == NULL) return fmi3Error;
-    *size = sizeof(phi_fmu_saved);
+    *size = PHI_FMU_BYTES;
     return fmi3OK;
 }
 
 FMI3_STATUS(SerializeFMUState)(void *of, void *state, uint8_t bytes[], size_t size)
 {
-    if (of == NULL || state == NULL || bytes == NULL || size < sizeof(phi_fmu_saved)) return fmi3Error;
-    memcpy(bytes, state, sizeof(phi_fmu_saved));
+    if (of == NULL || state == NULL || bytes == NULL || size < PHI_FMU_BYTES) return fmi3Error;
+    const uint64_t checksum = phi_fmu_checksum((const unsigned char *)state);
+    memcpy(bytes, state, sizeof(phi_fmu_state));
+    memcpy(&bytes[sizeof(phi_fmu_state)], &checksum, sizeof checksum);
     return fmi3OK;
 }
 
 /* If this fails, *state is unchanged. */
 FMI3_STATUS(DeserializeFMUState)(void *of, const uint8_t bytes[], size_t size, void **state)
 {
-    phi_fmu_saved saved;
+    uint64_t checksum = 0;
     if (of == NULL || state == NULL) return fmi3Error;
-    if (!phi_fmu_read(&saved, bytes, size))
+    const bool complete = bytes != NULL && size == PHI_FMU_BYTES;
+    if (complete) memcpy(&checksum, &bytes[sizeof(phi_fmu_state)], sizeof checksum);
+    if (!complete || checksum != phi_fmu_checksum(bytes))
         return phi_fmi3_demand(false, of, "the bytes are not those of a state of this FMU");
-    if (*state == NULL) *state = malloc(sizeof saved);
-    if (*state != NULL) memcpy(*state, &saved, sizeof saved);
-    return phi_fmi3_demand(*state != NULL, of, "no memory");
+    return phi_fmi3_copy(of, bytes, state);
 }
 
 FMI3_STATUS(DoStep)(void *of, double from, double size, bool no_earlier, bool *event, bool *terminate, bool *early,
@@ -279,6 +264,6 @@ FMI3_STATUS(DoStep)(void *of, double from, double size, bool no_earlier, bool *e
     const phi_status status = phi_fmu_do_step(instance, from + size);
     *reached = instance->state.time;
     *early = status == PHI_OK && *reached < from + size;
-    return status == PHI_OK ? fmi3OK : fmi3Discard;
+    return phi_fmi3_demand(status == PHI_OK, of, phi_status_string(status)) == fmi3OK ? fmi3OK : fmi3Discard;
 }
 #endif
