@@ -93,6 +93,14 @@ class _Compiled(ABC):
         program = self.program
         return replace(self, program=replace(program, extras=replace(program.extras, real="double")))
 
+    def including(self, part: str) -> Self:
+        """Return the compilation for code that has a part, although its profile or its spec leaves the part out."""
+        extras, program = self.program.extras, self.program
+        if program.offers(part):
+            return self
+        extras = replace(extras, without=extras.without - {part}, included=extras.included | {part})
+        return replace(self, program=replace(program, extras=extras))
+
     @property
     def method(self) -> str:
         """The scheme, the bi-realisation if there is one, the order and the profile, as the first lines of runs say."""

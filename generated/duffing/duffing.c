@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 4db280a6ddb49c121ea5267bda887976cd6f6baccde77c09e72f2bae7b394736
+ * body-sha256: 2e3bc0f304f069a4dc475ef0a77db499e5b35d3bd5ff3bb8692dfb56d82193be
  */
 #include "duffing.h"
 #include <float.h>
@@ -391,20 +391,6 @@ duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM])
     memcpy(from, s->x, sizeof from);
     if (!duffing_advance(s, change, s->carry)) return duffing_BAD_ARGUMENT;
     for (int i = 0; i < duffing_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
-    return duffing_OK;
-}
-
-duffing_status duffing_set_parameters(duffing_solver *s, const duffing_params *params)
-{
-    if (s == NULL || params == NULL) return duffing_BAD_ARGUMENT;
-    duffing_solver changed = *s;
-    changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
-    duffing_prepare(&changed.params, duffing_PROBE_STEP, changed.coef);
-    if (!duffing_finite(changed.x, duffing_DIM) || !duffing_allowed(&changed.params)
-        || !duffing_finite(changed.coef, duffing_COEFFICIENTS))
-        return duffing_BAD_ARGUMENT;
-    *s = changed;
     return duffing_OK;
 }
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2adbe4e37771036ba8da395ee31b4c011d9867b82d17c1afea357eee48e4fc28
+ * body-sha256: caf748a9f6b98aa6787ab87d54753c939ae7936768367810bee94c9bc258456a
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -71,10 +71,6 @@ duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps);
    with *s unchanged, if the new state is not finite. */
 duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM]);
 duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM]);
-
-/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
-   duffing_BAD_ARGUMENT, with *s unchanged, for parameters that duffing_init refuses. */
-duffing_status duffing_set_parameters(duffing_solver *s, const duffing_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

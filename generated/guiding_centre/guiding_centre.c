@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 1b17a8fa5615e2e4b2cf38b4d4e1fd1be049cdb4f627afea4d05cbd01e3ecbeb
+ * body-sha256: 4ca3ef1a8776b29e781df6fc0ca7a66469b9218bdeb5a3db20b5d80c8bc48019
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -701,21 +701,6 @@ guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double
     if (!guiding_centre_advance(s, change, s->carry)) return guiding_centre_BAD_ARGUMENT;
     for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
         for (int i = 0; i < guiding_centre_DIM; ++i) s->history[stage].difference[0][i] += s->x[i] - from[i];
-    return guiding_centre_OK;
-}
-
-guiding_centre_status guiding_centre_set_parameters(guiding_centre_solver *s,
-    const guiding_centre_params *params)
-{
-    if (s == NULL || params == NULL) return guiding_centre_BAD_ARGUMENT;
-    guiding_centre_solver changed = *s;
-    changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
-    guiding_centre_prepare(&changed.params, guiding_centre_PROBE_STEP, changed.coef[0]);
-    if (!guiding_centre_finite(changed.x, guiding_centre_DIM) || !guiding_centre_allowed(&changed.params)
-        || !guiding_centre_finite(changed.coef[0], guiding_centre_COEFFICIENTS))
-        return guiding_centre_BAD_ARGUMENT;
-    *s = changed;
     return guiding_centre_OK;
 }
 

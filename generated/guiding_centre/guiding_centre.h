@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8a5b353661e657e4d807374bdf3af192c16317fbf5dd4ce794ae05ad5b13b249
+ * body-sha256: 5f7e2fef4a04b4dae44a9cc92ab034f3d62b7e783a97737bb9d64e49a32c909e
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -72,11 +72,6 @@ guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double 
    guiding_centre_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const double x[guiding_centre_DIM]);
 guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM]);
-
-/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
-   guiding_centre_BAD_ARGUMENT, with *s unchanged, for parameters that guiding_centre_init refuses. */
-guiding_centre_status guiding_centre_set_parameters(guiding_centre_solver *s,
-    const guiding_centre_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; Energy level e = -H(x0): K = monitor (H + e) is 0 along a
  *   monitored trajectory; The solver
- * body-sha256: b45879449a50f5b7e950885bb85bf8e59c57a1bb996f4672d01cb2fae300d67a
+ * body-sha256: dc3f64d773097a2f95a048f92f63fba8e33db7cd8aaa4ef2fbc993b9d79b10ef
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -344,26 +344,6 @@ kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
     memcpy(carry, s->carry, sizeof carry);
     if (!kepler_eccentric_advance(s, change, s->carry)) return kepler_eccentric_BAD_ARGUMENT;
     if (!kepler_eccentric_take_level(s, from, carry)) return kepler_eccentric_BAD_ARGUMENT;
-    return kepler_eccentric_OK;
-}
-
-kepler_eccentric_status kepler_eccentric_set_parameters(kepler_eccentric_solver *s,
-    const kepler_eccentric_params *params)
-{
-    if (s == NULL || params == NULL) return kepler_eccentric_BAD_ARGUMENT;
-    kepler_eccentric_solver changed = *s;
-    changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
-    kepler_eccentric_choose_gauge(&changed.params, changed.x, changed.gauge);
-    kepler_eccentric_prepare(&changed.params, changed.gauge, kepler_eccentric_PROBE_STEP, changed.coef);
-    if (!kepler_eccentric_finite(changed.x, kepler_eccentric_DIM)
-        || !kepler_eccentric_allowed(&changed.params) || !kepler_eccentric_finite(changed.coef,
-        kepler_eccentric_COEFFICIENTS))
-        return kepler_eccentric_BAD_ARGUMENT;
-    if (!kepler_eccentric_finite(changed.gauge, kepler_eccentric_GAUGES))
-        return kepler_eccentric_BAD_ARGUMENT;
-    if (!kepler_eccentric_time_passes(&changed.params, changed.x)) return kepler_eccentric_BAD_ARGUMENT;
-    *s = changed;
     return kepler_eccentric_OK;
 }
 

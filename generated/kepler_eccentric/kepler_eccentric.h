@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8b7f2c990586967af0cfcfaab193e5d3219147d0e64bd9ef47fcbb939ded0899
+ * body-sha256: 0ddea16b0da4e0bbfc04a6653fd0269135fce1a773e806295f734252aff2962d
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -76,12 +76,6 @@ kepler_eccentric_status kepler_eccentric_set_state(kepler_eccentric_solver *s,
     const double x[kepler_eccentric_DIM]);
 kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
     const double change[kepler_eccentric_DIM]);
-
-/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
-   kepler_eccentric_BAD_ARGUMENT, with *s unchanged, for parameters that kepler_eccentric_init refuses. */
-/* The energy level e becomes -H with the new parameters. */
-kepler_eccentric_status kepler_eccentric_set_parameters(kepler_eccentric_solver *s,
-    const kepler_eccentric_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

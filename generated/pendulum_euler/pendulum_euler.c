@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0905cd353e36c3cd30d03d8e8b731ebebfc5db4ae4d9da7f16b3d6d4a1fa6c87
+ * body-sha256: cf5335f029bd7fd902fc176bded5441ae26deb988c9be012d090109e258e88c4
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -139,21 +139,6 @@ pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double
 {
     if (s == NULL || change == NULL) return pendulum_euler_BAD_ARGUMENT;
     if (!pendulum_euler_advance(s, change, s->carry)) return pendulum_euler_BAD_ARGUMENT;
-    return pendulum_euler_OK;
-}
-
-pendulum_euler_status pendulum_euler_set_parameters(pendulum_euler_solver *s,
-    const pendulum_euler_params *params)
-{
-    if (s == NULL || params == NULL) return pendulum_euler_BAD_ARGUMENT;
-    pendulum_euler_solver changed = *s;
-    changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
-    pendulum_euler_prepare(&changed.params, pendulum_euler_PROBE_STEP, changed.coef);
-    if (!pendulum_euler_finite(changed.x, pendulum_euler_DIM) || !pendulum_euler_allowed(&changed.params)
-        || !pendulum_euler_finite(changed.coef, pendulum_euler_COEFFICIENTS))
-        return pendulum_euler_BAD_ARGUMENT;
-    *s = changed;
     return pendulum_euler_OK;
 }
 

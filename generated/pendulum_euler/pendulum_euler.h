@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 198f0c24aa40a36abae9cdc5acc495ca82bc802489950e21ae2518f55227b47d
+ * body-sha256: 19ec9852f4352cb876fae6c84058c31bda67b55480836f019e46d720b014fdcc
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -59,11 +59,6 @@ pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double 
    pendulum_euler_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const double x[pendulum_euler_DIM]);
 pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM]);
-
-/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
-   pendulum_euler_BAD_ARGUMENT, with *s unchanged, for parameters that pendulum_euler_init refuses. */
-pendulum_euler_status pendulum_euler_set_parameters(pendulum_euler_solver *s,
-    const pendulum_euler_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 5892ee4fb5c25c70ff19c0ab7c8ca998e0e51651b0a72e8b244c53be4e039ea4
+ * body-sha256: 01975fbc7f5700df659d0a7f282c4e12c1740d76b3993bea8102126a3dc0a234
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -360,20 +360,6 @@ predator_prey_status predator_prey_kick(predator_prey_solver *s, const double ch
     memcpy(from, s->x, sizeof from);
     if (!predator_prey_advance(s, change, s->carry)) return predator_prey_BAD_ARGUMENT;
     for (int i = 0; i < predator_prey_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
-    return predator_prey_OK;
-}
-
-predator_prey_status predator_prey_set_parameters(predator_prey_solver *s, const predator_prey_params *params)
-{
-    if (s == NULL || params == NULL) return predator_prey_BAD_ARGUMENT;
-    predator_prey_solver changed = *s;
-    changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
-    predator_prey_prepare(&changed.params, predator_prey_PROBE_STEP, changed.coef);
-    if (!predator_prey_finite(changed.x, predator_prey_DIM) || !predator_prey_allowed(&changed.params)
-        || !predator_prey_finite(changed.coef, predator_prey_COEFFICIENTS))
-        return predator_prey_BAD_ARGUMENT;
-    *s = changed;
     return predator_prey_OK;
 }
 

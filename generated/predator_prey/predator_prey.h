@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: de29df9f5faa5391aa02c518874efa98116519543158c279007fade343f5e2e6
+ * body-sha256: eef36e937c35594e5016b26629d7b5aecef418e6caa4ffa6913e5b59e2f94656
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -70,11 +70,6 @@ predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, 
    predator_prey_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM]);
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
-
-/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
-   predator_prey_BAD_ARGUMENT, with *s unchanged, for parameters that predator_prey_init refuses. */
-predator_prey_status predator_prey_set_parameters(predator_prey_solver *s,
-    const predator_prey_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: a7561c03563008f0e66ee1043fd99f0f68e98fc33911ccae6c1c62cf3a576670
+ * body-sha256: aa1629f157aa4b13128b361fd15163a97911a4ace944564cd5ea7ae33804b43a
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -937,21 +937,6 @@ quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double
     memcpy(from, s->x, sizeof from);
     if (!quaternion_top_advance(s, change, s->carry)) return quaternion_top_BAD_ARGUMENT;
     for (int i = 0; i < quaternion_top_DIM; ++i) s->history.difference[0][i] += s->x[i] - from[i];
-    return quaternion_top_OK;
-}
-
-quaternion_top_status quaternion_top_set_parameters(quaternion_top_solver *s,
-    const quaternion_top_params *params)
-{
-    if (s == NULL || params == NULL) return quaternion_top_BAD_ARGUMENT;
-    quaternion_top_solver changed = *s;
-    changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
-    quaternion_top_prepare(&changed.params, changed.gauge, quaternion_top_PROBE_STEP, changed.coef);
-    if (!quaternion_top_finite(changed.x, quaternion_top_DIM) || !quaternion_top_allowed(&changed.params)
-        || !quaternion_top_finite(changed.coef, quaternion_top_COEFFICIENTS))
-        return quaternion_top_BAD_ARGUMENT;
-    *s = changed;
     return quaternion_top_OK;
 }
 

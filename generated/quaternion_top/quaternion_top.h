@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a7d246cae870f638ac2c149032070b3920d431b0f61a8c8889dc5f2f7891f656
+ * body-sha256: ada0eacd3d7817b7c2836b6430fcf719120bc7ff5f53c04c00f4910081172bb9
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -78,12 +78,6 @@ quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double 
    quaternion_top_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const double x[quaternion_top_DIM]);
 quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double change[quaternion_top_DIM]);
-
-/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
-   quaternion_top_BAD_ARGUMENT, with *s unchanged, for parameters that quaternion_top_init refuses. */
-/* The gauge is unchanged. */
-quaternion_top_status quaternion_top_set_parameters(quaternion_top_solver *s,
-    const quaternion_top_params *params);
 
 /* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
    last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */

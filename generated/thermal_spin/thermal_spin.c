@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 6a8963c1d3d63fed06883c2dd1a1a4a907548fe0c81c65e19c618c7ba52c9703
+ * body-sha256: a9e8fc5d6e1fe2e34eb8e88552f7fb378867208b51995598b995335ff7aeb833
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -489,20 +489,6 @@ thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double chang
 {
     if (s == NULL || change == NULL) return thermal_spin_BAD_ARGUMENT;
     if (!thermal_spin_advance(s, change, s->carry)) return thermal_spin_BAD_ARGUMENT;
-    return thermal_spin_OK;
-}
-
-thermal_spin_status thermal_spin_set_parameters(thermal_spin_solver *s, const thermal_spin_params *params)
-{
-    if (s == NULL || params == NULL) return thermal_spin_BAD_ARGUMENT;
-    thermal_spin_solver changed = *s;
-    changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
-    thermal_spin_prepare(&changed.params, thermal_spin_PROBE_STEP, changed.coef);
-    if (!thermal_spin_finite(changed.x, thermal_spin_DIM) || !thermal_spin_allowed(&changed.params)
-        || !thermal_spin_finite(changed.coef, thermal_spin_COEFFICIENTS))
-        return thermal_spin_BAD_ARGUMENT;
-    *s = changed;
     return thermal_spin_OK;
 }
 

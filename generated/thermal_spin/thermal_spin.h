@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: dd3ba90080e69787745ca636d0202352f7dff71eb04ab9cf1d2504870608ced4
+ * body-sha256: 0d9455e8e268a51dcc3fb798cb75596051713b13c47118f827f424cbe9cd22f6
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -78,10 +78,6 @@ thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, siz
    thermal_spin_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 thermal_spin_status thermal_spin_set_state(thermal_spin_solver *s, const double x[thermal_spin_DIM]);
 thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double change[thermal_spin_DIM]);
-
-/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
-   thermal_spin_BAD_ARGUMENT, with *s unchanged, for parameters that thermal_spin_init refuses. */
-thermal_spin_status thermal_spin_set_parameters(thermal_spin_solver *s, const thermal_spin_params *params);
 
 /* As thermal_spin_integrate, with given increments of the noise: dw[k * thermal_spin_DRAWS + i] is that of
    source i in step k. NULL for random ones. */

@@ -18,7 +18,7 @@ LANGUAGES = ("cpp", "fortran", "julia", "matlab", "rust")
 
 
 def with_bindings(
-    planned: Sequence[tuple[Compilation, list[Change]]], options: Options, languages: Sequence[str]
+    planned: Sequence[tuple[Compilation, list[Change]]], options: Options
 ) -> list[tuple[Compilation, list[Change]]]:
     """Return the files of the bindings of all systems, and the C that they call.
 
@@ -32,7 +32,7 @@ def with_bindings(
         with collector.collecting():
             folder = options.directory / compilation.spec.name
             files = generate(compilation, "c", of_c)
-            for language in dict.fromkeys(languages):
+            for language in options.bindings:
                 files |= binding(compilation, language)
             paths = {change.path for change in changes}
             binding_changes = [Change(folder / file, read(folder / file), text) for file, text in files.items()]

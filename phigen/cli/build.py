@@ -91,8 +91,8 @@ def command(
     are proved first; nothing is written if any spec has an error. Files that were edited by hand are not overwritten.
     Of folders, the specs whose names are in DIR/left_out.txt are left out.
     """
-    if (checking or diff) and (compiling or certify or fmu or bindings):
-        writing = "--compile, --fmu, --binding and --certify write files"
+    if (checking or diff) and (compiling or certify or fmu):
+        writing = "--compile, --fmu and --certify write files"
         message = f"{writing}, --check and --diff do not: leave out one or the other"
         raise click.UsageError(message)
     if platforms and not fmu:
@@ -109,11 +109,12 @@ def command(
         without,
         adjoint,
         real,
+        tuple(dict.fromkeys(bindings)),
     )
     compilations = _compile_all(console, spec_files, options, checking or diff)
     units = units_of(compilations, options) if fmu else {}
     planned = _plan(console, compilations, options)
-    planned = with_bindings(planned, options, bindings) if bindings else planned
+    planned = with_bindings(planned, options) if bindings else planned
     if checking or diff:
         lone = _orphans(spec_files, compilations, options)
         _compare([*(c for _, changes in planned for c in changes), *lone], options.command(spec_files), diff)

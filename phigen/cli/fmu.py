@@ -28,7 +28,8 @@ def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str,
     collector, units, of_c = Collector(), {}, replace(options, single_file=False)
     for compilation in compilations:
         with collector.collecting():
-            units[compilation.spec.name] = unit_of(compilation, generate(compilation, "c", of_c))
+            changeable = compilation.including("parameters")
+            units[compilation.spec.name] = unit_of(changeable, generate(changeable, "c", of_c))
     collector.finish()
     return units
 

@@ -39,6 +39,7 @@ class Options:
     without: tuple[str, ...] = ()
     adjoint: bool = False
     real: str | None = None
+    bindings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.real == "float" and self.profile == "fast":
@@ -48,7 +49,7 @@ class Options:
         """The compilation of a spec with these options, proved; see `phigen.compiler.compile_proved`."""
         from phigen.compiler import compile_proved
 
-        return compile_proved(
+        compilation = compile_proved(
             spec,
             order=self.order,
             scheme=self.scheme,
@@ -59,6 +60,7 @@ class Options:
             adjoint=self.adjoint,
             without=self.without,
         )
+        return compilation.including("parameters") if self.bindings else compilation
 
     def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
         """The targets to write: those of the command line, else those of the spec."""
@@ -84,6 +86,7 @@ class Options:
         arguments += ["--tangent"] if self.tangent else []
         arguments += ["--adjoint"] if self.adjoint else []
         arguments += ["--modified", str(self.modified)] if self.modified is not None else []
+        arguments += [word for language in self.bindings for word in ("--binding", language)]
         return arguments
 
 
@@ -136,6 +139,8 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     arguments += ["--tangent"] if options.tangent and not spec.extras.tangent else []
     arguments += ["--adjoint"] if options.adjoint and not spec.extras.adjoint else []
     arguments += ["--modified", str(options.modified)] if options.modified is not None else []
+    if not compilation.spec.extras.offers("parameters", compilation.program.profile):
+        arguments += [f"--binding {language}" for language in options.bindings]  # whose C has this part nevertheless
     return emit(compilation.program, target, " ".join(arguments), single_file=single)
 
 

@@ -110,7 +110,8 @@ def solvers(
 
 def emits(compilation: Compilation) -> bool:
     """Return whether the panel can run the program of the page unchanged."""
-    return not compilation.spec.reconstruct and compilation.program.extras in (NO_EXTRAS, _PRIVATE)
+    extras = replace(compilation.program.extras, included=frozenset())
+    return not compilation.spec.reconstruct and extras in (NO_EXTRAS, _PRIVATE)
 
 
 def enclosed(module: str) -> str:

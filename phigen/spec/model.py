@@ -184,7 +184,8 @@ class Extras:
 
     ``modified_hamiltonian`` adds the function of that name, with so many correction terms; 0 for none. ``without`` are
     parts to leave out (`phigen.spec.names.PARTS`). ``adjoint`` adds the transpose of a step and of a run, along state
-    and parameters. ``real`` are the numbers of the C, double or float.
+    and parameters. ``real`` are the numbers of the C, double or float. ``included`` are parts that the code has
+    although its profile leaves them out.
     """
 
     tangent: bool = False
@@ -192,10 +193,11 @@ class Extras:
     without: frozenset[str] = frozenset()
     adjoint: bool = False
     real: str = "double"
+    included: frozenset[str] = frozenset()
 
     def offers(self, part: str, profile: str) -> bool:
         """Whether the code of a profile has a part, where it applies."""
-        return part not in self.without | LEFT_OUT[profile]
+        return part not in self.without | (LEFT_OUT[profile] - self.included)
 
 
 NO_EXTRAS = Extras()
@@ -516,6 +518,7 @@ class Spec:
             self.extras.without.union(without),
             adjoint or self.extras.adjoint,
             real or self.extras.real,
+            self.extras.included,
         )
         ordered = replace(self, order=order, terms=None, birealisation=replace(self.birealisation, order=order))
         return replace(
@@ -528,12 +531,15 @@ class Spec:
 
     def for_running(self, **options: Unpack[Overrides]) -> Spec:
         """Return the spec with options applied, for code that phigen itself runs: in the profile fast unless the
-        options name one.
+        options name one, and with parameters that can be changed between steps in any profile.
 
         The ``profile`` of a spec is about the code that ``phigen build`` writes.
         """
         options["profile"] = options.get("profile") or "fast"
-        return self.overridden(**options)
+        spec = self.overridden(**options)
+        if spec.extras.offers("parameters", spec.profile):
+            return spec
+        return replace(spec, extras=replace(spec.extras, included=spec.extras.included | {"parameters"}))
 
     def parameters_of(self, run: Run) -> dict[str, float]:
         """Return the values of all parameters in a run: those of the run, else the defaults."""

@@ -99,12 +99,12 @@ PROFILES = ("fast", "small", "certified")
 #: Number types of the C.
 REALS = ("double", "float")
 
-#: Parts of the code that can be left out one by one; the profile small leaves out parts that serve speed, and members
-#: with parameters of their own.
-PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "recurrences")
+#: Parts of the code that can be left out one by one; the profile small leaves out parts that serve speed, members with
+#: parameters of their own, and the function that changes parameters between steps.
+PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "parameters", "recurrences")
 LEFT_OUT = {
     "fast": frozenset[str](),
-    "small": frozenset(["by-hand", "gauge-search", "lanes", "members", "recurrences"]),
+    "small": frozenset(["by-hand", "gauge-search", "lanes", "members", "parameters", "recurrences"]),
     "certified": frozenset(PARTS),
 }
 

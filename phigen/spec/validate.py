@@ -91,6 +91,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     if "monitor" not in raw:
         for run_ in runs.values():
             expect_rows_to_average(run_, declared)
+    inputs = _inputs(raw.get("inputs", ()), declared)
     return {
         "name": _name(raw.get("name"), declared),
         "coordinates": declared.coordinates,
@@ -100,7 +101,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "forces": _forces(raw, declared),
         "noise": _noise(raw.get("noise") or {}, declared),
         "parameters": tuple(declared.parameters.values()),
-        "inputs": _inputs(raw.get("inputs", ()), declared),
+        "inputs": inputs,
         "casimirs": casimirs,
         "invariants": _formulas(raw.get("invariants", {}), declared, declared.dated_scope()),
         "observables": observed,
@@ -122,6 +123,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
             frozenset(without_repetition(raw.get("without", ()), ("without",), declared)),
             raw.get("adjoint", False),
             raw.get("real", "double"),
+            frozenset(["parameters"] if inputs else []),
         ),
         "reconstruct": raw.get("reconstruct", ""),
         "runs": runs,

@@ -182,7 +182,7 @@ MORE = [pytest.param(name, marks=pytest.mark.slow) for name in ("satellite", "th
 @pytest.mark.parametrize("source", [AWKWARD, *MORE])
 def test_bindings_compile_for_systems_of_all_kinds(source, tmp_path):
     spec = specs.loads(source) if "\n" in source else specs.load(resources.file_of(source))
-    compilation = compile_proved(spec, profile="small")
+    compilation = compile_proved(spec, profile="small").including("parameters")
     name = spec.name
     for file, text in emit(compilation.program, "c", "x").items():
         (tmp_path / file).write_text(text, encoding="utf-8")
@@ -261,7 +261,7 @@ fn main() {
 
 def written(source, programs, folder):
     """Write the C and bindings of a system; compile programs by language to ``by_LANGUAGE``. Return its compilation."""
-    compilation = compile_proved(specs.loads(source))
+    compilation = compile_proved(specs.loads(source)).including("parameters")
     name = compilation.spec.name
     for file, text in emit(compilation.program, "c", "x").items():
         (folder / file).write_text(text, encoding="utf-8")
@@ -389,6 +389,26 @@ def test_hand_edits_stay_and_lattices_are_refused(tumbler):
     refused = CliRunner().invoke(group, ["build", "toda", "-o", str(tumbler), "-t", "numpy", "--binding", "rust"])
     assert refused.exit_code == 1
     assert "not for lattices" in refused.output
+
+
+def test_check_is_about_bindings_and_the_function_that_they_call(tmp_path):
+    """The C of the profile small has set_parameters for a binding; the command in its header says so."""
+    (tmp_path / "swing.yaml").write_text(SWING, encoding="utf-8")
+    words = ["build", str(tmp_path / "swing.yaml"), "-o", str(tmp_path)]
+
+    def outcome(*more):
+        return CliRunner().invoke(group, [*words, *more]).exit_code
+
+    assert outcome("--binding", "julia") == 0
+    c, module = tmp_path / "swing/swing.c", tmp_path / "swing/swing.jl"
+    assert "phigen build swing.yaml --binding julia" in c.read_text(encoding="utf-8")
+    assert "swing_set_parameters(" in c.read_text(encoding="utf-8")
+    assert outcome("--binding", "julia", "--check") == 0
+    assert outcome("--check") == 5
+    module.write_text(module.read_text(encoding="utf-8") + "# more\n", encoding="utf-8")
+    assert outcome("--binding", "julia", "--check") == 5
+    assert outcome() == 0
+    assert "swing_set_parameters(" not in c.read_text(encoding="utf-8")
 
 
 def test_command_line_knows_all_languages():

@@ -21,7 +21,7 @@ fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
 def unit(source, **options):
     """The compilation of a spec by its name or text, and its FMU without binaries."""
     spec = specs.loads(source) if "\n" in source else specs.load(resources.file_of(source))
-    compilation = compile_proved(spec, **options)
+    compilation = compile_proved(spec, **options).including("parameters")
     return compilation, unit_of(compilation, emit(compilation.program, "c", "phigen build"))
 
 

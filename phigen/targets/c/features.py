@@ -16,6 +16,7 @@ FEATURES = (
     Feature("COMMON", lambda p: False),  # of `phigen.targets.device` too
     Feature("SINGLE", lambda p: p.single),
     Feature("PARAMETERS", lambda p: p.parameters),
+    Feature("CHANGED_PARAMETERS", requires=("PARAMETERS",), part="parameters"),
     Feature("RELATIVE", lambda p: p.step.inner_solve and p.step.inner_solve.relative),
     Feature("ADJOINT", lambda p: p.step.adjoint),
     Feature("ASKED", lambda p: p.step.kind.sites, ("ADJOINT",)),

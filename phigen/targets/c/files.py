@@ -197,7 +197,7 @@ CONDITIONS = {
     "newton_unrolled.c": "INVERSE_UNROLLED && !SPARSE && !PATH",
     "noise.c": "NOISE",
     "noise_of_flows.c": "SPLITTING",
-    "parameters.c": "PARAMETERS && !DEVICE",
+    "parameters.c": "CHANGED_PARAMETERS && !DEVICE",
     "path_lanes.c": "PATH",
     "placing.c": "KICKED",
     "placing_level.c": "MONITOR",
