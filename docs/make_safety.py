@@ -9,13 +9,12 @@ import re
 import subprocess
 import tempfile
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from phigen import resources, spec
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit
+from phigen.runtime.stack import CallGraph, call_graph
 
 PAGE = Path(__file__).resolve().parent / "safety.md"
 #: The systems of the tables, one for each kind of step that microcontrollers are likely to make.
@@ -26,29 +25,8 @@ LIBRARY = {
     "frexp", "hypot", "ldexp", "log", "log1p", "memcmp", "memcpy", "memmove", "memset", "nearbyint", "pow", "rint",
     "round", "scalbn", "sin", "sincos", "sinh", "sqrt", "tan", "tanh", "trunc",
 }  # fmt: skip
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fcallgraph-info=su")
-_NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n[^"]*?(?:\\n(\d+) bytes \((\w+(?:,\w+)?)\))?"')
-_EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
-
-
-@dataclass(frozen=True)
-class CallGraph:
-    """Functions of a solver: bytes of stack and the functions called by each; those of libraries have no bytes."""
-
-    stack: Mapping[str, int]
-    calls: Mapping[str, set[str]]
-    kinds: set[str]
-
-    def deepest(self, function: str, above: tuple[str, ...] = ()) -> int:
-        """Bytes of stack of a call of a function, libraries apart. Raises `ValueError` if it can call itself."""
-        if function in above:
-            raise ValueError(f"{function} can call itself: {' → '.join((*above, function))}")
-        below = (self.deepest(callee, (*above, function)) for callee in self.calls.get(function, ()))
-        return self.stack.get(function, 0) + max(below, default=0)
-
-    def external(self) -> set[str]:
-        """Names of functions that are called and not defined."""
-        return {callee for callees in self.calls.values() for callee in callees} - self.stack.keys()
+#: Flags of the measured stacks.
+FLAGS = ("-O2", "-ffp-contract=off")
 
 
 def small(name: str) -> Compilation:
@@ -56,28 +34,9 @@ def small(name: str) -> Compilation:
     return compile_spec(spec.load(resources.bundled()[name]).overridden(profile="certified"))
 
 
-def call_graph(compilation: Compilation) -> CallGraph:
+def stacks(compilation: Compilation) -> CallGraph:
     """The call graph of the C of a system, by gcc."""
-    with tempfile.TemporaryDirectory() as scratch:
-        folder, name = Path(scratch), compilation.spec.name
-        for file, text in emit(compilation.program, "c", "").items():
-            (folder / file).write_text(text, encoding="utf-8")
-        subprocess.run(["gcc", *_FLAGS, "-c", f"{name}.c", "-o", "a.o"], cwd=folder, check=True)
-        text = (folder / "a.ci").read_text(encoding="utf-8")
-    stack, kinds = {}, set()
-    for title, size, kind in _NODE.findall(text):
-        if size:
-            stack[_plain(title)] = int(size)
-            kinds.add(kind)
-    calls: dict[str, set[str]] = {}
-    for caller, callee in _EDGE.findall(text):
-        calls.setdefault(_plain(caller), set()).add(_plain(callee))
-    return CallGraph(stack, calls, kinds)
-
-
-def _plain(title: str) -> str:
-    """A function without the file of static ones; parts and copies that gcc makes of one keep their own names."""
-    return title.rpartition(":")[2]
+    return call_graph(emit(compilation.program, "c", ""), compilation.spec.name, FLAGS)
 
 
 def misra(compilation: Compilation) -> Counter[str]:
@@ -94,10 +53,10 @@ def misra(compilation: Compilation) -> Counter[str]:
 def row_of_bounds(name: str) -> str:
     """A row of the table of bounds: RAM, stack, and operations of one evaluation."""
     compilation = small(name)
-    graph, operations = call_graph(compilation), compilation.program.about.operations
-    stacks = (graph.deepest(f"{name}_{function}") for function in ("init", "step"))
+    graph, operations = stacks(compilation), compilation.program.about.operations
+    deepest = (graph.deepest(f"{name}_{function}") for function in ("init", "step"))
     counts = (operations[kind] for kind in ("additions", "multiplications", "divisions", "functions"))
-    cells = (name, compilation.program.order, *stacks, *counts)
+    cells = (name, compilation.program.order, *deepest, *counts)
     return f"| {' | '.join(map(str, cells))} |"
 
 
@@ -112,8 +71,8 @@ def rows_of_rules() -> list[str]:
 
 #: Rules of MISRA C:2012 that generated C does not keep everywhere, with the reasons.
 REASONS = {
-    "2.4": "structs are typedefs without a use of their tag, so that a tag cannot clash",
-    "2.5": "macros that say orders, versions and checksums are for the code that includes the header",
+    "2.4": "structs and sizes are typedefs and enumerations without a use of their tag, so that a tag cannot clash",
+    "2.5": "two macros, the version and the checksum of the spec, are for the code that includes the header",
     "8.7": "functions of the interface are called by the code that uses the solver",
     "9.3": "`{0}` sets all of an array to zero",
     "10.3": "results of comparisons are stored as int, and counts of members converted to size_t",

@@ -20,7 +20,7 @@ from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import Discretisation
 from phigen.scheme.gauge import Gauge, Gauged
 from phigen.scheme.order import Order
-from phigen.scheme.program import Program
+from phigen.scheme.program import Program, StackBound
 from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec.model import Spec
 from phigen.splitting.parts import SplitHamiltonian
@@ -100,6 +100,10 @@ class _Compiled(ABC):
             return self
         extras = replace(extras, without=extras.without - {part}, included=extras.included | {part})
         return replace(self, program=replace(program, extras=extras))
+
+    def with_stack(self, stack: StackBound) -> Self:
+        """Return the compilation whose C states a measured bound of its stack."""
+        return replace(self, program=replace(self.program, stack=stack))
 
     @property
     def method(self) -> str:

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ecf64e03eb1b84307fec1ce22c1b5f083a9c1edd1d5d837cf434bcbfef496698
+ * body-sha256: 59b1b935e41fd08f6e0ebc4cecb8f694915d6abe5b724db931a80163ebdac0e5
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -9,10 +9,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define food_web_AXES 1 /* i */
-#define food_web_DIM 1  /* fields of a site: x */
-#define food_web_ORDER 4
-#define food_web_CASIMIRS 0
+enum { food_web_AXES = 1 }; /* i */
+enum { food_web_DIM = 1 };  /* fields of a site: x */
+enum { food_web_ORDER = 4 };
+enum { food_web_CASIMIRS = 0 };
 #define food_web_PHIGEN_VERSION "0.1.0"
 #define food_web_SPEC_SHA256 "33c365aeaaa9fcce1fd6f031be62040b3dc02f6bbb423e97e7a20f413586bc35"
 

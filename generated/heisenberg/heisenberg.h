@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1a75c7cf6e4cb2678304970e75cb3ff8a1ed1456b7a49eba1a3f77f56c17ff30
+ * body-sha256: 1aefb6f93c404d795b6e6dbf328326ed79eb0e6d55aa5f861e397985623e0314
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -9,10 +9,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define heisenberg_AXES 3 /* the slowest first: i, j, k */
-#define heisenberg_DIM 3  /* fields of a site: x, y, z */
-#define heisenberg_ORDER 2
-#define heisenberg_CASIMIRS 1 /* C */
+enum { heisenberg_AXES = 3 }; /* the slowest first: i, j, k */
+enum { heisenberg_DIM = 3 };  /* fields of a site: x, y, z */
+enum { heisenberg_ORDER = 2 };
+enum { heisenberg_CASIMIRS = 1 }; /* C */
 #define heisenberg_PHIGEN_VERSION "0.1.0"
 #define heisenberg_SPEC_SHA256 "a040bb6c643cd4238f4939d26b6bf47e380070926cd42f82989a61b8182d0d32"
 

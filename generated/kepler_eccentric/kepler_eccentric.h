@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0ddea16b0da4e0bbfc04a6653fd0269135fce1a773e806295f734252aff2962d
+ * body-sha256: 6db9b56174e7fb908ac38e73d2372c265e1e37f5e4385175b0cade081f5c759d
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define kepler_eccentric_DIM 4 /* coordinates: q1, q2, p1, p2 */
-#define kepler_eccentric_ORDER 8
-#define kepler_eccentric_CASIMIRS 0
 #define kepler_eccentric_PHIGEN_VERSION "0.1.0"
 #define kepler_eccentric_SPEC_SHA256 "9f8cc7f788b5fd46c22be5f35d1f064d371462a0b9c6814a9326d129431a0702"
+enum { kepler_eccentric_DIM = 4 };            /* coordinates: q1, q2, p1, p2 */
+enum { kepler_eccentric_ORDER = 8 };          /* order of the method */
+enum { kepler_eccentric_CASIMIRS = 0 };       /* Casimirs: none */
 enum { kepler_eccentric_COEFFICIENTS = 140 }; /* numbers that are functions of params and h */
 enum { kepler_eccentric_GAUGES = 1 };         /* the energy level e */
 

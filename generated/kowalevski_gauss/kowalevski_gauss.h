@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 003344341124e4561af3dc44521fa4245755a8ccf34f43f6fc8a132bd95cf0fd
+ * body-sha256: 2892172560372556da45118c7959fb099246b077006b4531a76d2a99b5bda1cf
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define kowalevski_gauss_DIM 6 /* coordinates: P1, P2, P3, G1, G2, G3 */
-#define kowalevski_gauss_ORDER 16
-#define kowalevski_gauss_CASIMIRS 2 /* A, B */
 #define kowalevski_gauss_PHIGEN_VERSION "0.1.0"
 #define kowalevski_gauss_SPEC_SHA256 "207f4ed5fd3660d4975c60c4ec873885b380480a09e812d4abf3ef5acac67116"
+enum { kowalevski_gauss_DIM = 6 };          /* coordinates: P1, P2, P3, G1, G2, G3 */
+enum { kowalevski_gauss_ORDER = 16 };       /* order of the method */
+enum { kowalevski_gauss_CASIMIRS = 2 };     /* Casimirs: A, B */
 enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* numbers that are functions of params and h */
 enum { kowalevski_gauss_NODES = 8 };        /* stages of a step */
 enum { kowalevski_gauss_WIDTH = 8 };        /* of an array over the stages */

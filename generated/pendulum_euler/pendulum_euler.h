@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 19ec9852f4352cb876fae6c84058c31bda67b55480836f019e46d720b014fdcc
+ * body-sha256: f544b03a667434161721910ccb02c18d8da5dc8cee62cf419c2cac661d19af40
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define pendulum_euler_DIM 2 /* coordinates: q, p */
-#define pendulum_euler_ORDER 1
-#define pendulum_euler_CASIMIRS 0
 #define pendulum_euler_PHIGEN_VERSION "0.1.0"
 #define pendulum_euler_SPEC_SHA256 "d5fee8a2d3fff23ddbddeab960102f5ac0a598b14e727457465bbf012b8b6b14"
+enum { pendulum_euler_DIM = 2 };          /* coordinates: q, p */
+enum { pendulum_euler_ORDER = 1 };        /* order of the method */
+enum { pendulum_euler_CASIMIRS = 0 };     /* Casimirs: none */
 enum { pendulum_euler_COEFFICIENTS = 2 }; /* numbers that are functions of params and h */
 
 typedef struct {

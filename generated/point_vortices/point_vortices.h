@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 18d752533dbd8322324f59f72bed9d4b3a4439a43e0a4dc0666a139bf0ef3ac5
+ * body-sha256: 6de34e867c1d6b50ed60c36ac86b41200e1b3b1efb0df74b678b0d28c3596631
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -9,10 +9,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define point_vortices_AXES 1 /* i */
-#define point_vortices_DIM 2  /* fields of a site: x, y */
-#define point_vortices_ORDER 4
-#define point_vortices_CASIMIRS 0
+enum { point_vortices_AXES = 1 }; /* i */
+enum { point_vortices_DIM = 2 };  /* fields of a site: x, y */
+enum { point_vortices_ORDER = 4 };
+enum { point_vortices_CASIMIRS = 0 };
 #define point_vortices_PHIGEN_VERSION "0.1.0"
 #define point_vortices_SPEC_SHA256 "d965bd92c708d41161c8d57d8630c9397f72d5c2059658e2d8ea3f1387ba2750"
 

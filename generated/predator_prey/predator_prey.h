@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eef36e937c35594e5016b26629d7b5aecef418e6caa4ffa6913e5b59e2f94656
+ * body-sha256: 259ccd1d288b59d00159d307aa99504de19403d5fbea4a12938d1155126077e4
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define predator_prey_DIM 2 /* coordinates: prey, predator */
-#define predator_prey_ORDER 4
-#define predator_prey_CASIMIRS 0
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "f6638ff9b1337f893f25016dded17f0b3c333d111afbf6afd42449aac73b6050"
+enum { predator_prey_DIM = 2 };           /* coordinates: prey, predator */
+enum { predator_prey_ORDER = 4 };         /* order of the method */
+enum { predator_prey_CASIMIRS = 0 };      /* Casimirs: none */
 enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that are functions of params and h */
 enum { predator_prey_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 69764e31dbdcffaa4b43263af709acfe4b19b168e5a88d3ec0aa52636a8ca6f2
+ * body-sha256: 4c7248df3cb39c93f2e9588477ab3622de536b37cf2061b61fd793bd34ce1283
  */
 #ifndef TODA_H
 #define TODA_H
@@ -9,10 +9,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define toda_AXES 1 /* i */
-#define toda_DIM 2  /* fields of a site: a, b */
-#define toda_ORDER 4
-#define toda_CASIMIRS 2 /* momentum, length */
+enum { toda_AXES = 1 }; /* i */
+enum { toda_DIM = 2 };  /* fields of a site: a, b */
+enum { toda_ORDER = 4 };
+enum { toda_CASIMIRS = 2 }; /* momentum, length */
 #define toda_PHIGEN_VERSION "0.1.0"
 #define toda_SPEC_SHA256 "fdb12f10a633d60a892c40686358bece67d0d7d2e0a768bf8ec3914cdf17aeac"
 

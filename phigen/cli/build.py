@@ -54,6 +54,11 @@ STRICT = ("-Wall", "-Wextra", "-Werror")
     type=click.Choice(LANGUAGES),
     help="Also write a module that calls the C from another language; may be repeated.",
 )
+@click.option(
+    "--stack",
+    metavar="FLAGS",
+    help="State the stack in the header, measured by gcc, or the gcc named in CC, with FLAGS, such as --stack=-O2.",
+)
 @click.option("--certify", is_flag=True, help="Also verify the solvers, and write DIR/NAME/NAME.certificate.json.")
 @click.option(
     "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what would be written."
@@ -80,6 +85,7 @@ def command(
     fmu: bool,
     platforms: tuple[str, ...],
     bindings: tuple[str, ...],
+    stack: str | None,
     certify: bool,
     checking: bool,
     diff: bool,
@@ -110,6 +116,7 @@ def command(
         adjoint,
         real,
         tuple(dict.fromkeys(bindings)),
+        stack,
     )
     compilations = _compile_all(console, spec_files, options, checking or diff)
     units = units_of(compilations, options) if fmu else {}

@@ -12,6 +12,7 @@ import click
 
 from phigen import resources
 from phigen.cli.arguments import CORRECTIONS, order_option, scheme_option
+from phigen.errors import SpecError
 from phigen.registry import TARGETS
 from phigen.spec.names import PARTS, PROFILES, REALS
 
@@ -40,6 +41,7 @@ class Options:
     adjoint: bool = False
     real: str | None = None
     bindings: tuple[str, ...] = ()
+    stack: str | None = None
 
     def __post_init__(self) -> None:
         if self.real == "float" and self.profile == "fast":
@@ -60,7 +62,20 @@ class Options:
             adjoint=self.adjoint,
             without=self.without,
         )
-        return compilation.including("parameters") if self.bindings else compilation
+        compilation = compilation.including("parameters") if self.bindings else compilation
+        return compilation if self.stack is None else self._measured(compilation, self.stack)
+
+    def _measured(self, compilation: Compilation, flags: str) -> Compilation:
+        """The compilation whose header states the stack of its C, compiled with these flags."""
+        from phigen.compiler import emit
+        from phigen.runtime.stack import stack_bound
+
+        spec = compilation.spec
+        if spec.lattice or "c" not in self.targets_of(compilation):
+            message = f"--stack of {spec.name}: " + ("not for lattices" if spec.lattice else "there is no target c")
+            raise SpecError([spec.diagnostic(("lattice" if spec.lattice else "targets",), message)])
+        files = emit(compilation.program, "c", "", single_file=self.single_file)
+        return compilation.with_stack(stack_bound(files, spec.name, flags))
 
     def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
         """The targets to write: those of the command line, else those of the spec."""
@@ -87,6 +102,7 @@ class Options:
         arguments += ["--adjoint"] if self.adjoint else []
         arguments += ["--modified", str(self.modified)] if self.modified is not None else []
         arguments += [word for language in self.bindings for word in ("--binding", language)]
+        arguments += [f"--stack={self.stack}"] if self.stack is not None else []
         return arguments
 
 
@@ -141,6 +157,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     arguments += ["--modified", str(options.modified)] if options.modified is not None else []
     if not compilation.spec.extras.offers("parameters", compilation.program.profile):
         arguments += [f"--binding {language}" for language in options.bindings]  # whose C has this part nevertheless
+    arguments += [shlex.quote(f"--stack={options.stack}")] if options.stack is not None and target == "c" else []
     return emit(compilation.program, target, " ".join(arguments), single_file=single)
 
 

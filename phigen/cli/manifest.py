@@ -158,7 +158,7 @@ def _options(name: str, raw: dict[str, Any]) -> Options:
         or options.profile not in (None, *PROFILES)
         or options.real not in (None, *REALS)
         or "directory" in raw
-        or "bindings" in raw
+        or not {"bindings", "stack"}.isdisjoint(raw)
         or not all(isinstance(flag, bool) for flag in (options.single_file, options.tangent, options.adjoint))
     ):
         raise ValueError(f"{name}: options that do not exist: {raw}")

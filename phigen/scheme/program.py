@@ -160,6 +160,17 @@ class Attitude:
 
 
 @dataclass(frozen=True)
+class StackBound:
+    """Bytes of stack of the longest chains of calls, as measured with a ``compiler`` and its flags: those that start in
+    ``init`` and in ``step``, and the ``longest`` of all."""
+
+    compiler: str
+    init: int
+    step: int
+    longest: int
+
+
+@dataclass(frozen=True)
 class Program:
     """A solver, ready to be printed.
 
@@ -169,7 +180,8 @@ class Program:
 
     ``lanes`` requests C that makes several steps or members at once; ``profile`` (``fast``, ``small``) says whether
     the C is optimised for speed or for size. ``compensated`` requests compensated sums over the steps of a lattice
-    that splits. ``truncated`` says that a step is a Poisson map only up to its truncation error.
+    that splits. ``truncated`` says that a step is a Poisson map only up to its truncation error. ``stack`` is the
+    measured stack that the header of the C states.
     """
 
     name: str
@@ -195,6 +207,7 @@ class Program:
     compensated: bool = False
     observed: tuple[str, ...] = ()
     truncated: bool = False
+    stack: StackBound | None = None
 
     @property
     def version(self) -> str:

@@ -14,7 +14,7 @@ from functools import partial
 from phigen.lanes.in_lanes import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.policies import PredictorPolicy
-from phigen.scheme.program import MAX_NORMAL_VARIATE, Attitude, Noise, Program
+from phigen.scheme.program import MAX_NORMAL_VARIATE, Attitude, Noise, Program, StackBound
 from phigen.scheme.steps import Adjoint
 from phigen.spec.model import Parameter
 from phigen.targets.c import functions
@@ -150,7 +150,16 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
 def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
     """Return the values of the template of declarations."""
     member, step = members(program), program.step
-    sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
+    sizes: Sizes = [
+        ("DIM", program.dimension, f"coordinates: {', '.join(program.coordinates)}"),
+        ("ORDER", program.order, "order of the method"),
+        ("CASIMIRS", len(program.casimirs), f"Casimirs: {', '.join(program.casimirs) or 'none'}"),
+    ]
+    if program.observed:
+        sizes.append(("OBSERVABLES", len(program.observed), f"observables: {', '.join(program.observed)}"))
+    if program.modified:
+        sizes.append(("MODIFIED_POWER", program.modified.power, "power of h in the error of the modified Hamiltonian"))
+    sizes += [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
     also = f", and of {_renewing(program)}" if program.step.refresh else ""
     sizes.append(
         ("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that are functions of params and h{also}")
@@ -181,25 +190,28 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
     return {
         "NAME": program.name,
         "noise": program.noise is not None,
-        "n": program.dimension,
-        "order": program.order,
-        "casimir_count": len(program.casimirs),
-        "observed_count": len(program.observed),
-        "observed": ", ".join(program.observed),
-        "modified_power": program.modified.power if program.modified else 0,
         "version": program.version,
         "sha256": program.about.spec_sha256,
-        "coordinates": ", ".join(program.coordinates),
         "defaults": _defaults(program),
-        "casimirs": f" /* {', '.join(program.casimirs)} */" if program.casimirs else "",
         "members": [(f"double {member[p.name]};", _member_comment(p, member[p.name])) for p in program.parameters]
         or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
+        "compiler": program.stack.compiler if program.stack else "",
+        "stack": _stack(program.stack, program.name) if program.stack else [],
         "observables": [
             (said, [declaration(program, k, name=name, returning=one) for k, name, one in kernels])
             for said, kernels in _observables(program)
         ],
     }
+
+
+def _stack(bound: StackBound, name: str) -> Sizes:
+    """Return the bytes of stack of chains of calls, with comments on their first functions."""
+    return [
+        ("STACK_OF_INIT", bound.init, f"from {name}_init on"),
+        ("STACK_OF_STEP", bound.step, f"from {name}_step on"),
+        ("STACK", bound.longest, "from any function on"),
+    ]
 
 
 #: Kernels that are functions of the API: each with its name there, and whether it returns its only value.

@@ -1,0 +1,109 @@
+"""Stack of generated C: the longest chain of calls, by the call graph that gcc writes (``-fcallgraph-info=su``)."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from phigen.errors import ToolchainError
+from phigen.scheme.program import StackBound
+from phigen.targets.header import plain
+
+_NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n[^"]*?(?:\\n(\d+) bytes \((\w+(?:,\w+)?)\))?"')
+_EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
+_HINT = "gcc of version 10 or later, or one named in the environment variable CC, such as CC=arm-none-eabi-gcc"
+#: Names of gcc for calls by a pointer, and of functions of OpenMP that call others by a pointer.
+_BY_POINTER = ("__indirect_call", "GOMP_")
+_TIMEOUT = 300.0  # seconds
+
+
+@dataclass(frozen=True)
+class CallGraph:
+    """Functions of a solver: bytes of stack and the functions called by each; those of libraries have no bytes."""
+
+    stack: Mapping[str, int]
+    calls: Mapping[str, set[str]]
+    kinds: set[str]
+
+    def deepest(self, function: str, above: tuple[str, ...] = ()) -> int:
+        """Return the bytes of stack of a call of a function, without those of libraries.
+
+        Raises `ToolchainError` if the function can call itself.
+        """
+        if function in above:
+            raise ToolchainError(f"{function} can call itself: {' → '.join((*above, function))}")
+        below = (self.deepest(callee, (*above, function)) for callee in self.calls.get(function, ()))
+        return self.stack.get(function, 0) + max(below, default=0)
+
+    @property
+    def external(self) -> set[str]:
+        """Names of functions that are called and not defined."""
+        return {callee for callees in self.calls.values() for callee in callees} - self.stack.keys()
+
+
+def stack_bound(files: Mapping[str, str], name: str, flags: str) -> StackBound:
+    """Return the bound for the stack of a solver in C, compiled with these flags by the compiler named in CC, else gcc.
+
+    Raises `ToolchainError` if the compiler writes no call graph, or if the stack has no bound.
+    """
+    words = tuple(shlex.split(flags))
+    graph = call_graph(files, name, words)
+    if graph.kinds != {"static"}:
+        raise ToolchainError(f"{name}: the stack of a function depends on its arguments ({', '.join(graph.kinds)})")
+    by_pointer = sorted(f for f in graph.external if f.startswith(_BY_POINTER))
+    if by_pointer:
+        raise ToolchainError(f"{name}: {', '.join(by_pointer)} calls functions that the graph of calls does not show")
+    init, step = (graph.deepest(f"{name}_{function}") for function in ("init", "step"))
+    version = _output([*_command(), "--version"]).split("\n")[0]
+    machine = _output([*_command(), "-dumpmachine"]).strip()
+    compiler = plain(f"{version} for {machine} with {shlex.join(words)}")
+    return StackBound(compiler, init, step, max(map(graph.deepest, graph.stack)))
+
+
+def call_graph(files: Mapping[str, str], name: str, flags: Sequence[str]) -> CallGraph:
+    """Return the call graph of the C of a solver, compiled with these flags."""
+    with tempfile.TemporaryDirectory(prefix="phigen-") as scratch:
+        folder = Path(scratch)
+        for file, text in files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        command = [*_command(), "-std=c99", *flags, "-fcallgraph-info=su", "-c", f"{name}.c", "-o", "a.o"]
+        _output(command, folder)
+        graphs = [*folder.glob("*.ci")]
+        if not graphs:
+            raise ToolchainError(f"{command[0]} does not report the stack of functions\n  hint: use {_HINT}")
+        text = graphs[0].read_text(encoding="utf-8")
+    stack, kinds, calls = dict[str, int](), set[str](), dict[str, set[str]]()
+    for title, size, kind in _NODE.findall(text):
+        if size:
+            stack[_plain(title)] = int(size)
+            kinds.add(kind)
+    for caller, callee in _EDGE.findall(text):
+        calls.setdefault(_plain(caller), set()).add(_plain(callee))
+    return CallGraph(stack, calls, kinds)
+
+
+def _command() -> list[str]:
+    return shlex.split(os.environ.get("CC", "")) or ["gcc"]
+
+
+def _output(command: Sequence[str], folder: Path | None = None) -> str:
+    """Return what a command prints. Raises `ToolchainError` with its messages if it fails."""
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=_TIMEOUT, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise ToolchainError(f"{command[0]} did not run: {error}\n  hint: {_HINT}") from error
+    if done.returncode:
+        said = "\n  ".join(done.stderr.strip().split("\n")[:4])
+        raise ToolchainError(f"{shlex.join(command)} failed:\n  {said}\n  hint: the stack is measured by {_HINT}")
+    return done.stdout
+
+
+def _plain(title: str) -> str:
+    """Return a function without the file of static ones; parts and copies that gcc makes keep their own names."""
+    return title.rpartition(":")[2]
