@@ -5,6 +5,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from ruamel.yaml import YAML
 
 from phigen._version import __version__
@@ -17,15 +18,14 @@ def text(file):
 
 
 def recipe():
-    """The conda recipe, with its version put in."""
-    body = text("packaging/conda/meta.yaml").split("%}\n", 1)[1]
-    return YAML(typ="safe").load(re.sub(r"\{\{ *(\w+) *\}\}", r"\1", body))
+    """The conda recipe."""
+    return YAML(typ="safe").load(text("packaging/conda/recipe.yaml"))
 
 
 def test_all_files_state_the_same_version():
     assert YAML(typ="safe").load(text("CITATION.cff"))["version"] == __version__
     assert json.loads(text(".zenodo.json"))["version"] == __version__
-    assert f'{{% set version = "{__version__}" %}}' in text("packaging/conda/meta.yaml")
+    assert recipe()["context"]["version"] == __version__
 
 
 def test_conda_recipe_has_the_dependencies_of_the_package():
@@ -37,13 +37,32 @@ def test_conda_recipe_has_the_dependencies_of_the_package():
 def test_conda_recipe_agrees_with_the_package():
     project, about = tomllib.loads(text("pyproject.toml")), recipe()
     (command,) = project["project"]["scripts"].items()
-    assert about["build"]["entry_points"] == [" = ".join(command)]
+    assert about["build"]["python"]["entry_points"] == [" = ".join(command)]
     assert about["about"]["license"] == project["project"]["license"]
     host = [d.replace(" ", "") for d in about["requirements"]["host"]]
     assert set(project["build-system"]["requires"]) <= set(host)
     assert (ROOT / "packaging/conda" / about["source"]["path"] / about["about"]["license_file"]).samefile(
         ROOT / "LICENSE"
     )
+
+
+def test_conda_recipe_is_rendered():
+    """By rattler-build: unknown keys, requirements that are no specifications and unset variables are errors."""
+    rattler_build = pytest.importorskip("rattler_build", reason="py-rattler-build is not installed")
+    given = text("packaging/conda/recipe.yaml")
+    (variant,) = rattler_build.Stage0Recipe.from_yaml(given).render()
+    rendered = variant.recipe.to_dict()
+    assert rendered["package"] == {"name": "phigen", "version": __version__}
+    assert rendered["build"]["noarch"] == "python"
+    assert len(rendered["tests"]) == 2
+    mistakes = [
+        ("requirements:", "requirement:"),
+        ("click >=8.1", "click >=8.1 &"),
+        ("${{ version }}", "${{ versio }}"),
+    ]
+    for mistake in mistakes:
+        with pytest.raises(rattler_build.RattlerBuildError):
+            rattler_build.Stage0Recipe.from_yaml(given.replace(*mistake)).render()
 
 
 def test_paper_cites_what_its_bibliography_has():
