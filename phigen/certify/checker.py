@@ -9,7 +9,7 @@ import operator
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
-from functools import cache, reduce
+from functools import reduce
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -49,6 +49,7 @@ SERIES: Mapping[str, Callable[[int], fmpq]] = {  # coefficient n of functions th
     "phi1": lambda n: (n + 1) * SERIES["phi0"](n + 1),
     "phi2": lambda n: (n + 1) * SERIES["phi1"](n + 1),
 }
+COEFFICIENTS = {name: [coefficient(n) for n in range(TERMS)] for name, coefficient in SERIES.items()}
 
 
 class RefusedError(Exception):
@@ -75,11 +76,6 @@ def square(x: Ball) -> Ball:
 def top(values: Iterable[Ball]) -> Ball:
     """Return the largest of some balls, or a ball that contains it."""
     return reduce(arb.max, values)
-
-
-def gap(a: Ball, b: Ball) -> Ball:
-    """Return the largest distance between numbers in two balls."""
-    return mag(a - b)
 
 
 def middle(x: Ball) -> Ball:
@@ -111,12 +107,6 @@ def each(f: Callable[..., Ball], *matrices: Matrix) -> Matrix:
 def identity(n: int) -> Matrix:
     """Return the identity matrix."""
     return arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
-
-
-@cache
-def coefficients(name: str) -> list[fmpq]:
-    """Return the first coefficients of a function of `SERIES`."""
-    return [SERIES[name](n) for n in range(TERMS)]
 
 
 class Evaluation:
@@ -183,11 +173,9 @@ def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
         inside = s.intersection(BALL * arb(series["radius"])) if s.overlaps(BALL * arb(series["radius"])) else None
         error = polynomial(c, {**series, "beyond": False, "inside": True}, inside)[2] if inside is not None else ZERO
         return x, slope, error.max(2 * U * ulps * mag(x) + TINY)
-    r, exact, rest, v = mag(s), coefficients(series["name"]), arb(2) ** (3 - TERMS), list[Any]()
-    demand(
-        r < ROUNDED and (r < series["radius"] or "inside" in series),
-        f"the argument of {series['name']} reaches {float(r):.3g}",
-    )
+    r, exact, rest, v = mag(s), COEFFICIENTS[name], arb(2) ** (3 - TERMS), list[Any]()
+    accurate = r < ROUNDED and (r < series["radius"] or "inside" in series)
+    demand(accurate, f"the argument of {name} reaches {float(r):.3g}")
     for op, *a in series["operations"]:
         literal = [0, 1] if op == "s" else [fmpq(*a[0].as_integer_ratio())] if op == "number" else None
         v.append(fmpq_poly(literal) if literal else -v[a[0]] if op == "neg" else EXACT[op](v[a[0]], v[a[1]]))
@@ -199,24 +187,28 @@ def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
     return sums[0] + BALL * rest, sums[1] + BALL * (TERMS + 1) * rest, rounding[0, 0] + sums[2] + rest
 
 
+def carries(c: Any, X: Iterable[Ball]) -> list[Ball]:
+    """Return the largest compensation terms of states."""
+    return [c["carry"] * U * mag(x) for x in X]
+
+
 def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exact: bool = False) -> Evaluation:
     """Evaluate the operations of a stage for states in X, times in T and unknowns u, with rests of Taylor series."""
     rests = [op[3] for op in stage["operations"] if op[0] == "rest"]
     demand("path" in stage or not rests, "a Taylor series has no path")
-    carry, tail, along = [BALL * c["carry"] * U * mag(x) for x in X], [ZERO] * len(X), "path" in stage and not exact
+    carry, tail, along = [BALL * r for r in carries(c, X)], [ZERO] * len(X), "path" in stage and not exact
     if along:  # the path dm/dt = field from x stays in the box P
         P, path = [interval(p) for p in leaf["path"]], stage["path"]
         run = Evaluation(c, path["operations"], {"m": P, "u": u, "t": [T]})
         reached = [x + r + ZERO.union(run.x[k]) for x, r, k in zip(X, carry, path["field"], strict=True)]
         demand(all(p.contains_interior(v) for p, v in zip(P, reached, strict=True)), "a path may leave its box")
         tail = [mag(run.x[k]) for k in path["next"]]
-    run = Evaluation(
-        c, stage["operations"], {"x": X, "start": X, "carry": carry, "t": [T], "u": u, "tail": tail}, exact
-    )
-    demand(not along or len(stage["hidden"]) == 2 * len(X), "a Taylor series may end late")
-    demand(not along or bool(stage["seen"]) or max(rests) <= 4, "a Taylor series may end early")
-    hidden = [(mag(run.x[a]), run.x[b].abs_lower() / ROUNDED) for a, b in stage["hidden"]] if along else []
-    demand(all(a < b for a, b in hidden), "a Taylor series may end late")  # the C stops after two such terms
+    inputs = {"x": X, "start": X, "carry": carry, "t": [T], "u": u, "tail": tail}
+    run = Evaluation(c, stage["operations"], inputs, exact)
+    if along:  # the C stops after two terms that are below rounding
+        demand(bool(stage["seen"]) or max(rests) <= 4, "a Taylor series may end early")
+        hidden = [mag(run.x[a]) < run.x[b].abs_lower() / ROUNDED for a, b in stage["hidden"]]
+        demand(len(hidden) == 2 * len(X) and all(hidden), "a Taylor series may end late")
     return run
 
 
@@ -259,9 +251,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     bends, reach, low = arb_mat(m * m, m), column(map(arb, leaf["reach"])), each(arb.abs_lower, scale)
     if solves:
         J, errors, bends = run.outputs(matrix, {"u": m})
-        pivots = (
-            top(map(mag, (*J.entries(), *A.entries()))) * 4 * m * m * 2 ** (m - 1) * U
-        )  # backward error of elimination
+        pivots = top(map(mag, (*J.entries(), *A.entries()))) * 4 * m * m * 2 ** (m - 1) * U  # error of elimination
         M, M_error = arb_mat(m, m, J.entries()), each(lambda e: e + pivots, arb_mat(m, m, errors.entries()))
     if derived:
         expect_derivatives(c, stage, X, T, leaf, box)
@@ -269,10 +259,9 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
         least = -top(-v for v in low.entries())
         demand(least > 0, "the unknowns, in whose sizes residuals are measured, may be 0")
         noise = (d_error + U * Y) * (2 / (stage["difference"] * least))
-        M_error += each(gap, M, A) + arb_mat([[v] * m for v in noise.entries()])
+        M_error += each(mag, M - A) + arb_mat([[v] * m for v in noise.entries()])
     M = each(lambda v, e: v + BALL * e, M, M_error)
     inverse, measured = each(mag, M.inv()), each(mag, M) * high if derived else high
-    first_order = each(gap, M, A)
 
     def residual_error(e: Matrix) -> Matrix:
         """Return bounds for rounding errors of the residual, at a distance e from the solution."""
@@ -281,7 +270,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
     def missed(e: Matrix) -> Matrix:
         """Return the error of u after a correction of an error e."""
-        bent = arb_mat(m, m, (each(mag, bends) * e * HALF).entries()) + M_error if derived else first_order
+        bent = arb_mat(m, m, (each(mag, bends) * e * HALF).entries()) + M_error if derived else each(mag, M - A)
         return inverse * (bent * e + residual_error(e))
 
     def worst_of(size: Ball) -> Matrix:
@@ -291,7 +280,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     C = each(middle, each(middle, A).inv())
     values = run_of(c, stage, X, T, leaf, centre.entries()).x
     at = column(values[k] for k in stage["equation"])
-    base = column(x + BALL * c["carry"] * U * mag(x) for x in X) if based else column([ZERO] * m)
+    base = column(x + BALL * r for x, r in zip(X, carries(c, X), strict=True)) if based else column([ZERO] * m)
     K = centre - C * (centre - base + at) + (identity(m) - C * A) * (column(box) - centre)
     away = each(mag, centred(c, stage, X, T, leaf, box, run, "away")) + (2 * c["carry"] * U + arb(2) ** -30) * Y
     demand(below(away, reach), "a start is out of reach")
@@ -346,12 +335,10 @@ def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
         else:
             change, error, by_x, by_start = run_of(c, stage, X, T, part).outputs(stage["change"], {"x": n, "start": n})
             slope, small = identity(n) + by_x + by_start, column([ZERO] * n)
-        parts = [*zip(X, change.entries(), small.entries(), strict=True)]
-        lost = column(
-            8 * U * (U * mag(x + v) + w + c["carry"] * U * mag(x)) for x, v, w in parts
-        )  # by the compensated sum
+        parts = [*zip(X, change.entries(), small.entries(), carries(c, X), strict=True)]
+        lost = column(8 * U * (U * mag(x + v) + w + r) for x, v, w, r in parts)  # by the compensated sum
         total = error + lost + each(mag, slope) * total
-        X = [x + v + BALL * (e + c["carry"] * U * mag(x)) for (x, v, _), e in zip(parts, total.entries(), strict=True)]
+        X = [x + v + BALL * (e + r) for (x, v, _, r), e in zip(parts, total.entries(), strict=True)]
     return total.entries(), X
 
 
@@ -372,9 +359,8 @@ def check(c: Any, domain: Sequence[Sequence[float]], node: Any) -> tuple[int, li
 
 def digest(c: Mapping[str, Any]) -> str:
     """Return the digest of a certificate without its entry of the digest."""
-    return hashlib.sha256(
-        json.dumps({k: v for k, v in c.items() if k != "sha256"}, sort_keys=True).encode()
-    ).hexdigest()
+    text = json.dumps({k: v for k, v in c.items() if k != "sha256"}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def replayed(c: Any, text: bytes) -> str:
@@ -383,7 +369,8 @@ def replayed(c: Any, text: bytes) -> str:
     demand(hashlib.sha256(text).hexdigest() == c["c_sha256"], "the certificate is about another C file")
     boxes, largest = check(c, [*c["domain"], c["time"]], c["tree"])
     ulps = [b / math.ulp(x) for b, x in zip(c["bound"], largest, strict=True)]
-    return f"{c['name']}: {boxes} boxes; a step is within {max(ulps):.3g} ulp of the exact map in each coordinate"
+    number = f"{boxes} box{'es' * (boxes > 1)}"
+    return f"{c['name']}: {number}; a step is within {max(ulps):.3g} ulp of the exact map in each coordinate"
 
 
 if __name__ == "__main__":

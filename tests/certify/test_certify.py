@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import ast
 import copy
 import ctypes
 import dataclasses
+import io
 import json
 import math
 import random
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import tokenize
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -26,12 +30,12 @@ from systems import compile_anew, slow_but, spec_of
 
 import phigen.certify.checker
 from phigen.certify.checker import (
+    COEFFICIENTS,
     LIBM,
     SERIES,
     TERMS,
     Evaluation,
     RefusedError,
-    coefficients,
     digest,
     interval,
     replayed,
@@ -287,7 +291,34 @@ def test_the_checker_needs_nothing_of_phigen(tmp_path: Path) -> None:
         [sys.executable, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert (process.returncode, process.stderr) == (0, "")
-    assert "pendulum: 1 boxes; a step is within" in process.stdout
+    assert "pendulum: 1 box; a step is within" in process.stdout
+
+
+def code_lines(text: str) -> dict[str, int]:
+    """Numbers of lines with code, neither comments nor docstrings, by top-level functions; "" for other lines."""
+    tree, numbers = ast.parse(text), set[int]()
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type not in (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT):
+            numbers |= {*range(token.start[0], token.end[0] + 1)} if token.string else set()
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list) and isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant):
+            numbers -= {*range(body[0].lineno, body[0].end_lineno + 1)}
+    named = [node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    counts = {n.name: sum(n.lineno <= k <= n.end_lineno for k in numbers) for n in named}
+    return counts | {"": len(numbers) - sum(counts.values())}
+
+
+def test_the_page_says_what_the_lines_of_the_checker_are_for() -> None:
+    counts = code_lines(Path(phigen.certify.checker.__file__).read_text(encoding="utf-8"))
+    page = (Path(phigen.__file__).parents[1] / "docs/certify.md").read_text(encoding="utf-8")
+    (total,) = map(int, re.findall(r"with (\d+) lines of code", page))
+    rows = re.findall(r"^\| (\d+) \| [^|]* \| ([^|]*) \|$", page, re.MULTILINE)
+    named = [re.findall(r"`(\w+)`", functions) for _, functions in rows]
+    assert total == sum(counts.values()) == sum(int(number) for number, _ in rows)
+    assert sorted(name for names in named for name in names) == sorted(counts.keys() - {""})
+    for (number, functions), names in zip(rows, named, strict=True):
+        assert int(number) == sum(counts[name] for name in names) + ("other lines" in functions) * counts[""], functions
 
 
 def test_a_jacobian_that_is_not_the_derivative_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -342,7 +373,7 @@ def test_systems_that_certificates_do_not_cover_are_refused(text: str, words: st
 
 def test_coefficients_of_series_fall_as_the_rest_assumes() -> None:
     for name in SERIES:
-        sizes = [abs(float(c)) for c in coefficients(name)]
+        sizes = [abs(float(c)) for c in COEFFICIENTS[name]]
         assert all(size <= 2.0 ** (1 - n) for n, size in enumerate(sizes)), name
         if not name.startswith("phi"):  # the factorials go on falling; phi has its nearest pole at 4 pi^2
             assert sizes[TERMS - 2] + sizes[TERMS - 1] < 2.0**-TERMS
