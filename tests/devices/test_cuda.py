@@ -43,3 +43,13 @@ def test_small_systems_stay_in_registers(name, architecture, tmp_path):
     common = resources_of(name, architecture, tmp_path, 4, f"-D{name}_COMMON")
     assert (common.spilled, common.stack) == (0, 0)
     assert common.registers < used.registers
+
+
+@pytest.mark.parametrize("architecture", nvrtc.ARCHITECTURES)
+def test_four_blocks_of_a_rigid_body_fit_into_the_registers_of_a_multiprocessor(architecture, tmp_path):
+    """With 65,536 registers; without spills. Three blocks fit by default."""
+    options = ["-Drigid_body_COMMON", "-Drigid_body_BLOCKS=4"]
+    used = resources_of("rigid_body", architecture, tmp_path, 4, *options)
+    assert (used.spilled, used.stack) == (0, 0)
+    assert 4 * 128 * used.registers <= 65_536
+    assert 4 * 128 * resources_of("rigid_body", architecture, tmp_path, 4, options[0]).registers > 65_536
