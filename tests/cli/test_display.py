@@ -19,8 +19,8 @@ class Terminal(io.StringIO):
         return True
 
     def shows(self, text):
-        """Whether the text is drawn, within a second."""
-        end = time.monotonic() + 1
+        """Whether the text is drawn, on a busy machine too."""
+        end = time.monotonic() + 30
         while text not in self.getvalue() and time.monotonic() < end:
             time.sleep(0.001)
         return text in self.getvalue()
@@ -43,7 +43,8 @@ def test_what_lasts_is_shown_on_a_terminal_and_erased_at_its_end():
     with redirect_stderr(Terminal()) as terminal, Console().watching():
         with progress.stage("top"), progress.stage("parts", total=12) as parts:
             parts.done = 5
-            assert terminal.shows("\rtop: parts, 5 of 12, 0 s\x1b[K")
+            assert terminal.shows("\rtop: parts, 5 of 12, ")
+            assert re.search(r"\rtop: parts, 5 of 12, \d+ s\x1b\[K", terminal.getvalue())
         assert terminal.getvalue().endswith("\r\x1b[K")
 
 
