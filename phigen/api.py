@@ -263,7 +263,7 @@ def interface_of(program: Program) -> Interface:
         colours=sites.colours,
         colour_weights=sites.weights,
         launches=launches(program, step),
-        dear=every_other or step.equation is not None,
+        slow_steps=every_other or step.equation is not None,
     )
 
 

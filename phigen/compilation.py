@@ -219,7 +219,7 @@ class _CompiledSystem(_Compiled, ABC):
 
     @property
     def known_system(self) -> System | None:
-        """The system."""
+        """The system of coordinates."""
         return self.system
 
     def _repr_latex_(self) -> str:
@@ -242,7 +242,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def label(self) -> str:
-        """The bi-realisation."""
+        """The name of the bi-realisation."""
         return self.realisation.label
 
     @property
@@ -294,7 +294,7 @@ class CompiledSeries(_CompiledSystem):
         return self.gauged.series
 
     def by_series(self) -> CompiledSeries:
-        """The compilation itself."""
+        """Return this compilation, which is one by a series."""
         return self
 
     def by_kind(
@@ -326,12 +326,12 @@ class CompiledSplitting(_CompiledSystem):
 
     @property
     def label(self) -> str:
-        """The scheme."""
+        """The name of the scheme."""
         return "splitting"
 
     @property
     def exact(self) -> bool:
-        """Flows are Poisson maps."""
+        """Whether a step is a Poisson map: always, since flows are."""
         return True
 
     @property
@@ -340,7 +340,7 @@ class CompiledSplitting(_CompiledSystem):
         return True
 
     def by_splitting(self) -> CompiledSplitting:
-        """The compilation itself."""
+        """Return this compilation, which is one by a splitting."""
         return self
 
     def by_kind(
@@ -402,7 +402,7 @@ class CompiledGauss(_CompiledSystem):
         return {"scheme": self.scheme_name, "structure": self.structure}
 
     def by_gauss(self) -> CompiledGauss:
-        """The compilation itself."""
+        """Return this compilation, which is one by Gauss collocation."""
         return self
 
     def by_kind(
@@ -429,7 +429,7 @@ class CompiledLattice(_Compiled):
 
     @property
     def discretised(self) -> System:
-        """Raise `SpecError`, as `system`."""
+        """Raise `SpecError`: the number of coordinates is not known before a run."""
         return self.system
 
     @property
@@ -490,7 +490,7 @@ class CompiledLattice(_Compiled):
         return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     def by_sweeps(self) -> CompiledLattice:
-        """The compilation itself."""
+        """Return this compilation, which is one of a lattice."""
         return self
 
     def by_kind(
@@ -499,7 +499,7 @@ class CompiledLattice(_Compiled):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """Raise `SpecError`, as `system`."""
+        """Raise `SpecError`: a lattice is of none of these kinds."""
         raise system_of_lattice(self.spec)
 
     def _repr_latex_(self) -> str:

@@ -289,7 +289,7 @@ def _is_dearer(spec: Spec, source: System, least: float) -> bool:
 
 
 def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
-    """Compile to a splitting."""
+    """Compile a system to a splitting into parts with elementary flows."""
     gauge = Gauge() if isinstance(spec.gauge, str) else fixed_gauge(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: _parts(spec, discretised.frozen))
@@ -340,7 +340,7 @@ def _turns_bodies(spec: Spec, system: System) -> bool:
 
 
 def _collocated(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
-    """Compile to Gauss collocation."""
+    """Compile a system to steps of Gauss collocation."""
     expect_offered(spec)
     plan = plan_gauss(spec)
     realisation = clock.timed("momentum maps", lambda: realise_gauss(spec, source))

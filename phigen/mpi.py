@@ -265,12 +265,12 @@ class _Domain:
             elif self.far == 0:
                 self.far, stretch = FAR_STEPS, STRETCH
             else:
-                self._close()
+                self._apply_last_flow()
                 message = (
                     f"{self.lattice.solver.interface.name}: step {self.steps} of size {self.h!r} failed: NOT_FINITE"
                 )
                 raise StepError(message, step=self.steps, status="NOT_FINITE")
-        self._close()
+        self._apply_last_flow()
         self._tell_time(self.steps)
 
     def _tell_time(self, steps: int) -> None:
@@ -297,7 +297,7 @@ class _Domain:
         self.saved = self._all()
         return True
 
-    def _close(self) -> None:
+    def _apply_last_flow(self) -> None:
         """Apply the last flow of a step, after saving the state before it."""
         if not self.open:
             return
@@ -473,7 +473,7 @@ class _Frames:
             self.file.close()
 
     def discard(self) -> None:
-        """Remove the file."""
+        """Remove the incomplete output file."""
         self.domain.comm.barrier()
         if self.path and self.domain.comm.rank == 0:
             self.part.unlink(missing_ok=True)

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Target:
-    """A language.
+    """A language in which phigen writes solvers.
 
     ``emitter`` is the module whose ``emit(program, command)`` gives file names and their contents; it takes
     ``single_file`` too if that is offered. ``loader`` is the module whose ``load(files, interface)`` makes a back end
-    of them, empty if Python cannot run them. ``suffixes`` are those of all files, the first that of the main one.
-    Specs that name no targets get those of ``default``. A ``device`` is where Python runs the files of the target
-    device, beside those of another target for what runs on the host.
+    of them, empty if Python cannot run them. ``suffixes`` are the suffixes of all files, the main file's first.
+    Specs that name no targets get the targets with ``default``. A ``device`` is where Python runs the files of the
+    target device; the host runs the files of another target.
     """
 
     name: str

@@ -87,7 +87,7 @@ class _Pending:
         self._temporary.chmod(_mode(self.path))
 
     def take_place(self) -> None:
-        """Replace the file."""
+        """Replace the file by the temporary file, atomically."""
         with naming(self.path):
             self._temporary.replace(self.path)
 

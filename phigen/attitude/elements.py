@@ -102,12 +102,12 @@ def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
 
 
 def dot(a: Vector, b: Vector) -> Expression:
-    """a·b."""
+    """Return the scalar product a·b."""
     return total(x * y for x, y in zip(a, b, strict=True))
 
 
 def cross(a: Vector, b: Vector) -> list[Expression]:
-    """a × b."""
+    """Return the vector product a × b."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 

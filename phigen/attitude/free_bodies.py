@@ -152,7 +152,10 @@ def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
 
 
 def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
-    """Yield the residual of the rate of θ where the axes l, m, h have this ``order``."""
+    """Yield the residual of the formula for θ̇ (module docstring).
+
+    The axes l, m, h of smallest, middle and largest E_i have the indices ``order``.
+    """
     x, w = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "w"))
     name = Symbol("attitude", "S")
     s, factors = symbol(name), [w[k] - w[j] for j, k in CYCLIC]

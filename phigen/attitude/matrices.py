@@ -64,7 +64,7 @@ def cayley(group: Group, p: Sequence[Expression]) -> Flat:
 
 
 def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
-    """P, …, P^{N−1}."""
+    """Return the powers P, …, P^{N−1}."""
     rows = group.rows
     powers = [group.generator(p)]
     while len(powers) < rows - 1:

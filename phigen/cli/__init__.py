@@ -118,5 +118,5 @@ def group() -> None:
 
 
 def main() -> None:
-    """The console script ``phigen``."""
+    """Run the command line of the console script ``phigen``."""
     group.main(prog_name="phigen")

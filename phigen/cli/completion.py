@@ -24,7 +24,7 @@ def specs(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[C
 
 
 def bundled_names(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[str]:
-    """Bundled specs."""
+    """Complete the names of bundled specs."""
     return [name for name in resources.bundled() if name.startswith(prefix)]
 
 

@@ -136,23 +136,23 @@ def mend(commands: Sequence[str]) -> list[str]:
 
 
 def counted(number: int, noun: str) -> str:
-    """``3 files``."""
+    """Return a number with its noun, as ``3 files``."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def heading(text: str) -> str:
-    """A heading on stdout, bold on a terminal."""
+    """Return a heading, which terminals print in bold."""
     return click.style(text, bold=True)
 
 
 def out(text: str) -> None:
-    """Lines for people on stdout."""
+    """Write lines to stdout, in colour on a terminal."""
     with _stdout():
         click.echo(text, color=_colour())
 
 
 def out_json(value: Any) -> None:
-    """Data for machines on stdout; in ASCII where stdout is not UTF-8."""
+    """Write JSON to stdout, in ASCII if the encoding of stdout is not UTF-8."""
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     ascii_only = codecs.lookup(encoding).name != "utf-8"
     out(json.dumps(value, indent=2, ensure_ascii=ascii_only))
@@ -166,7 +166,7 @@ def out_document(text: str) -> None:
 
 @contextmanager
 def _stdout() -> Iterator[None]:
-    """Errors name stdout."""
+    """Context in which errors of writing name stdout."""
     if sys.stdout is None:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF), "stdout")
     try:

@@ -37,7 +37,7 @@ class Display:
             self.erase()
 
     def erase(self) -> None:
-        """Clear the line."""
+        """Clear the progress line on the terminal."""
         with self.room():
             pass
 

@@ -44,7 +44,7 @@ class Experiment:
 
     @property
     def h(self) -> float:
-        """The step size."""
+        """The step size, in t or τ."""
         return float(self.run.step)
 
     @property

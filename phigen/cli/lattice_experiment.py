@@ -35,7 +35,7 @@ _UNREADABLE = (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZ
 class LatticeExperiment(Experiment):
     """An `Experiment` of a lattice: its ``start`` has the state, ``past`` is a `phigen.runtime.lattice_rows.Past`.
 
-    ``origin`` is a text for its files.
+    ``origin`` is the provenance text that is written into output files.
     """
 
     start: Start | None = None
@@ -43,11 +43,11 @@ class LatticeExperiment(Experiment):
 
     @property
     def begin(self) -> float:
-        """The time at which its steps start."""
+        """The time at which the steps of the run start."""
         return float(self.past.t[-1]) if self.past else self.t0
 
     def beginning(self, solver: LatticeSolver) -> Beginning:
-        """The state at which its steps start, with everything that they depend on."""
+        """Return the initial state of the run, with everything that its steps depend on."""
         assert self.start is not None
         state = solver.state(self.start.state if self.past is None else self.past.last, "x0")
         values = solver.values(self.parameters, {}, state.shape[1:])
@@ -66,7 +66,7 @@ class LatticeExperiment(Experiment):
         return solver.function(expression, self.parameters)
 
     def plan(self, solver: LatticeSolver) -> IntegrationPlan:
-        """Return the requested integration."""
+        """Return the start, the rows, and the outputs of the integration that the run requests."""
         beginning, run = self.beginning(solver), self.run
         if self.times is None:
             rows = strided(beginning.h, run.steps, run.stride, self.end)

@@ -12,7 +12,7 @@ import os
 import re
 import shlex
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -122,8 +122,8 @@ def read(folder: Path) -> tuple[dict[str, ManifestEntry], tuple[str, ...]]:
             raise ValueError(f"build systems that do not exist: {builds}")
         return {name: _entry(name, part) for name, part in data["solvers"].items()}, builds
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        problem = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-        raise _damaged(path, problem) from None
+        what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise _damaged(path, what) from None
 
 
 def _entry(name: str, part: Mapping[str, Any]) -> ManifestEntry:
@@ -146,22 +146,26 @@ def _entry(name: str, part: Mapping[str, Any]) -> ManifestEntry:
 
 def _options(name: str, raw: dict[str, Any]) -> Options:
     targets = tuple(_list_of_texts(raw.pop("targets", [])))
-    left_out = tuple(_list_of_texts(raw.pop("without", [])))
-    options = Options(targets=targets, without=left_out, **raw)
+    without = tuple(_list_of_texts(raw.pop("without", [])))
+    unknown = sorted(raw.keys() - ({field.name for field in fields(Options)} - {"directory", "bindings", "stack"}))
+    if unknown:
+        raise ValueError(f"{name}: {unknown[0]!r} is not an option")
+    options = Options(targets=targets, without=without, **raw)
     order, modified = options.order, options.modified
-    if (
-        not set(targets) <= set(TARGETS)
-        or not set(left_out) <= set(PARTS)
-        or not (order is None or (type(order) is int and 1 <= order <= limits.ORDER))
-        or not (modified is None or (type(modified) is int and 0 <= modified <= limits.CORRECTIONS))
-        or options.scheme not in (None, *SCHEMES)
-        or options.profile not in (None, *PROFILES)
-        or options.real not in (None, *REALS)
-        or "directory" in raw
-        or not {"bindings", "stack"}.isdisjoint(raw)
-        or not all(isinstance(flag, bool) for flag in (options.single_file, options.tangent, options.adjoint))
-    ):
-        raise ValueError(f"{name}: options that do not exist: {raw}")
+    is_valid = {
+        "targets": set(targets) <= set(TARGETS),
+        "without": set(without) <= set(PARTS),
+        "order": order is None or (type(order) is int and 1 <= order <= limits.ORDER),
+        "modified": modified is None or (type(modified) is int and 0 <= modified <= limits.CORRECTIONS),
+        "scheme": options.scheme in (None, *SCHEMES),
+        "profile": options.profile in (None, *PROFILES),
+        "real": options.real in (None, *REALS),
+    }
+    is_valid |= {key: isinstance(getattr(options, key), bool) for key in ("single_file", "tangent", "adjoint")}
+    for key, valid in is_valid.items():
+        if not valid:
+            value = getattr(options, key)
+            raise ValueError(f"{name}: the option {key!r} cannot be {list(value) if type(value) is tuple else value!r}")
     return options
 
 
@@ -171,6 +175,6 @@ def _list_of_texts(value: Any) -> list[str]:
     return value
 
 
-def _damaged(path: Path, problem: str) -> CheckError:
+def _damaged(path: Path, why: str) -> CheckError:
     hint = f"restore {FILE} from version control, or remove it and vendor the solvers again"
-    return CheckError(f"{path} cannot be used: {problem}\n  hint: {hint}")
+    return CheckError(f"{path} cannot be used: {why}\n  hint: {hint}")

@@ -121,7 +121,7 @@ class Recorder:
 
     @property
     def steps(self) -> int:
-        """Whole steps."""
+        """The number of whole steps made so far."""
         return self._whole if self._whole is not None else self.session.steps
 
     @property

@@ -197,7 +197,7 @@ def brackets(compilation: Compilation) -> list[tuple[str, str]]:
 
 
 def readable_one(expression: Any, max_terms: int | None) -> str:
-    """One expression as text."""
+    """Return one expression as text."""
     from phigen.symbolic.readable import readable
 
     return readable([expression], max_terms)[0]

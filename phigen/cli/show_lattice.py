@@ -33,7 +33,7 @@ def _parameter(p: Parameter) -> str:
 
 
 def described_cell(spec: Spec, cell: Cell) -> dict[str, object]:
-    """The cell for machines."""
+    """Return the cell as data for JSON."""
     from phigen.notation.cell_formulas import brackets, rates
     from phigen.symbolic.expression import text
     from phigen.symbolic.readable import readable

@@ -207,6 +207,6 @@ def box_of(points: Floats) -> Floats:
 
 
 def _length(points: Floats) -> float:
-    """Return the length of the curve, scaled to the size 1 in each direction."""
+    """Return the arc length of a curve after each coordinate is scaled to range 1."""
     size = np.ptp(points, axis=0)
     return float(np.sum(np.linalg.norm(np.diff(points / np.where(size > 0, size, 1.0), axis=0), axis=1)))

@@ -1,4 +1,4 @@
-"""Plots of Poincaré sections."""
+"""Plots of Poincaré sections: the crossings of a trajectory with a surface."""
 
 from __future__ import annotations
 

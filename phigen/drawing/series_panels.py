@@ -1,4 +1,4 @@
-"""Panels of time series."""
+"""Panels with time series of lattices, such as energies and observables."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def first_run(spec: Spec) -> Run:
 
 
 def variables_of(compilation: Compilation) -> tuple[Variable, ...]:
-    """Return all variables in the order of their numbers, as in `first_numbers`."""
+    """Return all variables by value reference (0, 1, …), grouped by kind as `first_numbers` counts them."""
     all_variables = chain.from_iterable(_kinds(compilation).values())
     return tuple(replace(variable, number=k) for k, variable in enumerate(all_variables))
 

@@ -1,4 +1,4 @@
-"""Quaternions over commutative algebras, for Lie algebras of skew elements.
+"""The associative algebra A of a Lie algebra g: quaternions over a commutative algebra, with g as skew elements.
 
 A = K ⊕ g with ab = β(a, b) + ½[a, b] on g, where K commutes with all elements. A exists if [[a, b], c] = 4(β(b, c)a −
 β(a, c)b) for a symmetric β whose values are maps that commute with the bracket; K is spanned by the identity and

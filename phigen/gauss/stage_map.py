@@ -37,8 +37,8 @@ class StageMap:
     """Points as expressions in the start of the step and the unknowns.
 
     ``unknowns`` are symbols, and ``change`` is x − x_start by coordinates. The first ``plain`` unknowns are offsets
-    of the coordinates with the indices ``moved``. Then come the offset of the time, if there is one, those of the
-    logarithms of the coordinates ``scaled``, and those of group elements.
+    of the coordinates with the indices ``moved``. Then come the offset of the time, if H depends on it, the offsets of
+    the logarithms of the coordinates ``scaled``, and the unknowns of group elements.
     """
 
     system: System

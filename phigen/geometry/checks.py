@@ -28,7 +28,7 @@ def check(system: System) -> list[Statement]:
 
 
 def skew_symmetry(system: System) -> Statement:
-    """π_ij = −π_ji."""
+    """Decide whether π_ij = −π_ji."""
     pi, names = system.poisson, system.coordinates
     n = len(names)
     residuals = [(f"({names[i]}, {names[j]})", pi[i][j] + pi[j][i]) for i in range(n) for j in range(i, n)]

@@ -51,7 +51,7 @@ class Unit:
 
     @property
     def adjective(self) -> str:
-        """``relative`` or ``absolute``."""
+        """The kind of errors in this unit: ``relative`` or ``absolute``."""
         return ABSOLUTE if self.kind == ABSOLUTE else RELATIVE
 
     def errors(self, values: Floats, start: float) -> Floats:

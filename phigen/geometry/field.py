@@ -113,7 +113,7 @@ class Field(Arithmetic[Scalar]):
         raise KeyError(name)
 
     def power(self, base: Scalar, exponent: Fraction) -> Scalar:
-        """An integer power."""
+        """Return an integer power of an element."""
         if exponent.denominator != 1:
             raise KeyError(str(exponent))
         return base ** int(exponent)

@@ -115,7 +115,7 @@ class Array:
 
 @dataclass(frozen=True)
 class Name:
-    """A declared name."""
+    """A variable that is declared in the function, by its name."""
 
     symbol: str
 
@@ -170,7 +170,7 @@ class BondParameter:
 
 @dataclass(frozen=True)
 class Time:
-    """Physical time."""
+    """The physical time at which a kernel is evaluated."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ class OnSeam:
 
 @dataclass(frozen=True)
 class Member:
-    """Member of a record."""
+    """A member of a record, such as the solver."""
 
     record: Value
     name: str
@@ -562,10 +562,10 @@ class ConstantTable:
 
 @dataclass(frozen=True)
 class Function:
-    """A function; ``doc`` is its purpose, ``role`` that of its kernel, ``returns`` the type of its value.
+    """A function; ``doc`` is its purpose, ``role`` the purpose of its kernel, ``returns`` the type of its value.
 
-    On the level of sites its parameters are some of `PARAMETERS`. On the level of memory they have the types that are
-    listed in ``types``, or else those of `TYPES`.
+    On the level of sites its parameters are some of `PARAMETERS`. On the level of memory the types of the parameters
+    are in ``types``; types that are not listed there are in `TYPES`.
     """
 
     name: str

@@ -98,7 +98,10 @@ class PathFunctions:
     def slopes(self) -> ir.Block:
         """Return the statements that compute the coefficients of order k + 1 of the coordinates."""
         after, layout = ir.plus(K, 1), self.layout
-        values = (ir.Binary("/", layout.order(slope, K), ir.Cast(after, "real")) for slope in self.path.slopes)
+        values = (
+            ir.Binary("/", layout.order(derivative_index, K), ir.Cast(after, "real"))
+            for derivative_index in self.path.slopes
+        )
         return tuple(layout.following(i, after, value) for i, value in enumerate(values))
 
     def nodes(self) -> ir.Block:
@@ -108,7 +111,8 @@ class PathFunctions:
 
     def field(self) -> ir.Block:
         """Return the statements that compute ṁ from these values."""
-        return tuple(ir.Assign(ir.entry(FIELD, i), ir.entry(E, slope)) for i, slope in enumerate(self.path.slopes))
+        derivatives = (ir.entry(E, index) for index in self.path.slopes)
+        return tuple(ir.Assign(ir.entry(FIELD, i), value) for i, value in enumerate(derivatives))
 
     def reads(self, expressions: Iterable[Expression], *, at_point: bool = False) -> list[ir.Statement]:
         """Return the declarations of the symbols of expressions; series are those of one point, or of order 0."""
@@ -226,7 +230,7 @@ def lane_functions(program: Program, path: Recurrences, slopes: PathSlopes, used
     along_m = [(e.row * 2 * n + e.column, SHARE, e) for e in slopes.jacobian]
     half = ir.Binary("*", ir.Constant(0.5), SHARE)
     along_p = [(e.row * 2 * n + n + e.column, half, e) for e in slopes.tensor]
-    listed = [
+    functions = [
         build.follow("follow", "the series that follow from those of the coordinates", range(n, base)),
         build.follow("follow_slopes", "the further series", range(base, len(whole.series))),
         build.variation("vary_by", "v", slopes.jacobian, 2 * n, "the derivatives"),
@@ -234,11 +238,11 @@ def lane_functions(program: Program, path: Recurrences, slopes: PathSlopes, used
     ]
     if used:
         along = [(e.row * len(used) + e.column, SHARE, e) for e in slopes.along]
-        listed += [
+        functions += [
             build.variation("vary_along_by", "w", slopes.jacobian, len(used), "the derivatives by coefficients"),
             build.source("vary_along_source", "w", along, "the derivatives by coefficients"),
         ]
-    return listed
+    return functions
 
 
 @dataclass(frozen=True)

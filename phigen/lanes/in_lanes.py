@@ -67,12 +67,12 @@ class LaneKernel:
 
 @dataclass(frozen=True)
 class Blocks:
-    """Implicit steps in lanes.
+    """Implicit steps whose kernels are evaluated in SIMD lanes.
 
     ``calls`` are the functions that the kernels call; the loops are ``vectorised`` if no library function is among
-    them. ``factors`` are those of the Newton matrix, stored in place of its inverse where the matrix is sparse.
+    them. ``factors`` are the factors of the Newton matrix, stored in place of its inverse where the matrix is sparse.
     ``path`` has the derivatives of paths, with at most ``slope_terms`` terms. ``room`` is the number of values in
-    each lane that a group of members needs, without those of its predictors.
+    each lane that a group of members needs, without the values of its predictors.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -92,10 +92,10 @@ class Blocks:
 class Packs:
     """Members with explicit steps, one in each lane.
 
-    ``kernels`` are those of a step, or of the flows of a splitting. ``small_argument`` are the functions with a
-    small-argument form, a polynomial; beyond its range the full-range form is called. ``transposes`` are those of the
-    kernels, if cotangents are pulled back in packs too, ``reverse_packs`` of them together. Where states are
-    ``recomputed``, the transposes compute the state before a flow by the inverse flow.
+    ``kernels`` belong to a step, or to the flows of a splitting. ``small_argument`` are the functions with a
+    small-argument form, a polynomial; beyond its range the full-range form is called. ``transposes`` are the transposed
+    kernels, if cotangents are pulled back in lanes too; the reverse pass takes ``reverse_packs`` batches of members
+    together. If states are ``recomputed``, the transposes compute the state before a flow by the inverse flow.
     """
 
     kernels: tuple[Kernel, ...]
@@ -151,7 +151,7 @@ class Stages:
 
     @property
     def lanes(self) -> int:
-        """The number of lanes."""
+        """The number of values that are computed side by side."""
         return LANES // 2 if self.narrow else LANES
 
 
@@ -261,7 +261,7 @@ def _called_in_forms(step: Sweeps) -> set[str]:
 
 
 def _stages(program: Program, step: Gauss) -> Stages:
-    """Return the vector field of a Gauss method at all stages, with its transposes.
+    """Return the kernels in lanes of the vector field of a Gauss method at all stages, with their transposes.
 
     Values at the start of the step are shared by all lanes.
     """

@@ -221,8 +221,9 @@ def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()
     do not fit.
     """
     if len(sizes) != (len(cell.axes) or 1) or any(n < 1 for n in sizes):
-        required_sizes = f"{len(cell.axes)}, along {', '.join(cell.axes)}" if cell.axes else "the number of sites"
-        raise ValueError(f"sizes are {required_sizes}; not {'x'.join(map(str, sizes))}")
+        axes = f"{len(cell.axes)} positive integers, for the axes {', '.join(cell.axes)}"
+        required = axes if len(cell.axes) > 1 else "one positive integer, the number of sites"
+        raise ValueError(f"sizes must be {required}; got {'x'.join(map(str, sizes))}")
     bond_ends = tuple((int(a), int(b)) for a, b in bonds)
     if any(not (0 <= n < sizes[0]) for pair in bond_ends for n in pair) or any(a == b for a, b in bond_ends):
         raise ValueError(f"bonds are pairs of different sites between 0 and {sizes[0] - 1}")

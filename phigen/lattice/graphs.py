@@ -1,7 +1,7 @@
 """Parts of H on a graph: forces and motions are sums over the bonds that meet at a site.
 
-Some terms commute with themselves only if no two neighbouring sites belong to the same part. Sites are then coloured
-when the bonds are known, so that no bond connects two sites of one colour. A part of one colour is the sum of its
+The copies of a term on two bonds may not commute if the bonds share a site. Sites are then coloured, when the bonds
+are known, so that no bond connects two sites of one colour. A part of one colour is the sum of its
 terms over the bonds that begin at sites of the colour or, for some terms, end there; the flows of all colours follow
 one another. Two terms may be mirror images under the exchange of the ends, as x[a]*y[b] and y[a]*x[b] in a cross
 product. They form one part, where each term is assigned to the end that makes them commute.

@@ -55,7 +55,7 @@ class _FewBodies:
 
     @property
     def masses(self) -> Vector:
-        """The masses."""
+        """The masses m_i of all bodies."""
         return [symbol(n) for n in self.mass_names]
 
     @property
@@ -68,11 +68,11 @@ class _FewBodies:
         return [Symbol(kind, body, axis) for axis, _ in enumerate(self.bodies.axes)]
 
     def inner(self, i: int) -> Expression:
-        """Return M_i."""
+        """Return M_i: in Jacobi coordinates m_0 + … + m_i, else m_0."""
         return total(self.masses[: i + 1]) if self.bodies.jacobi else self.masses[0]
 
     def inertia(self, i: int) -> Expression:
-        """Return 1/w_i."""
+        """Return 1/w_i, the mass that belongs to the relative momentum of body i."""
         if not self.bodies.jacobi:
             return self.masses[i]
         return self.masses[i] * self.inner(i - 1) * power(self.inner(i), -1)

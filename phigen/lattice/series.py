@@ -102,7 +102,7 @@ class SeriesPlan:
         return "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(forces.vector)
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
-        """No flows."""
+        """Yield nothing: a step by a series has no flows."""
         yield from ()
 
     def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> Equation:

@@ -1,4 +1,4 @@
-"""Casimirs of log-canonical structures in the usual form: logarithms of products of powers."""
+"""Print Casimirs of log-canonical structures, ½ Σ u_i log x_i², as log|Π x_i^u_i|."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def _exponents(node: Expression, args: list[_Sum]) -> _Sum:
         case "neg":
             return {name: -u for name, u in parts[0].items()}
         case "mul" if set(parts[0]) == {None} or set(parts[1]) == {None}:
-            scale, rest_part = (parts[0], parts[1]) if set(parts[0]) == {None} else (parts[1], parts[0])
-            return {name: scale[None] * u for name, u in rest_part.items()}
+            scale, logarithms = (parts[0], parts[1]) if set(parts[0]) == {None} else (parts[1], parts[0])
+            return {name: scale[None] * u for name, u in logarithms.items()}
     return {None: node} if not any(set(p) - {None} for p in parts) else None
 
 

@@ -15,7 +15,10 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass
 class ClassicalCourse:
-    """Course (`phigen.runtime.session.Course`) of a classical method, whose runner starts from the array ``place``."""
+    """Run of a classical method that is continued step by step, with the interface of `phigen.runtime.session.Course`.
+
+    The compiled ``runner`` reads its initial state from the array ``place``; ``x`` is the state after ``steps`` steps.
+    """
 
     runner: race.Runner
     place: Floats
@@ -41,6 +44,6 @@ class ClassicalCourse:
 
 
 def started(method: str, compilation: Compilation, x0: Floats, parameters: Mapping[str, float]) -> ClassicalCourse:
-    """Return the course of a method from x0 (DIM,). Raises `ToolchainError`."""
+    """Return the run of a method at its initial state x0 (DIM,). Raises `ToolchainError`."""
     state = np.array(x0, dtype=np.float64)
     return ClassicalCourse(race.compiled(compilation, [method], state, parameters).runners[method], state, state.copy())

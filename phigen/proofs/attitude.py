@@ -1,9 +1,9 @@
 """Statements on attitudes: a step conserves the momentum in the other frame, and rotates with the velocity ∇H.
 
-With x the momenta in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, so that the momentum in space is constant; with x those
-in space g₁ = τ g₀, and that in the body is. An element times a rotation that fixes x
-has this property too. So a second statement is about the rate of rotation: for h → 0 it must be ∇H, the Casimirs that
-the gauge subtracted included.
+If x is the momentum in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, and the momentum in space is constant. If x is the
+momentum in space, g₁ = τ g₀, and the momentum in the body is constant. If τ conserves the momentum, so does the product
+of τ and a rotation that fixes x. So a second statement is about the rate of rotation. For h → 0 the rate must be ∇H,
+where H includes the Casimirs that the gauge subtracted.
 """
 
 from __future__ import annotations
@@ -281,9 +281,10 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
 def element_statements(
     group: Group, group_element: Vector, p: Vector, start: Vector, end: Vector, *, cayley: bool, positive: Sequence[str]
 ) -> Iterator[Statement]:
-    """``group_element`` is that of p, written by φ(s/4) or not, and conserves the momentum in the other frame.
+    """Yield the statements that ``group_element`` is the element of p and conserves the momentum in the other frame.
 
-    ``start`` and ``end`` are those of a step, for all components; the attitude before it is any quaternion.
+    With ``cayley`` the element is written without φ(s/4). ``start`` and ``end`` are the states before and after a
+    step. The attitude before the step is any quaternion.
     """
     covectors = [p[i] for i in group.rotation], [p[i] for i in group.translation]
     increment = direction(*covectors, cayley=cayley)

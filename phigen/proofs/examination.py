@@ -47,7 +47,7 @@ class Examination:
 
     @property
     def statements(self) -> list[Statement]:
-        """All statements, in order."""
+        """All statements, in the order in which they are printed."""
         return [s for group in self.groups.values() for s in group]
 
     @property

@@ -84,7 +84,7 @@ def _in_exponentials(e: Expression) -> Expression:
 
 
 def _pulled_back(system: System, maps: Sequence[Expression], pairs: Sequence[tuple[int, int]]) -> list[Expression]:
-    """π_ij∘maps for the pairs."""
+    """Return π_ij∘maps for the pairs (i, j)."""
     return substitute([system.poisson[i][j] for i, j in pairs], dict(zip(system.coordinates, maps, strict=True)))
 
 
@@ -141,7 +141,7 @@ class _Differential:
         self.in_x, self.in_p = slopes(coordinates), slopes(covector)
 
     def bracket(self, other: _Differential) -> Poly:
-        """{self, other}."""
+        """Return the canonical bracket {self, other}."""
         result = self._zero
         for i in self.in_x.keys() & other.in_p.keys():
             result += self.in_x[i] * other.in_p[i]

@@ -49,7 +49,7 @@ class Cotangent:
         return self.tower.derivative(f, name)
 
     def scaled(self, f: Poly, factor: Fraction) -> Poly:
-        """factor · f."""
+        """Return factor · f."""
         return f * self.tower.constant(factor)
 
     # -- forms ------------------------------------------------------------------------------------
@@ -67,7 +67,7 @@ class Cotangent:
         return result
 
     def exterior(self, form: Components) -> TwoForm:
-        """d Σ λ_b dz_b."""
+        """Return the exterior derivative d Σ λ_b dz_b."""
         result: TwoForm = {}
         for b, component in enumerate(form):
             if component == 0:
@@ -87,7 +87,7 @@ class Cotangent:
         return all(self.tower.is_zero(w) for w in form.values())
 
     def sum(self, forms: Iterable[tuple[Fraction, TwoForm]]) -> TwoForm:
-        """A linear combination."""
+        """Return a linear combination of two-forms."""
         result: TwoForm = {}
         for factor, form in forms:
             for key, w in form.items():

@@ -14,7 +14,7 @@ Matrix = list[list[Expression]]
 
 
 def identity(size: int) -> Matrix:
-    """The identity matrix."""
+    """Return the identity matrix."""
     return [[ONE if r == c else ZERO for c in range(size)] for r in range(size)]
 
 
@@ -52,7 +52,7 @@ class MatrixFunction(Arithmetic[Matrix]):
         return super().visit(node, args)
 
     def power(self, base: Matrix, exponent: Fraction) -> Matrix:
-        """An integer power."""
+        """Return an integer power of a matrix."""
         return self._power(base, int(exponent)) if exponent.denominator == 1 else self.function("pow", [base])
 
     def function(self, name: str, args: list[Matrix]) -> Matrix:

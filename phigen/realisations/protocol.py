@@ -73,7 +73,7 @@ def covector_names(coordinates: Sequence[str]) -> tuple[str, ...]:
 
 
 def covector_symbols(coordinates: Sequence[str]) -> list[Expression]:
-    """The covector's symbols."""
+    """The symbols of the components of the covector p."""
     return [symbol(name) for name in covector_names(coordinates)]
 
 

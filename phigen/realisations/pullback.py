@@ -57,9 +57,9 @@ def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> 
 
 
 def is_composed(system: System, realisation: BiRealisation) -> bool:
-    """Whether α and β are those of ``realisation.inner`` in the coordinates of the map, for which ψ⁻¹ was proved.
+    """Whether α and β are the maps of ``realisation.inner`` in the coordinates of ψ, whose inverse ψ⁻¹ was proved.
 
-    The axioms then hold if those of the inner realisation do, since T*ψ is symplectic.
+    In that case the axioms follow from the axioms of the inner realisation, since T*ψ is symplectic.
     """
     if realisation.inner is None or not isinstance(system.form, PullbackForm):
         return False

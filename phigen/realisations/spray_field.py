@@ -34,7 +34,7 @@ class Spray:
     name: str
 
     def apply(self, f: Poly) -> Poly:
-        """L_X f."""
+        """Return L_X f, the derivative of f along the field X."""
         return self.space.along(self.field, f)
 
 

@@ -30,9 +30,9 @@ from phigen.symbolic.arrays import Floats
 class LatticeMaterial:
     """Material of the page of a lattice; without a run there is neither a trajectory nor a verification.
 
-    ``errors`` (frames,) are those of conserved quantities, by name; ``energies`` (frames, *sizes) are those of the
-    sites. ``failure`` is the reason for an incomplete run. ``live`` is the live panel, ``spectrum`` contains Lyapunov
-    exponents.
+    ``errors`` (frames,) are the errors of conserved quantities, by name; ``energies`` (frames, *sizes) are the
+    energies of the sites. ``failure`` is the reason for an incomplete run. ``live`` is the live panel, ``spectrum``
+    contains Lyapunov exponents.
     """
 
     examination: Examination

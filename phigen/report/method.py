@@ -77,7 +77,11 @@ def _generating_function(compilation: CompiledSeries) -> list[Markup]:
     if correction is None or not correction.size:
         return blocks
     blocks.append(page.heading("Modified Hamiltonian"))
-    blocks.append(page.paragraph("A step is the exact flow, over the time h, of a Hamiltonian near H:"))
+    blocks.append(
+        page.paragraph(
+            "A step agrees to all orders in h with the exact flow, over the time h, of a Hamiltonian near H:"
+        )
+    )
     power, first = compilation.order.order, _indexed("H", compilation.order.order)
     leading = f"{_power('h', power)}<mo>&#x2062;</mo>{first}<mo>+</mo><mo>…</mo>"
     return [*blocks, page.equations([[mathml.math(MODIFIED + leading)]]), polynomial(first, correction)]

@@ -14,8 +14,8 @@ from phigen.study.backward import Constancy, truncation
 def modified_section(constancy: Constancy | None, why_not: str) -> Markup:
     """Return the measurements as a table and a figure, or the reason why there are none."""
     explanation = (
-        "A step of the solver is the exact flow, over the time h, of a Hamiltonian H̃ near H. So steps conserve H̃, and "
-        "the energy H oscillates but does not drift. H̃ is a series in h."
+        "A step of the solver agrees to all orders in h with the exact flow, over the time h, of a Hamiltonian H̃ near "
+        "H, which is a series in h. So steps nearly conserve H̃, and the energy H oscillates but does not drift."
     )
     if constancy is None:
         return page.joined(

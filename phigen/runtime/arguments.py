@@ -299,9 +299,10 @@ def states(x: ArrayLike, argument: str, interface: Interface) -> Floats:
 
 
 def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface, members: int) -> Floats:
-    """Return the initial attitudes and positions of members (members, numbers), by default identity and origin.
+    """Return the initial group elements of all members, (members, interface.element): attitude, then position.
 
-    The arguments are one attitude or position for all members, or have an axis of members.
+    The arguments are one attitude or position for all members, or have an axis of members. The defaults are the
+    identity and the origin.
     """
     if not interface.attitude:
         first(np.eye(1), None, interface)  # raises, with the reason why there is no attitude
@@ -326,13 +327,10 @@ def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: I
     """
     if attitude0 is None and position0 is None:
         return None
-    for argument, session_there, what in (
-        (attitude0, bool(interface.attitude), "attitude0"),
-        (position0, interface.position, "position0"),
-    ):
-        if argument is not None and not session_there:
-            requirement = "reconstruct: quaternion or matrix in its spec asks for one, positions belong to se(3)"
-            raise TypeError(f"{interface.name} has no {what[:-1]}: {requirement}")
+    if attitude0 is not None and not interface.attitude:
+        raise TypeError(f"{interface.name} has no attitude: add `reconstruct: quaternion` or `matrix` to its spec")
+    if position0 is not None and not interface.position:
+        raise TypeError(f"{interface.name} has no position: only systems on se(3) with `reconstruct` have positions")
     shape = interface.attitude
     start = np.eye(shape[0]) if len(shape) == 2 else np.eye(4)[0]
     attitude = start if attitude0 is None else array(attitude0, "attitude0", shape)

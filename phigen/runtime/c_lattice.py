@@ -129,7 +129,7 @@ class CLatticeSession:
         self._observed = len(interface.observables), len(interface.observed_fields)
         # the fields before the last flow of a step, and the compensation terms of both sets of fields
         self._saved_states = 3 if interface.compensated else 1
-        self._dear = interface.dear
+        self._slow_steps = interface.slow_steps
         self._steps_per_call = max(1, _UPDATES_PER_CALL // math.prod(x0.shape[1:]))
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
@@ -194,16 +194,18 @@ class CLatticeSession:
         """
         row_bars = np.ascontiguousarray(bars[1:], dtype=self._real)
         rows, x0_bar = filled(f"{len(bars)} frames", bars.shape, self._real), np.empty(self._shape, self._real)
-        full_tape, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
+        full_tape, single_step_tape = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
         state = x0_bar.nbytes
-        of_step = (int(self._c.trail_size(self._address, 1 + MEASURED_STEPS)) - least) // MEASURED_STEPS
+        tape_of_steps = int(self._c.trail_size(self._address, 1 + MEASURED_STEPS)) - single_step_tape
+        tape_per_step = tape_of_steps // MEASURED_STEPS
         # At this size, checkpoints and the tape of one segment fit if each segment is recomputed once.
-        recomputed = least + 3 * math.isqrt(steps * state * of_step)
+        recomputing_tape = single_step_tape + 3 * math.isqrt(steps * state * tape_per_step)
         # A tape of the whole run pays if steps are slow, or if the tape is short because the inverse flow recomputes
         # states.
-        useful = full_tape if self._dear or of_step < state else recomputed
-        minimum = max(MIN_TAPE_VALUES * x0_bar.itemsize, least + MIN_CHECKPOINTS * 2 * state)
-        size = max(least, min(full_tape or least, max(minimum, min(MAX_TAPE_BYTES, useful))))
+        preferred_tape = full_tape if self._slow_steps or tape_per_step < state else recomputing_tape
+        min_tape_bytes = max(MIN_TAPE_VALUES * x0_bar.itemsize, single_step_tape + MIN_CHECKPOINTS * 2 * state)
+        size = max(min_tape_bytes, min(MAX_TAPE_BYTES, preferred_tape))
+        size = max(single_step_tape, min(full_tape or single_step_tape, size))
         expect_room("the stored data of the reverse pass", size)
         tape = np.empty(size, dtype=np.uint8)
         pointers = (rows[1:].ctypes.data, row_bars.ctypes.data, x0_bar.ctypes.data, parameters_bar, tape.ctypes.data)
@@ -310,7 +312,7 @@ class CLatticeSession:
         self._expect_done(self._c.set_planes(self._address, first, planes))
 
     def begin(self, h: float) -> None:
-        """Set the step size."""
+        """Set the step size, before the first step or when it changes."""
         self._expect_done(self._c.begin(self._address, h))
 
     def sweep(self, stage: int, full_range: int, first: int, end: int) -> None:

@@ -167,7 +167,7 @@ class CSolver:
         ``rows`` (frames, members, DIM) receive the states of the frames; None if there are none.
         """
         count = len(members)
-        packed, began, h = self._numbers(members)
+        packed, began, h = self._packed_arguments(members)
         start = [packed.ctypes.data if members.parameters else None, x.ctypes.data, count]
         start += [None if a is None else a.ctypes.data for a in began]
         stride = members.stride or 1
@@ -210,7 +210,7 @@ class CSolver:
 
         ``initial`` are their states and attitudes (numbers, members), ``rows`` receive those of the frames.
         """
-        packed, times_or_gauges, h = self._numbers(members)
+        packed, times_or_gauges, h = self._packed_arguments(members)
         start = [packed if members.parameters else None, *initial]
         draws = members.draws.seed, int(members.paths[0]), members.draws.step
         self._c.ensemble_attitudes(
@@ -225,7 +225,7 @@ class CSolver:
             status.ctypes.data,
         )
 
-    def _numbers(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
+    def _packed_arguments(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
         """Return parameters (members, parameters), a list of the times or gauges, and the step sizes (members,).
 
         The list has one array if the system has a time or a gauge, which is None for gauges that the C chooses.
@@ -299,7 +299,7 @@ class CSolver:
         self, members: Members, segments: Sequence[Segment], tape: Floats, bars: Floats, status: Bytes
     ) -> tuple[Floats, Floats, Floats]:
         """Return the pullback of some members, from one call for each segment of the run."""
-        rows, (packed, times_or_gauges, h) = np.empty_like(bars), self._numbers(members)
+        rows, (packed, times_or_gauges, h) = np.empty_like(bars), self._packed_arguments(members)
         parameters_bar, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)
         parameters_address = packed.ctypes.data if members.parameters else None
         segment_starts = self._segment_starts(members, segments, status)

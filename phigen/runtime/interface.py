@@ -99,7 +99,7 @@ class LatticeInterface(Interface):
     colours: int = 1
     colour_weights: tuple[int, ...] = ()  # the colour of a site is the sum of weights times places, modulo the colours
     launches: LatticeLaunches = field(default_factory=LatticeLaunches)  # of the kernels of devices
-    dear: bool = False  # whether recomputing a step takes longer than writing and reading its tape
+    slow_steps: bool = False  # whether recomputing a step takes longer than writing and reading its tape
 
     def is_shared(self, sites: int) -> bool:
         """Whether threads share the work on a lattice of ``sites`` sites; the thresholds are those of the C runtime."""

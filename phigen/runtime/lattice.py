@@ -545,10 +545,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters at sites and bonds are computed from the formulas, files and random numbers of the run, at its
         ``sizes`` or at those passed. The other arguments replace the settings of the spec: the ``step``, the number of
         ``steps`` or the time ``until`` where it ends, the ``stride`` or the time ``every`` between rows, or the times
-        ``at`` which they are, ``seed`` that of the noise; ``x0`` (coordinates, *sizes) is the initial state, ``retry``
-        as for `integrate`. A run with ``stop`` ends where that expression first passes through 0; ``crossings`` of the
-        result are those of the ``section``. Raises `ValueError` if there is no run of that name, and `SpecError` for an
-        initial state that does not fit the sizes.
+        ``at`` which rows are stored, the ``seed`` of the noise. ``x0`` (coordinates, *sizes) is the initial state,
+        ``retry`` an argument of `integrate`. A run with ``stop`` ends where that expression first passes through 0.
+        ``crossings`` of the result are crossings of the ``section``. Raises `ValueError` if there is no run of that
+        name, and `SpecError` for an initial state that does not fit the sizes.
         """
         from phigen.lattice.states import start_of
 

@@ -41,7 +41,7 @@ class LatticeCourse:
 
     @property
     def sites(self) -> LatticeSession:
-        """The session."""
+        """The session of the lattice, which is started or restored when it is first needed."""
         if self._sites is None:
             # counted from the last change of the step size, so that times and random numbers are the same
             arrays, clock, steps_before = self._arrays, self._clock, self._before
@@ -90,7 +90,7 @@ class LatticeCourse:
         sites.advance(h, steps)
 
     def branch(self) -> LatticeCourse:
-        """An independent copy."""
+        """Return an independent copy, which shares saved arrays with the course until it is used."""
         steps = self.steps
         if not (self._anchor and 0 <= steps - self._anchor_steps < SHARED_STEPS):
             self._anchor, self._anchor_steps = self.saved(), steps
@@ -112,7 +112,7 @@ class LatticeCourse:
         self.sites.kick(change)
 
     def saved(self) -> dict[str, Any]:
-        """Arrays for `restored`."""
+        """Return arrays from which `restored` makes the same course."""
         if self._sites is None and not self._ahead:
             return dict(self._arrays)
         sites, clock = self.sites, self._clock
@@ -144,7 +144,7 @@ class ObservedCourse(Retrying):
     """
 
     def state(self) -> Floats:
-        """Observables (observables,)."""
+        """Return the observables at the state, (observables,)."""
         return self.sites.observables()
 
     @property
@@ -153,7 +153,7 @@ class ObservedCourse(Retrying):
         return cast("LatticeCourse", self.session).sites
 
     def saved(self) -> dict[str, Any]:
-        """Arrays for `restored`."""
+        """Return arrays from which `restored` makes the same course."""
         parts = np.array([self._extra, *self.retried])
         return {**cast("LatticeCourse", self.session).saved(), "parts": parts}
 

@@ -88,11 +88,11 @@ class GrowingFrames:
         self._states: list[Floats] = []
 
     def whole(self, shape: tuple[int, ...]) -> Floats:
-        """All frames (frames, *shape)."""
+        """Return all frames (frames, *shape)."""
         return np.array(self._states).reshape(-1, *shape)
 
     def frame(self, k: int) -> Floats:
-        """Frame k."""
+        """Return the state of frame k."""
         return self._states[k]
 
     def put(self, k: int, state: Floats) -> None:
@@ -102,7 +102,7 @@ class GrowingFrames:
         self._states.append(state)
 
     def first(self, count: int) -> Iterator[Floats]:
-        """The first frames."""
+        """Iterate over the first ``count`` frames."""
         return iter(self._states[:count])
 
     def flush(self) -> None:

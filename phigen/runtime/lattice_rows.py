@@ -113,7 +113,8 @@ class IntegrationPlan:
     """An integration: its start, its rows, and the number of halvings allowed for a failing step.
 
     ``begin`` is the time of its start, also where `Beginning` has no time because H does not depend on it.
-    ``transforms`` are the spectra and correlations computed from its frames, ``origin`` the text that files say it by.
+    ``transforms`` are the spectra and correlations computed from its frames, ``origin`` is the provenance text that is
+    written into output files.
     """
 
     at: Beginning

@@ -190,7 +190,7 @@ class LatticeRun:
     # --- checkpoints
 
     def forget(self) -> None:
-        """Remove the checkpoint."""
+        """Remove the file of checkpoints, if there is one."""
         if self.checkpoints:
             self.checkpoints.unlink(missing_ok=True)
 

@@ -104,7 +104,7 @@ class LiveSession:
 
     @property
     def energy(self) -> float:
-        """H of the state."""
+        """The value of H at the state."""
         row = self.x[np.newaxis]
         return float(self.solver.energies(row, np.array([self.t]), self.parameters)[0])
 
@@ -187,7 +187,7 @@ class LiveLattice(LiveSession):
 
     @property
     def energy(self) -> float:
-        """H of the state."""
+        """The value of H at the state."""
         return self._sites.hamiltonian()
 
     @property

@@ -441,8 +441,8 @@ class NumpySolver:
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        when = () if t is None else (t,)
-        return np.asarray(self.module.hamiltonian(x, *when, **parameters), dtype=np.float64)
+        time_arguments = () if t is None else (t,)
+        return np.asarray(self.module.hamiltonian(x, *time_arguments, **parameters), dtype=np.float64)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
@@ -450,20 +450,20 @@ class NumpySolver:
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        when = () if t is None else (t,)
-        return np.asarray(self.module.vector_field(x, *when, **parameters), dtype=np.float64)
+        time_arguments = () if t is None else (t,)
+        return np.asarray(self.module.vector_field(x, *time_arguments, **parameters), dtype=np.float64)
 
     def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         if not self.interface.observables:
             return np.empty((len(x), 0))
-        when = () if t is None else (t,)
-        return np.asarray(self.module.observables(x, *when, **parameters), dtype=np.float64)
+        time_arguments = () if t is None else (t,)
+        return np.asarray(self.module.observables(x, *time_arguments, **parameters), dtype=np.float64)
 
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        when = () if t is None else (t,)
-        return np.asarray(self.module.noise_fields(x, *when, **parameters), dtype=np.float64)
+        time_arguments = () if t is None else (t,)
+        return np.asarray(self.module.noise_fields(x, *time_arguments, **parameters), dtype=np.float64)
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
         """See `phigen.runtime.backend.Backend`."""

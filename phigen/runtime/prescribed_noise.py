@@ -15,7 +15,7 @@ class PrescribedNoise(Forwarding[Session]):
         self.increments = increments
 
     def advance(self, h: float, steps: int) -> None:
-        """Make ``steps`` steps."""
+        """Make ``steps`` steps with the prescribed increments of the noise."""
         steps_done = self.steps
         self.session.advance_along(h, self.increments[steps_done : steps_done + steps])
 

@@ -200,10 +200,10 @@ def level_adjoint(system: System) -> Kernel:
 def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, slopes: PathSlopes) -> PathAdjoint:
     """Return the path integrated backward with its cotangents, and the transpose of its slope by the coefficients.
 
-    Let λ be the cotangent of x' = m(1), and ν that of y = ∫ m dt. Along the path backwards, ȧ = ∂(π(m)p)/∂mᵀ a + ν
-    with the start a = λ. The end value of a is the cotangent of x, ∫ π(m)ᵀ a dt that of p, and ∫ ∂(a·π(m)p)/∂c dt
-    that of a coefficient c. With p = ∇S_h(y), ν = Hess S_hᵀ ω for the cotangent ω of p, which gives a linear equation
-    for ω.
+    Let λ be the cotangent of x' = m(1), and ν the cotangent of y = ∫ m dt. Along the path backwards, ȧ =
+    ∂(π(m)p)/∂mᵀ a + ν with the start a = λ. The cotangents are: of x, the end value of a; of p, ∫ π(m)ᵀ a dt; of a
+    coefficient c, ∫ ∂(a·π(m)p)/∂c dt. With p = ∇S_h(y), ν = Hess S_hᵀ ω for the cotangent ω of p, which gives a linear
+    equation for ω.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]

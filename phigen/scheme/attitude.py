@@ -115,9 +115,9 @@ def flow_attitude(
     coefficients: Coefficients,
     time_of: Callable[[Flow], Expression] | None = None,
 ) -> Attitude:
-    """Return the attitude of a splitting; its coefficients go to the table. Raises `SpecError` as `turnings`.
+    """Return the attitude of a splitting; its coefficients go to the table. Raises the errors of `turnings`.
 
-    ``moved`` are increments: those of the sources of noise, then those of the ``flows``. With a monitor, ``time_of``
+    ``moved`` are the increments of the sources of noise, then of the ``flows``. With a monitor, ``time_of``
     returns the physical time of a flow.
     """
     flow_rotations = turnings(system, group, flows, put_back=uniform(system))

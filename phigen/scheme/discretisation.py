@@ -220,7 +220,7 @@ def _composed(
 
 
 def is_large(system: System) -> bool:
-    """Whether `expect_affordable` may raise."""
+    """Whether S_1 of a system of this dimension may be too large, so that `expect_affordable` counts its terms."""
     return may_have(system.dimension, MOST_OPERATIONS)
 
 

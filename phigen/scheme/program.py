@@ -37,7 +37,7 @@ class About:
 
     @property
     def counts(self) -> str:
-        """The operations in words."""
+        """The numbers of operations in words, such as ``3 additions, 2 divisions``."""
         worded_counts = (
             (n, operation.removesuffix("s") if n == 1 else operation) for operation, n in self.operations.items()
         )

@@ -26,7 +26,7 @@ BACK = "_back"
 class PathAdjoint:
     """The path integrated backward with cotangents (`phigen.scheme.adjoint`).
 
-    ``recurrences`` are those of the cotangents, with those of the ``used`` coefficients last. ``curvature`` is ∇S_h and
+    ``recurrences`` give the cotangents, those of the ``used`` coefficients last. ``curvature`` is ∇S_h and
     its Hessian at the mean, ``slope`` the transpose of ∇S_h along coefficients. ``slopes`` are the recurrences for the
     derivatives of a path, for many paths at once.
     """
@@ -399,7 +399,7 @@ class _Scheduled(_Staged):
 
     @property
     def flow_schedule(self) -> Schedule:
-        """The schedule."""
+        """The order and the times of the flows in a step."""
         return self.schedule
 
     @property
@@ -557,9 +557,9 @@ class PartRates:
     """Steps of a lattice that are equal in τ: K = log(A + e) − log(−B), where H = A + B has two parts.
 
     The flow of a part of K is that of the part of H over the time τ/(A + e), or τ/(−B). ``energies`` are the densities
-    of both parts, in the order of the parts of the step; that with the number ``negative`` is B. ``slopes`` are their
-    derivatives along a variation, if derivatives of a step were requested: then ``prepare`` reads the variation of the
-    time of the flow, as the input ``late``.
+    of both parts, in the order of the parts of the step; the part with the number ``negative`` is B. ``slopes`` are the
+    derivatives of the densities along a variation, if derivatives of a step were requested: then ``prepare`` reads the
+    variation of the time of the flow, as the input ``late``.
     """
 
     energies: tuple[Kernel, Kernel]
@@ -672,15 +672,15 @@ class Sweeps(_Scheduled):
 
     @property
     def swept(self) -> Sweeps:
-        """The step itself."""
+        """This step, since it consists of sweeps over sites."""
         return self
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether a caller can drive the sweeps of a step one by one over planes: those of a grid that is split.
+        """Whether a caller can drive the sweeps of a step one by one over planes: in grids that are split.
 
-        Noise is drawn with the sweep that reads it, so no sweep may read that of neighbours. A seam lies at the end
-        of the lattice, which a caller with a part of the lattice does not have.
+        Noise is drawn with the sweep that reads it, so no sweep may read the noise of neighbours. A seam lies at the
+        end of the lattice, which a caller with a part of the lattice does not have.
         """
         reads_neighbour_increments = any(
             base in self.sites.increments and any(offset) for base, offset in self.sites.places.values()

@@ -82,8 +82,9 @@ def takes(program: Program, step: Sweeps) -> bool:
     if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
     kernels = [kernel for part in transposes(program, step) for kernel in part]
-    alone = all(len(part) == 1 for part in step.parts) and not any(kernel.inputs.get(AROUND) for kernel in kernels)
-    return alone and any(hands(program, step))
+    one_kernel_per_part = all(len(part) == 1 for part in step.parts)
+    reads_neighbours = any(kernel.inputs.get(AROUND) for kernel in kernels)
+    return one_kernel_per_part and not reads_neighbours and any(hands(program, step))
 
 
 def handed_apart(program: Program, step: Sweeps) -> list[bool]:

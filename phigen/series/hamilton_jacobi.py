@@ -224,7 +224,7 @@ class _Recursion:
 
     @property
     def good(self) -> tuple[Any, ...]:
-        """The terms so far."""
+        """The terms of the series that have been computed."""
         return tuple(self._found)
 
     def _expect_small(self, terms: int) -> None:

@@ -85,7 +85,7 @@ class _ModifiedRecursion:
         self.fraction = self.tower.names.index(FRACTION)
 
     def advance(self, r: int, *, vanishing: bool) -> None:
-        """Find H_{r−1} and s_r."""
+        """Compute the terms H_{r−1} of the modified Hamiltonian and s_r of its generating function."""
         if vanishing:
             self._keep(self.tower.zero, self.tower.zero)
             return
@@ -127,7 +127,7 @@ class _ModifiedRecursion:
         return {t: self.tower.variable(t) if k == 0 else shift if k == 1 else self.tower.zero for t in self.times}
 
     def _integral(self, element: Poly) -> Poly:
-        """∫_0^σ of an element."""
+        """Return the integral of an element from 0 to σ."""
         integrated: dict[Any, Any] = {}
         for m, c in element.to_dict().items():
             e = int(m[self.fraction]) + 1

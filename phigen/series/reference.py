@@ -119,7 +119,7 @@ class Series:
         self._power = cache(self._product)
 
     def combined(self, coefficients: Coefficients, j: int) -> Any:
-        """[t^j] Σ_μ c_μ u(t)^μ."""
+        """Return the coefficient of t^j in Σ_μ c_μ u(t)^μ."""
         element = self._functions.element
         return self._functions.total(element(c) * self._power(mu, j) for mu, c in coefficients.items() if sum(mu) <= j)
 

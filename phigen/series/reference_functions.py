@@ -38,12 +38,12 @@ class Sign(sympy.Function):  # type: ignore[misc]
         return -cls(-u) if u.could_extract_minus_sign() else None
 
     def fdiff(self, argindex: int = 1) -> Any:
-        """0."""
+        """Return the derivative, which is 0."""
         return sympy.Integer(0)
 
 
 def derivative(f: Any, variable: Any) -> Any:
-    """∂f/∂x."""
+    """Return ∂f/∂x."""
     if f.has(sympy.Abs, sympy.sign):
         f = f.replace(sympy.Abs, lambda u: u * Sign(u)).replace(sympy.sign, Sign)
     return sympy.diff(f, variable)

@@ -144,7 +144,7 @@ class ShapedText(Kind):
 
 @dataclass(frozen=True)
 class OneOf(Kind):
-    """One of some words."""
+    """A value that must be one of the listed ``words``."""
 
     words: tuple[str, ...]
 
@@ -195,7 +195,7 @@ class Integer(Kind):
 
 @dataclass(frozen=True)
 class Boolean(Kind):
-    """true or false."""
+    """A value that must be true or false."""
 
     expected = "true or false"
 

@@ -230,7 +230,7 @@ class AverageChoice:
 
 @dataclass(frozen=True)
 class Run:
-    """A named experiment."""
+    """A run of the spec: initial state, step, number of steps, and the rows to store."""
 
     name: str
     initial: tuple[Fraction, ...]
@@ -405,7 +405,7 @@ class Lattice:
 
     @property
     def relation(self) -> str:
-        """``grid``, ``graph`` or ``pairs``."""
+        """The relation between the sites: ``grid``, ``graph`` or ``pairs``."""
         return "grid" if self.axes else "graph" if self.graph else "pairs"
 
 

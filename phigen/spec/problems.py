@@ -56,7 +56,7 @@ def one_of(choices: Iterable[str]) -> str:
 
 
 def counted(number: int, noun: str, plural: str = "") -> str:
-    """``1 row``, ``2 rows``."""
+    """Return a number with its noun, as ``1 row`` or ``2 rows``."""
     return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 

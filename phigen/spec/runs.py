@@ -258,9 +258,10 @@ def whole(ratio: Fraction) -> int | None:
 
 
 def with_step(run: Run, step: Fraction, *, parts: bool = False) -> Run:
-    """The run with another step, as long as before where that is said as a time; it may go back instead.
+    """Return the run with another step, which may be negative.
 
-    A duration that it does not divide ends with a part of a step if there may be ``parts``; else `ValueError`.
+    The duration is unchanged if the run gives one, else the number of steps. If the step does not divide the duration,
+    the run ends with a part of a step if ``parts`` are allowed; otherwise raises `ValueError`.
     """
     if run.until is not None:
         ratio = (run.until - run.start) / step
@@ -271,7 +272,10 @@ def with_step(run: Run, step: Fraction, *, parts: bool = False) -> Run:
     if (steps := whole(span / step)) is not None:
         return replace(run, step=step, steps=steps, stride=min(run.stride, steps))
     if not parts:
-        raise ValueError(f"the duration {float(span):.9g} is {float(span / step):.9g} steps of {float(step):.9g}")
+        count = f"it is {float(span / step):.9g} steps"
+        raise ValueError(
+            f"the duration {float(span):.9g} is not a whole number of steps of {float(step):.9g} ({count})"
+        )
     return replace(run, step=step, steps=max(1, int(span / step)), until=run.start + span)
 
 

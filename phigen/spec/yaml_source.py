@@ -67,7 +67,7 @@ class Scalar(Node):
 
 @dataclass
 class Sequence(Node):
-    """A YAML sequence."""
+    """A sequence of YAML with its position in the file."""
 
     items: list[Node] = field(default_factory=list)
 
@@ -116,7 +116,7 @@ def is_unprintable(character: str) -> bool:
 
 
 def describe(character: str) -> str:
-    """``U+202E RIGHT-TO-LEFT OVERRIDE``."""
+    """Return code point and name of a character, as ``U+202E RIGHT-TO-LEFT OVERRIDE``."""
     return f"U+{ord(character):04X} {unicodedata.name(character, 'control character')}"
 
 
@@ -215,7 +215,7 @@ class _Builder:
         return self.problems.stop(f"not valid YAML: {what}", location, hint)
 
     def take(self, event: Any) -> None:
-        """Handle one event."""
+        """Handle one event of the YAML parser."""
         kind = type(event).__name__
         if kind == "DocumentStartEvent":
             self.start_document(event)

@@ -99,7 +99,7 @@ class _Writer:
                 yield from _indented(_folded(name, written))
 
     def _driving(self) -> Iterator[str]:
-        """Damping, forces and noise."""
+        """Yield the YAML lines of damping, forces and noise."""
         spec = self.spec
         if spec.forces.damping is not None:
             yield from _folded("damping", self.short("damping", spec.forces.damping))

@@ -42,7 +42,7 @@ class EulerMotion:
 
     @property
     def manner(self) -> str:
-        """The motion in words."""
+        """Description of the motion for reports."""
         return f"{', '.join(self.coordinates)} moved as a free rigid body, by elliptic functions"
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
@@ -131,7 +131,7 @@ class Addition:
 
 
 def levels_of(x: Vector, factors: Vector) -> list[Expression]:
-    """Return the E_i."""
+    """Return the first integrals E_i of the free rigid body (module docstring)."""
     return [factors[j] * factors[k] * e**2 for e, (j, k) in zip(x, CYCLIC, strict=True)]
 
 

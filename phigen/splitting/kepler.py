@@ -38,12 +38,12 @@ class KeplerMotion:
 
     @property
     def hamiltonian(self) -> Expression:
-        """w|p|²/2 − k/|q|."""
+        """The Hamiltonian w|p|²/2 − k/|q| of the motion."""
         return self.inverse_mass / 2 * square(self.momentum) - self.strength * inverse_length(self.position)
 
     @property
     def manner(self) -> str:
-        """The motion of coordinates in words."""
+        """Description of the motion for reports."""
         return f"{', '.join(map(str, (*self.position, *self.momentum)))} moved along a conic section"
 
     def rates(self) -> tuple[list[Expression], list[Expression]]:
@@ -53,7 +53,7 @@ class KeplerMotion:
 
     @property
     def cube(self) -> Expression:
-        """1/|q|³."""
+        """The inverse cube of the distance, 1/|q|³."""
         return power(sqrt(square(self.position)), -3)
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
@@ -110,7 +110,7 @@ class _Orbit:
 
     @property
     def spin(self) -> Expression:
-        """|q × v|²."""
+        """The square of the angular momentum per mass, |q × v|²."""
         pairs = list(combinations(zip(self.position, self.momentum, strict=True), 2))
         return self.inverse_mass**2 * total((a * d - b * c) ** 2 for (a, b), (c, d) in pairs)
 

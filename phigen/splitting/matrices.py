@@ -43,7 +43,7 @@ class MatrixExponential:
 
     @property
     def exponents(self) -> list[Expression]:
-        """The entries of tA."""
+        """The entries of the matrix tA whose exponential is the flow."""
         return [symbol(TIME) * e for e in self.rates]
 
     @property

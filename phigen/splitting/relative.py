@@ -48,7 +48,7 @@ class AttractingBodies:
 
     @property
     def kinetic(self) -> Expression:
-        """The kinetic energy."""
+        """The kinetic energy of all bodies, Σ |p_i|²/(2 m_i)."""
         return total(square(p) * power(m, -1) / 2 for p, m in zip(map(_vector, self.momenta), self.masses, strict=True))
 
     def attraction(self, i: int, j: int) -> Expression:
@@ -63,10 +63,11 @@ class AttractingBodies:
 
 @dataclass(frozen=True)
 class RelativeMotions:
-    """The motion of A: ``kepler`` motions in linear forms of the coordinates, and that of the centre of mass.
+    """The motion of A: ``kepler`` motions in linear forms of the coordinates, and the motion of the centre of mass.
 
-    ``hamiltonian`` is A in the coordinates; ``total_momentum`` and ``inverse_mass`` are those of all bodies. ``spread``
-    has the changes of the coordinates, by name, in the symbols of those of the Q_i, the P_i and the centre of mass.
+    ``hamiltonian`` is A in the coordinates; ``total_momentum`` and ``inverse_mass`` are of all bodies together.
+    ``spread`` has the changes of the coordinates, by name, in symbols for the changes of the Q_i, the P_i and the
+    centre of mass.
     ``masses`` are pairs of masses m_i, or sums M_i, with symbols for proofs.
     """
 
@@ -79,7 +80,7 @@ class RelativeMotions:
 
     @property
     def manner(self) -> str:
-        """The motion in words."""
+        """Description of the motion for reports."""
         return f"{len(self.kepler)} relative positions moved along conic sections, the centre of mass shifted"
 
     def field(self, names: Sequence[str]) -> list[Expression]:

@@ -1,8 +1,8 @@
 """Measurement of the modified Hamiltonian (backward error analysis) along trajectories of a solver.
 
-A step is the exact flow of H̃ = H + h^p H_p + … . With m corrections, H̃ is constant along the numerical solution up to
-O(h^q), where q is the power of the first omitted term. Each correction raises q by one, or by two for a symmetric
-method.
+A step agrees to all orders in h with the exact flow of H̃ = H + h^p H_p + … . With m corrections, H̃ is constant along
+the numerical solution up to O(h^q), where q is the power of the first omitted term. Each correction raises q by one, or
+by two for a symmetric method.
 """
 
 from __future__ import annotations
@@ -67,7 +67,9 @@ class ModifiedHamiltonian:
         """Return the largest of the `errors` within ``steps`` steps from x, (corrections + 1,). Raises `StepError`."""
         changes: Floats = self.errors(method.rows(x, h, steps, 1), h).max(axis=1)
         if not np.isfinite(changes).all():
-            raise StepError("H̃ left the finite numbers", step=0, status="NOT_FINITE")
+            raise StepError(
+                "the modified Hamiltonian H̃ became infinite or NaN along the trajectory", step=0, status="NOT_FINITE"
+            )
         return changes
 
 

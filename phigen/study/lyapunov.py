@@ -40,7 +40,7 @@ class Spectrum:
 
     @property
     def largest(self) -> float:
-        """The largest exponent."""
+        """The largest Lyapunov exponent."""
         return float(self.exponents[0])
 
     @property

@@ -105,7 +105,7 @@ def of_classical(
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
         states = classical.integrate(name, field, extended(solver, x, t0), h, steps, stride)[:, : len(x)]
         if not np.isfinite(states).all():
-            raise StepError(f"{name} left the finite numbers", step=0, status="NOT_FINITE")
+            raise StepError(f"the state of {name} became infinite or NaN", step=0, status="NOT_FINITE")
         return states
 
     def step(x: Floats, h: float) -> Floats:

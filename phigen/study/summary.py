@@ -65,7 +65,7 @@ class Summary:
 
     @property
     def is_balance(self) -> bool:
-        """Whether ``energy`` has the errors of the energy balance."""
+        """Whether ``energy`` measures H − work instead of H, because H is not conserved."""
         return math.isfinite(self.off)
 
     @property

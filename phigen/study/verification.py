@@ -88,7 +88,7 @@ class Verification:
 
     @property
     def made(self) -> str:
-        """Description of the run."""
+        """Number and size of the steps, in words."""
         return f"{self.steps} steps of {self.step:.9g}" + " in τ" * (self.clock == "τ")
 
     @property

@@ -77,7 +77,7 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """The number of members."""
+        """The number of members of the sweep."""
         return prod(self.shape)
 
     @property

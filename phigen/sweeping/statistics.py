@@ -47,10 +47,10 @@ def statistics_of(
 
 def _values(job: Job, solver: Solver, members: Members, states: Floats, numbers: Floats) -> Floats:
     """Return the observables (rows, members, observables) of states with the given step numbers."""
-    when: tuple[Any, ...] = ()
+    time_arguments: tuple[Any, ...] = ()
     if solver.interface.time:
-        when = (members.t0 + numbers[:, np.newaxis] * members.h,)
-    return np.asarray(job.module.observables(states, *when, **members.parameters), dtype=np.float64)
+        time_arguments = (members.t0 + numbers[:, np.newaxis] * members.h,)
+    return np.asarray(job.module.observables(states, *time_arguments, **members.parameters), dtype=np.float64)
 
 
 def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: Floats) -> tuple[Floats, Floats]:

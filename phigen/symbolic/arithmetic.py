@@ -1,4 +1,4 @@
-"""The one interpreter of expressions: evaluates them in any kind of arithmetic."""
+"""Evaluation of expressions in any kind of arithmetic."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ NOTHING: Mapping[int, Any] = MappingProxyType({})
 
 
 class Arithmetic(Generic[T]):
-    """A domain of values of expressions; ``+`` and ``-`` are those of the values themselves."""
+    """A kind of arithmetic in which expressions have values of type T; sums use ``+`` and ``-`` of these values."""
 
     def constant(self, value: Fraction) -> T:
-        """A rational number as a value."""
+        """Convert a rational number to a value."""
         raise NotImplementedError
 
     def variable(self, name: str) -> T:
@@ -28,15 +28,15 @@ class Arithmetic(Generic[T]):
         raise NotImplementedError
 
     def product(self, a: T, b: T) -> T:
-        """a·b."""
+        """Multiply two values."""
         return a * b  # type: ignore[operator, no-any-return]
 
     def power(self, base: T, exponent: Fraction) -> T:
-        """A value to a rational power."""
+        """Raise a value to a rational power."""
         raise NotImplementedError
 
     def function(self, name: str, args: list[T]) -> T:
-        """A function in `phigen.symbolic.functions.FUNCTIONS`, or ``pi`` or ``E`` without arguments."""
+        """Apply a function of `phigen.symbolic.functions.FUNCTIONS`; ``pi`` and ``E`` have no arguments."""
         raise NotImplementedError
 
     def visit(self, node: Expression, args: list[Any]) -> T:

@@ -23,7 +23,7 @@ class Arrays(Arithmetic[Any]):
         self._values, self._library = values, library
 
     def constant(self, value: Fraction) -> Any:
-        """The nearest double."""
+        """Return the double that is nearest to a rational number."""
         return float(value)
 
     def variable(self, name: str) -> Any:

@@ -186,7 +186,7 @@ def _third_series(a: Any, b: Any, c: Any) -> Any:
 
 
 def carlson(library: Any, x: Any, y: Any, z: Any) -> Any:
-    """Carlson's R_D(x, y, z)."""
+    """Return the elliptic integral R_D(x, y, z) of Carlson."""
     rounding = 2.2e-16 if library is math else library.eps
     start = mean = (x + y + 3 * z) / 5
     spread = max(abs(mean - x), abs(mean - y), abs(mean - z)) * (rounding / 4) ** (-1 / 6 + 0 * rounding)

@@ -181,7 +181,7 @@ def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
 
 
 def number(value: Number) -> Expression:
-    """A literal rational number."""
+    """Return a literal rational number."""
     return _node("number", (), value if type(value) is Fraction else Fraction(value))
 
 
@@ -204,7 +204,7 @@ EULER = _node("E")
 
 
 def add(a: Expression, b: Expression) -> Expression:
-    """a + b."""
+    """Return a + b, simplified."""
     if a.is_zero:
         return b
     if b.is_zero:
@@ -223,7 +223,7 @@ def add(a: Expression, b: Expression) -> Expression:
 
 
 def sub(a: Expression, b: Expression) -> Expression:
-    """a − b."""
+    """Return a − b, simplified."""
     if b.is_zero:
         return a
     if a is b:
@@ -246,7 +246,7 @@ def _has_minus(e: Expression) -> bool:
 
 
 def neg(a: Expression) -> Expression:
-    """−a."""
+    """Return −a, simplified."""
     if a.is_number:
         return number(-a.value)
     if a.op == "neg":
@@ -259,7 +259,7 @@ def neg(a: Expression) -> Expression:
 
 
 def mul(a: Expression, b: Expression) -> Expression:
-    """a · b."""
+    """Return a · b, simplified."""
     if a.is_number and b.is_number:
         return number(a.value * b.value)
     if b.is_number:

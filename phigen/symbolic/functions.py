@@ -30,18 +30,18 @@ def _everywhere(*arguments: Fraction) -> bool:
 class Function:
     """A function of an expression.
 
-    ``slopes(call, f, *arguments)`` are its partial derivatives, f its value; None if unknown. ``known(call,
-    *arguments)`` writes it by functions that readers know, ``value(library, *arguments)`` computes it with those of
-    `math` or of an mpmath context, which have one of its own name if there is no rule. ``at_zero`` is its value at 0,
-    if that is a rational number. ``defined`` tells whether it has a value at rational arguments, ``rational`` whether
-    its values are rational there. ``cost`` is in units of one addition. ``own`` are those of phigen's own, which no
-    spec can name.
+    ``slopes(call, f, *arguments)`` are the partial derivatives of the function, with f its value; None if unknown.
+    ``known(call, *arguments)`` writes the function by functions that readers know. ``value(library, *arguments)``
+    computes the function with the functions of the library: `math`, or an mpmath context. Without this rule the
+    library has a function of the same name. ``at_zero`` is the value at 0, if it is rational. ``defined`` says whether
+    the function has a value at rational arguments, ``rational`` whether its values are rational there. ``cost`` is in
+    units of one addition. No spec can name a function that is phigen's ``own``.
 
-    ``written`` is its spelling in a language: a name, or a text with ``{0}``, ``{1}`` for the arguments; in
-    languages without an entry, the generated file defines it. ``lanes`` is the same for C's loops over lanes, by
-    functions that have a vectorised version, whose own entry is their name; ``inline`` ones are instructions or
-    arithmetic. ``near`` says that flows call a polynomial for small arguments. ``letters`` is the name in
-    mathematics.
+    ``written`` is the spelling of the function in a language: a name, or a text with ``{0}``, ``{1}`` for the
+    arguments. In languages without an entry, the generated file defines the function. ``lanes`` is the spelling in
+    loops over lanes in C, by functions with a vectorised version; a function that has such a version itself has its
+    name there. An ``inline`` function is an instruction, or arithmetic. ``near`` says that flows call a polynomial for
+    small arguments. ``letters`` is the name in mathematics.
     """
 
     name: str

@@ -88,15 +88,15 @@ class Neighbours:
 
 
 def steps(offset: Offset) -> tuple[int, ...]:
-    """An offset of a grid."""
+    """Return an offset of a grid as integers, one for each axis."""
     return tuple(int(o) for o in offset)
 
 
 def plus(a: Offset, b: Offset) -> tuple[int, ...]:
-    """The sum of two offsets of a grid."""
+    """Return the sum of two offsets of a grid."""
     return tuple(x + y for x, y in zip(steps(a), steps(b), strict=True))
 
 
 def minus(a: Offset) -> tuple[int, ...]:
-    """The opposite offset, −a."""
+    """Return the opposite offset, −a."""
     return tuple(-o for o in steps(a))

@@ -118,7 +118,7 @@ class Numbers(Arithmetic[Any]):
         self._values, self._convert, self._library, self._power = values, convert, library, power
 
     def constant(self, value: Fraction) -> Any:
-        """A rational number."""
+        """Convert a rational number to a value."""
         return self._convert(value)
 
     def variable(self, name: str) -> Any:

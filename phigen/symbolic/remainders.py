@@ -58,7 +58,7 @@ def value(k: int, library: Any, t: Any, *a: Any) -> Any:
 
 
 def quotient(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """G_k."""
+    """Return G_k (module docstring), in the precision of the library as `value`."""
     return _coefficients(library, t, a)[1][k]
 
 

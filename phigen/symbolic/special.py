@@ -44,23 +44,23 @@ def order_of(name: str) -> int:
 
 
 def coefficient(order: int, n: int) -> Fraction:
-    """The coefficient of sⁿ in the series of the derivative of that order, exactly."""
+    """Return the coefficient of sⁿ in the Taylor series of the derivative φ^(order)(s), exactly."""
     return _series(n + order) * (math.factorial(n + order) // math.factorial(n))
 
 
 def near_coefficients(order: int) -> list[float]:
-    """Coefficients for |s| < `NEAR`, the constant first; full double precision."""
+    """Return Taylor coefficients of φ^(order), the constant first, in double precision for |s| < `NEAR`."""
     return [float(coefficient(order, n)) for n in range(NEAR_TERMS)]
 
 
 def lane_coefficients(order: int) -> list[float]:
-    """Coefficients for |s| ≤ `LANE_REACH`, the constant first; full double precision."""
+    """Return Taylor coefficients of φ^(order), the constant first, in double precision for |s| ≤ `LANE_REACH`."""
     return [float(coefficient(order, n)) for n in range(LANE_TERMS)]
 
 
 @cache
 def rest_coefficients(order: int) -> list[float]:
-    """Coefficients, for |s| < `MIDDLE`, of the derivative minus its pole 2·order!/(4π² − s)^{order+1}."""
+    """Return Taylor coefficients, for |s| < `MIDDLE`, of φ^(order) minus its pole 2·order!/(4π² − s)^{order+1}."""
     differences = []
     for n in range(MIDDLE_TERMS):
         factor = math.factorial(n + order) // math.factorial(n)
@@ -69,7 +69,7 @@ def rest_coefficients(order: int) -> list[float]:
 
 
 def in_double(order: int, s: float) -> float:
-    """The value in double precision, as the generated code computes it."""
+    """Return φ^(order)(s) in double precision, as the generated code computes it."""
     if abs(s) < NEAR:
         return _polynomial(near_coefficients(order), s)
     if abs(s) < MIDDLE:

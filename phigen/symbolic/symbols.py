@@ -1,4 +1,4 @@
-"""The names of symbols: plain text for those of a spec, `Symbol` for those of phigen's own."""
+"""The names of symbols: plain text for the symbols of a spec, `Symbol` for the symbols that phigen adds."""
 
 from __future__ import annotations
 

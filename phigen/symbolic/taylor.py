@@ -52,7 +52,7 @@ class RingOperations(Protocol):
         """An elementary function (or ``pi``, ``E`` with no arguments)."""
 
     def power(self, base: Any, exponent: Fraction | int) -> Any:
-        """A rational power."""
+        """Return a rational power of an element."""
 
     def combine(self, terms: list[Any]) -> Any:
         """The sum of the terms."""
@@ -67,15 +67,15 @@ class ExpressionRing(Arithmetic[Expression]):
     bytes_per_term = 0
 
     def product(self, a: Expression, b: Expression) -> Expression:
-        """A product node."""
+        """Return the node of a product."""
         return a * b
 
     def constant(self, value: int | Fraction) -> Expression:
-        """A literal number."""
+        """Return the node of a number."""
         return number(value)
 
     def variable(self, name: str) -> Expression:
-        """A symbol."""
+        """Return the node of a symbol."""
         return symbol(name)
 
     def function(self, name: str, args: list[Expression]) -> Expression:
@@ -85,11 +85,11 @@ class ExpressionRing(Arithmetic[Expression]):
         return power(*args) if name == "power" else call(name, *args)
 
     def power(self, base: Expression, exponent: Fraction | int) -> Expression:
-        """A power node."""
+        """Return the node of a power."""
         return power(base, exponent)
 
     def combine(self, terms: list[Expression]) -> Expression:
-        """A balanced sum."""
+        """Return the sum as a balanced tree of additions."""
         return total(terms)
 
     def vanishes(self, element: Expression) -> bool:

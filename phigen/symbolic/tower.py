@@ -136,7 +136,7 @@ class Tower(Arithmetic[Poly]):
 
     @property
     def zero(self) -> Poly:
-        """0."""
+        """The element 0 of the tower."""
         return self.constant(0)
 
     # -- growing ----------------------------------------------------------------------------------

@@ -41,9 +41,9 @@ Notify = Callable[[str], object]
 class ComparedMethod:
     """One method of a comparison; ``refusal`` says why there are no numbers, "" if there are.
 
-    ``error`` of the energy and ``casimirs`` are the largest on the way, ``orbit`` is the distance from the solution at
-    the end, ``defect`` that of DΦ π DΦᵀ = π∘Φ; None where a number is not known. ``nanoseconds`` are those of a step.
-    ``poisson`` tells whether a step is a Poisson map by its construction.
+    ``error`` (of the energy) and ``casimirs`` are the largest errors along the trajectory. ``orbit`` is the distance
+    from the solution at the end, ``defect`` the residual of DΦ π DΦᵀ = π∘Φ. Numbers that are not known are None. A
+    step takes ``nanoseconds``. ``poisson`` says whether a step is a Poisson map by its construction.
     """
 
     title: str

@@ -50,7 +50,7 @@ class FlatSession:
         self.session.advance(h, steps)
 
     def branch(self) -> FlatSession:
-        """Not available for lattices."""
+        """Raise `NotImplementedError`: sessions of lattices are not copied in tunings."""
         raise NotImplementedError
 
 

@@ -209,8 +209,9 @@ def compare(
 def _trial(
     candidate: Built, problem: Problem, states: Floats, span: float, accuracy: float, max_steps: float, deadline: float
 ) -> Trial:
-    """Find the fewest steps with that error: their number is doubled until the error is reached, then interpolated by
-    the order.
+    """Return the trial with the fewest steps whose error is at most ``accuracy``.
+
+    The step is halved until the error is small enough; the last step is interpolated by the order of the method.
     """
     solver = Solver(candidate.solver(), candidate.interface)
     h, previous = _largest(solver, problem, states), (math.nan, math.inf)

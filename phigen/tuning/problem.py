@@ -28,10 +28,10 @@ ROWS = 8_000
 
 @dataclass(frozen=True)
 class Problem(ABC):
-    """A tuning problem: the values of a run and its time span. ``step`` is that of the run, the first guess.
+    """A tuning problem: the values of a run, its time span, and its ``step``, where searches start.
 
-    Steps and times are positive here; ``direction`` is −1 for a run back in time. ``sizes`` are those of a lattice. All
-    times are in units of the ``clock``: τ if the spec has a monitor, which all methods use then, else t.
+    Steps and times are positive here; ``direction`` is −1 for a run back in time. ``sizes`` are the sizes of a lattice.
+    All times are in units of the ``clock``: τ if the spec has a monitor, which all methods use then, else t.
     """
 
     start: Floats
@@ -68,7 +68,7 @@ class Problem(ABC):
 
     @abstractmethod
     def guesses(self, current: Setting) -> list[Setting]:
-        """Settings to begin with."""
+        """Return the settings that the search measures first."""
 
     @abstractmethod
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:

@@ -72,7 +72,7 @@ class Setting:
 
     @property
     def chart(self) -> Setting:
-        """The bi-realisation alone."""
+        """The setting reduced to its bi-realisation."""
         return Setting(self.kind, 0, of=self.of)
 
     @property

@@ -37,7 +37,7 @@ EQUAL = 1.1
 class Finalist:
     """A method at its proposed step, confirmed over ``point.time``, and timed together with the others.
 
-    ``seconds`` are the CPU seconds of a unit of time, one for each round.
+    ``seconds`` are CPU times (s) per unit of simulated time, one for each round.
     """
 
     curve: Curve
@@ -46,7 +46,7 @@ class Finalist:
 
     @property
     def cost(self) -> float:
-        """CPU seconds of a unit of time: the median."""
+        """Median over the rounds of the CPU time (s) per unit of simulated time; NaN if the method was not timed."""
         return median(self.seconds) if self.seconds else math.nan
 
 
@@ -54,13 +54,14 @@ class Finalist:
 class Tuning:
     """The result of a tuning. ``finalists`` meet the accuracy, the best first; empty if nothing does.
 
-    ``own`` is the spec's own setting at the accuracy, None if it does not reach it; ``present`` that at the run's
-    step; ``peers`` are classical methods at the accuracy, those that reach it. Scans were made over ``piece`` of the
-    ``horizon``. ``refused`` tells why other candidates were not measured; ``finished`` whether no more seemed worth
-    trying; ``orbit_error`` that of the best over the piece where the energy was measured, None if that is unknown.
-    ``unit`` is the unit of energy errors; ``monitors`` are the gains of monitors, if the spec has none and the speed of
-    the motion varies much. ``sizes`` are those of the measured lattice, empty for other systems.
-    Times are those of the ``clock``, t or τ.
+    ``own`` is the setting of the spec at the step that reaches the accuracy, None if no step does. ``present`` is the
+    setting of the spec at the step of the run. ``peers`` are the classical methods that reach the accuracy. Scans were
+    made over ``piece`` of the ``horizon``. ``refused`` has the reasons why other candidates were not measured.
+    ``finished`` says whether all candidates worth trying were measured. ``orbit_error`` is the error of the orbit of
+    the best finalist over ``piece`` if the energy error was measured, None if it is unknown. ``unit`` is the unit of
+    energy errors. ``monitors`` are the gains of monitors, if the spec has none and the speed of the motion varies
+    much. ``sizes`` are the sizes of the measured lattice, empty for other systems. Times are values of the ``clock``,
+    t or τ.
     """
 
     measure: str
@@ -90,7 +91,7 @@ class Tuning:
 
     @property
     def winner(self) -> Finalist | None:
-        """The proposal."""
+        """The method that is proposed: the best finalist, None if there is none."""
         return self.finalists[0] if self.finalists else None
 
     @property

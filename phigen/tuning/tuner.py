@@ -33,7 +33,7 @@ Notify = Callable[[str], object]
 
 
 class TimeBudget:
-    """The budget of time, from ``start`` on, a time of `time.perf_counter`; by default from now on."""
+    """The seconds that a search may take, from ``start`` on (`time.perf_counter`); by default from now on."""
 
     def __init__(self, budget: float, start: float | None = None) -> None:
         self.budget, self.start = budget, time.perf_counter() if start is None else start
@@ -43,7 +43,7 @@ class TimeBudget:
         return self.start + share * self.budget
 
     def left(self, share: float) -> float:
-        """Seconds until then."""
+        """Return the seconds until this share of the budget is used up, negative afterwards."""
         return self.at(share) - time.perf_counter()
 
 
@@ -107,7 +107,7 @@ class Tuner:
         return not proposed
 
     def add(self, build: Built, method: CompiledMethod, worth: float) -> Curve:
-        """Scan a candidate."""
+        """Measure the errors of a candidate at several steps, and add its curve."""
         setting = build.setting
         self._known[build.fingerprint] = setting
         points = self._scanned(method, build.order, worth, bounded=build.exact)

@@ -300,7 +300,10 @@ def test_a_duration_stays_with_another_step_and_steps_do_too(phigen, write):
     assert json.loads(ran(phigen, body, "--step", 0.1, "--json").stdout)["steps"] == 50
     assert json.loads(ran(phigen, body, "--step", 0.07, "--until", 1, "--json").stdout)["time"] == pytest.approx(1)
     refused = phigen("run", body, "--step", 0.07)
-    assert (refused.exit_code, "the duration 5 is 71.4285714 steps of 0.07" in refused.stderr) == (2, True)
+    assert (
+        refused.exit_code,
+        "the duration 5 is not a whole number of steps of 0.07 (it is 71.4285714 steps)" in refused.stderr,
+    ) == (2, True)
 
 
 @pytest.mark.thin(2)

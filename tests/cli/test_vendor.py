@@ -230,7 +230,8 @@ def test_second_time_leaves_files_alone(phigen, vendored):
         ('"a.c"', '"../a.c"', "'../a.c' is not a file of that solver"),
         ('"order: 2"', '"order: 4"', "the text of its spec was changed"),
         ('"options"', '"choices"', "'options' is missing"),
-        ('"targets"', '"directory"', "options that do not exist"),
+        ('"targets"', '"directory"', "'directory' is not an option"),
+        ('"targets"', '"order": 99, "targets"', "the option 'order' cannot be 99"),
     ],
 )
 def test_damaged_manifest_is_refused(phigen, vendored, before, after, message):

@@ -168,7 +168,7 @@ def test_the_text_of_a_large_expansion_keeps_the_limits_of_expressions() -> None
 
 def test_sizes_that_do_not_fit_are_refused() -> None:
     cell = prepared("spins_2")[1]
-    with pytest.raises(ValueError, match="sizes are 2, along i, j; not 3"):
+    with pytest.raises(ValueError, match="sizes must be 2 positive integers, for the axes i, j; got 3"):
         expand(cell, (3,))
     with pytest.raises(ValueError, match="between 0 and 2"):
         expand(prepared("spin_graph")[1], (3,), [(0, 3)])

@@ -334,7 +334,9 @@ def test_another_step_leaves_a_run_as_long_as_it_is_in_time(end, steps):
 
 def test_a_step_that_does_not_divide_a_duration_is_refused(spec):
     spec = specs.loads(BODY.replace("steps: 60", "duration: 6"))
-    with pytest.raises(ValueError, match=r"the duration 6 is 85\.7142857 steps of 0\.07"):
+    with pytest.raises(
+        ValueError, match=r"the duration 6 is not a whole number of steps of 0\.07 \(it is 85\.7142857 steps\)"
+    ):
         phigen.sweep(spec, over={"I2": [1, 2]}, h=0.07)
 
 

@@ -19,7 +19,7 @@ _OPTIONS = ("--fmad=false",)
 
 
 class CUDADevice:
-    """A CUDA device."""
+    """A graphics card of NVIDIA, used through CuPy."""
 
     target = "cuda"
     double = is_card = True

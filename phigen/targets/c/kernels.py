@@ -1,4 +1,4 @@
-"""Kernels as C functions."""
+"""Print kernels as C functions."""
 
 from __future__ import annotations
 

@@ -66,7 +66,9 @@ def grouped(program: Program, lanes: Lanes | None) -> bool:
 def printed(
     program: Program, lanes: Lanes, packed: Callable[[Packs], list[str]], *, batched: bool = False
 ) -> list[str]:
-    """Return the kernels in SIMD lanes; ``packed`` prints those of packs, ``batched`` adds those of batches of Gauss
+    """Return the text of the kernels in SIMD lanes.
+
+    ``packed`` prints the kernels of members with explicit steps. ``batched`` adds the kernels of batches of Gauss
     steps.
     """
     texts = functions.phi_lanes(program, lanes.calls)

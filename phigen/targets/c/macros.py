@@ -29,7 +29,7 @@ class Macro:
 
 @dataclass
 class Macros:
-    """Macros by their names."""
+    """The macros of the runtime by their names, for expansion without a preprocessor."""
 
     _known: dict[str, Macro] = field(default_factory=dict)
     _heads: re.Pattern[str] | None = None  # of macros that are empty, made when they are needed

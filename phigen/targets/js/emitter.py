@@ -34,7 +34,7 @@ def emit(program: Program, command: str) -> dict[str, str]:
 
 
 def expect_offered(program: Program) -> None:
-    """Raise `SpecError` for adjoints."""
+    """Raise `SpecError` if the program has the transpose of steps, which JavaScript lacks."""
     if program.step.adjoint:
         message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])

@@ -53,7 +53,7 @@ class StepPart:
     values: Mapping[str, object] = field(default_factory=dict)
 
     def functions(self, program: Program) -> list[str]:
-        """The kernels as functions."""
+        """Return the text of the kernels as functions of NumPy."""
         return [function(program, kernel) for kernel in self.kernels if kernel]
 
     def rendered(self, program: Program, prefix: str = "") -> list[str]:
@@ -64,7 +64,7 @@ class StepPart:
 
 @dataclass(frozen=True)
 class StepFunctions:
-    """The text of one kind of step: that of a stage, of its tangent map, and of its transpose.
+    """The functions of one kind of step: a stage, its tangent map, and its transpose.
 
     ``adjoint`` has the kernels that the transpose needs beside its own. With ``chained`` the transpose of a step starts
     from that of the step after.

@@ -141,7 +141,7 @@ class _Reverse(RowLoops):
 
     @property
     def row_drivers(self) -> RowDrivers:
-        """The builder of drivers."""
+        """The builder of the functions that call the loops for the rows of a lattice."""
         return drivers(self)
 
     def drivers(self, parts: Sequence[Back]) -> Iterator[str]:

@@ -37,12 +37,12 @@ class Layout(RowLayout):
 
     @property
     def program(self) -> Program:
-        """The program."""
+        """The program of the lattice."""
         return self.lattice.program
 
     @property
     def step(self) -> Sweeps:
-        """The step."""
+        """The step of the lattice."""
         return self.lattice.step
 
     def bar(self, array: str) -> int:

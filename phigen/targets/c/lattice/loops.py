@@ -75,7 +75,7 @@ class RowLoops:
 
     @property
     def program(self) -> Program:
-        """The program."""
+        """The program of the lattice."""
         return self.layout.program
 
     @property
@@ -94,7 +94,11 @@ class RowLoops:
         return IN_LANES if self.fast else FULL_RANGE
 
     def forms(self, rows: Rows | None, loops: Iterable[ir.Function]) -> Forms:
-        """Return the forms that some loops need together; one form without ``rows``."""
+        """Return the forms to generate: suffixes of function names with versions of elementary functions.
+
+        There are a small-argument and a full-range form if one of the ``loops`` needs both. Without ``rows`` there is
+        one form.
+        """
         if rows is None:
             return {"": self.versions}
         return forms_of(loops, rows.small_argument, rows.limited, self.versions)
@@ -124,7 +128,7 @@ class RowLoops:
     def sums(self, gather: Gather | None, *, swept: bool = False) -> Iterator[ir.Function]:
         """Yield the loops that sum over all bonds of a site, or its pairs with other sites.
 
-        Those that a sweep reads (``swept``) may have further arguments, see `bond_arguments`.
+        Sums that a sweep reads (``swept``) may have further arguments, see `bond_arguments`.
         """
         partners = self.layout.partners
         of_parts = [sums for _, sums in partners.of_parts]

@@ -169,7 +169,7 @@ def model(program: Program, step: Sweeps) -> str:
 
 
 def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, int, str]]:
-    """Names, values, and comments."""
+    """Yield the constants of the C file: names, values and comments."""
     program, step, sites, several = layout.program, layout.step, layout.step.sites, not layout.single_row
     if densities := program.observables.named:
         yield "SHARE", share(densities), "sites whose densities of observables are computed in one go"
