@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 2e3bc0f304f069a4dc475ef0a77db499e5b35d3bd5ff3bb8692dfb56d82193be
+ * body-sha256: a6b9fc9106e59882cfcb6215f0fd854f841bf28913286b0bb5ecd85e1d2de29b
  */
 #include "duffing.h"
 #include <float.h>
@@ -354,7 +354,7 @@ static duffing_status duffing_stage(duffing_solver *s)
 duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return duffing_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
         duffing_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8c7ba6520fd8c0c430b8e343d0941704ac510fc0241952844ae7e8045e6ee2d4
+ * body-sha256: a59f4c551f6e5da0dc71ed724e906d7330d0b394d0d90fdac6cb63e70350abea
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -295,7 +295,7 @@ export class Solver {
   t;
   /** Number of successful steps since the start. */
   steps = 0;
-  /** Number of evaluations of the generating function, for statistics. */
+  /** Number of evaluations of the step equations, or of explicit stages, for statistics. */
   evaluations = 0;
   /** Size of the last step. */
   h = NaN;

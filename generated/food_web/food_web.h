@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 59b1b935e41fd08f6e0ebc4cecb8f694915d6abe5b724db931a80163ebdac0e5
+ * body-sha256: 872dab69b696b844b16024b27d60c25813a1cf733d2dd679ebf48a9aa1858643
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -75,8 +75,9 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     const size_t sizes[food_web_AXES], const food_web_bonds *bonds, const double *x0, void *work);
 
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. Where steps consist of flows, the last is merged with the first of the
-   next step or call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+   s->steps counts the successful ones. OpenMP updates rows in parallel, with the same bits for any number of
+   threads. */
+/* The last flow of a step is merged with the first flow of the next step or call. */
 food_web_status food_web_step(food_web_solver *s, double h);
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 4ca3ef1a8776b29e781df6fc0ca7a66469b9218bdeb5a3db20b5d80c8bc48019
+ * body-sha256: b8d978fcad0346414ee3bb34e81552350a0a9b2e769f2eb6329917228f00d2bd
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -658,7 +658,7 @@ static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return guiding_centre_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
         for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
             guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
         s->h = h;

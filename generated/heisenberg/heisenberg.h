@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1aefb6f93c404d795b6e6dbf328326ed79eb0e6d55aa5f861e397985623e0314
+ * body-sha256: 10b457b097c49d79fd2a6635f1839bb9e18c8d9bab84f5ef6ee15807af4806cb
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -62,8 +62,9 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     const size_t sizes[heisenberg_AXES], const double *x0, void *work);
 
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. Where steps consist of flows, the last is merged with the first of the
-   next step or call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+   s->steps counts the successful ones. OpenMP updates rows in parallel, with the same bits for any number of
+   threads. */
+/* The last flow of a step is merged with the first flow of the next step or call. */
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
 

@@ -8,9 +8,9 @@
  *   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; The explicit step; Energy level e = -H(x0): K = monitor (H + e) is 0 along a
- *   monitored trajectory; The solver
- * body-sha256: dc3f64d773097a2f95a048f92f63fba8e33db7cd8aaa4ef2fbc993b9d79b10ef
+ * Contents: The model; The explicit step; The energy level e = -H(x0) and the monitor dt/dtau; The
+ *   solver
+ * body-sha256: 4e5820741cf2cd1c9fecedf2dc7ef10d7cdde885503ed83513f3bec1534e3615
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -112,8 +112,8 @@ static void kepler_eccentric_pass(kepler_eccentric_solver *s, double elapsed)
 
 double kepler_eccentric_solver_time(const kepler_eccentric_solver *s) { return s->t + s->t_carry; }
 
-/* Within a step, moved holds the sum of the increments so far and the compensation term; x is start + moved,
-   rounded. */
+/* Add change to coordinate i within a step: displacement is the sum of the changes so far and the
+   compensation term, and x is start + displacement, rounded. */
 static inline void kepler_eccentric_add(double x[kepler_eccentric_DIM],
     double displacement[kepler_eccentric_DIM], const double start[kepler_eccentric_DIM], int i, double change)
 {
@@ -121,7 +121,7 @@ static inline void kepler_eccentric_add(double x[kepler_eccentric_DIM],
     x[i] = start[i] + displacement[i];
 }
 
-/* At the end of a step, add moved to x in compensated arithmetic. */
+/* At the end of a step, add displacement to x in compensated arithmetic. */
 static void kepler_eccentric_settle(double x[kepler_eccentric_DIM], double carry[kepler_eccentric_DIM],
     const double displacement[kepler_eccentric_DIM])
 {
@@ -234,7 +234,7 @@ static kepler_eccentric_status kepler_eccentric_stages(kepler_eccentric_solver *
     return kepler_eccentric_OK;
 }
 
-/* ---- Energy level e = -H(x0): K = monitor (H + e) is 0 along a monitored trajectory ---- */
+/* ---- The energy level e = -H(x0) and the monitor dt/dtau ---- */
 static void kepler_eccentric_choose_gauge(const kepler_eccentric_params *params,
     const double x[kepler_eccentric_DIM], double gauge[kepler_eccentric_GAUGES])
 {
@@ -283,7 +283,7 @@ kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return kepler_eccentric_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
         kepler_eccentric_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
     }

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6db9b56174e7fb908ac38e73d2372c265e1e37f5e4385175b0cade081f5c759d
+ * body-sha256: 22cc074042a5cb26f0f1d1b115cb3323e9a0958f6cf15bbf5243a8243d05498d
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -36,15 +36,15 @@ const char *kepler_eccentric_status_string(kepler_eccentric_status status); /* t
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
-    double x[kepler_eccentric_DIM];     /* the state; change it only by the functions below */
+    double x[kepler_eccentric_DIM]; /* the state; change it only by the functions below */
     double carry[kepler_eccentric_DIM]; /* rounding error of x: x + carry is more accurate */
-    size_t steps;                       /* number of successful steps since kepler_eccentric_init */
-    size_t evaluations;                 /* number of evaluations of the generating function, for statistics */
+    size_t steps; /* number of successful steps since kepler_eccentric_init */
+    size_t evaluations; /* number of steps or of their stages that were computed, for statistics */
     /* physical time since kepler_eccentric_init, t + t_carry; steps are equal in tau, not t */
     double t, t_carry;
     double h;                       /* size of the last step; NaN before the first step */
     kepler_eccentric_params params; /* the parameters, set by kepler_eccentric_init; do not change them */
-    /* energy level e = -H(x0); K = monitor (H + e) is 0 along the trajectory */
+    /* the energy level e: -H(x0), or the value passed to kepler_eccentric_init_gauge */
     double gauge[kepler_eccentric_GAUGES];
     double coef[kepler_eccentric_COEFFICIENTS]; /* functions of params and h, computed when h changes */
 } kepler_eccentric_solver;

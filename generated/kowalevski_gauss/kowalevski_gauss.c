@@ -7,9 +7,9 @@
  *   one evaluation at a stage: 72 additions, 93 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; Compensated sums; SIMD lanes: several steps or members at once; The implicit
- *   step, by Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 81843d5b23508dd98636e5b19cd66352c8afd33c5da78cf6d0b8ae551b774008
+ * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
+ *   Gauss collocation; The solver; Members of an ensemble; Ensembles
+ * body-sha256: 21ad5b6b7d2b2eef66ed80cacab257a9fda6ef45772288d9fb0cbbd41206e849
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -125,9 +125,9 @@ static inline int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const dou
     return 1;
 }
 
-/* ---- SIMD lanes: several steps or members at once ---- */
-/* The functions below evaluate the formulas of a step for several steps of a trajectory, or members of an
-   ensemble, together. Compilers turn the loops over lanes into vector instructions. */
+/* ---- SIMD lanes: one evaluation in each ---- */
+/* The functions below evaluate the formulas of a step several times together, one evaluation in each lane.
+   Compilers turn the loops over lanes into vector instructions. */
 enum { kowalevski_gauss_LANES = 8 }; /* numbers in one vector of AVX-512 */
 
 #if defined(__GNUC__)
@@ -177,7 +177,7 @@ static const double kowalevski_gauss_mixing[kowalevski_gauss_NODES][kowalevski_g
 };
 
 enum { kowalevski_gauss_PREDICTORS = 3 };
-/* Predictors of the stages of a step, from the stage increments of the last step, then of the one before. */
+/* Predictors of the stages of a step, from the stage increments of the last step, then of the step before. */
 static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kowalevski_gauss_EARLIER
     * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH] = {
     {
@@ -486,7 +486,7 @@ static inline double kowalevski_gauss_change_of(double scale, int count, kowalev
     return kowalevski_gauss_total(sum) / (double)kowalevski_gauss_NODES;
 }
 
-/* What sweeps read, as a predictor derives it from the increments of the last steps. */
+/* Predict the values that sweeps read, from the increments of the last steps. */
 static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor,
     kowalevski_gauss_lanes reads[kowalevski_gauss_READS])
 {
@@ -502,7 +502,8 @@ static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int 
             reads[r]);
 }
 
-/* The predictor that would have come nearest to what the sweeps of a step have read in the end. */
+/* Number of the predictor that would have come nearest to the values that the last sweep of a step has
+   read. */
 static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale,
     kowalevski_gauss_lanes *reads)
 {
@@ -686,7 +687,7 @@ static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s
 kowalevski_gauss_status kowalevski_gauss_integrate(kowalevski_gauss_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return kowalevski_gauss_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
         kowalevski_gauss_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

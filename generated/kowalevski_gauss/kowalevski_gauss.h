@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2892172560372556da45118c7959fb099246b077006b4531a76d2a99b5bda1cf
+ * body-sha256: 81922ee5ec3ecce620fdf6d90e30bd577c1afbc229208d6c6b26ef9e6a45ea7d
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -40,11 +40,13 @@ typedef struct {
     int count;     /* steps in increments */
     int latest;    /* index of the last step in increments */
     int sweeps;    /* number of the first sweep over the stages whose change is measured */
-    int predictor; /* number of the predictor */
-    int age;       /* steps since all predictors were compared for the first time */
-    double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
-    int kicked;    /* whether the state was changed since the last step */
-    double h;      /* size of the last step */
+    int predictor; /* row of kowalevski_gauss_prediction that predicts the next step */
+    /* steps since the predictors were first compared; they are compared again after every
+       kowalevski_gauss_TRIALS */
+    int age;
+    double rate; /* factor by which the changes of a sweep shrink from one sweep to the next */
+    int kicked;  /* whether the state was changed since the last step */
+    double h;    /* size of the last step */
     /* stage increments of the last steps, in the frame of the end of the last one */
     double increments[kowalevski_gauss_EARLIER][kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
 } kowalevski_gauss_history;

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cf5335f029bd7fd902fc176bded5441ae26deb988c9be012d090109e258e88c4
+ * body-sha256: 464ca233067566cbfd77bbcdfb200cd6309bfdd65569b392120b885f2eae0adf
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -104,7 +104,7 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return pendulum_euler_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
         pendulum_euler_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f544b03a667434161721910ccb02c18d8da5dc8cee62cf419c2cac661d19af40
+ * body-sha256: 7df21f428c9a7ba0bfab6f1b1a2991aaacfa37ffaf501519be9a6ed8be533998
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -35,7 +35,7 @@ typedef struct {
     double x[pendulum_euler_DIM]; /* the state; change it only by the functions below */
     double carry[pendulum_euler_DIM]; /* rounding error of x: x + carry is more accurate */
     size_t steps; /* number of successful steps since pendulum_euler_init */
-    size_t evaluations; /* number of evaluations of the generating function, for statistics */
+    size_t evaluations; /* number of steps or of their stages that were computed, for statistics */
     double t; /* time since pendulum_euler_init */
     double h; /* size of the last step; NaN before the first step */
     pendulum_euler_params params; /* the parameters, set by pendulum_euler_init; do not change them */

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4c50509d9336a17e210dcaf2c77d0f4474332432622dc17401ff52039c682165
+ * body-sha256: 9664d40227dbc5b8da7d4270cedcc94022b15283510a60df7d9c79813fef73af
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -181,7 +181,7 @@ export class Solver {
   t = 0;
   /** Number of successful steps since the start. */
   steps = 0;
-  /** Number of evaluations of the generating function, for statistics. */
+  /** Number of evaluations of the step equations, or of explicit stages, for statistics. */
   evaluations = 0;
   /** Size of the last step. */
   h = NaN;

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: b551692b1a3d1e604c2c10f3719421cd006af98ed7e0ec0b398b0a0480144b42
+ * body-sha256: 55540edd4662de71a842d31dfe2670bb1fd5e89371fb957e303870a56cfbc32f
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -657,8 +657,9 @@ static double point_vortices_distance(const point_vortices_solver *s, int side, 
     return sum;
 }
 
-/* Correct s->y[now] by a Newton step, with a matrix that is reused while it contracts or with a Krylov space,
-   into the other array. Returns the change relative to the size of each field; not finite on failure. */
+/* Correct s->y[now] by a Newton step into the other array, with the linear equations solved in a Krylov
+   space. */
+/* Returns the change relative to the size of each field; not finite on failure. */
 static double point_vortices_corrected(point_vortices_solver *s, const double *coef, int now)
 {
     if (!isfinite(point_vortices_relaxed(s, coef, now))) return HUGE_VAL;

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6de34e867c1d6b50ed60c36ac86b41200e1b3b1efb0df74b678b0d28c3596631
+ * body-sha256: 9705ce91735e95a7b17774026c1e0c0e8c5ddfbaa3b24ae8492f2433c31f8ea6
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -79,8 +79,8 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     const size_t sizes[point_vortices_AXES], const double *x0, void *work);
 
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. Where steps consist of flows, the last is merged with the first of the
-   next step or call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+   s->steps counts the successful ones. OpenMP updates rows in parallel, with the same bits for any number of
+   threads. */
 point_vortices_status point_vortices_step(point_vortices_solver *s, double h);
 point_vortices_status point_vortices_integrate(point_vortices_solver *s, double h, size_t steps);
 

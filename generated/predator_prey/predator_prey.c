@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 01975fbc7f5700df659d0a7f282c4e12c1740d76b3993bea8102126a3dc0a234
+ * body-sha256: 5891b5bec46812f4bbc7506879d98bd8fd0b0121de8ffbe7f86c8f7252fb5583
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -320,7 +320,7 @@ static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return predator_prey_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
         predator_prey_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 259ccd1d288b59d00159d307aa99504de19403d5fbea4a12938d1155126077e4
+ * body-sha256: 39e1981b1ff53d10529adbf20be73a496cb7df917c6254e013b0de00e957f6a2
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -10,7 +10,7 @@
 extern "C" {
 #endif
 #define predator_prey_PHIGEN_VERSION "0.1.0"
-#define predator_prey_SPEC_SHA256 "f6638ff9b1337f893f25016dded17f0b3c333d111afbf6afd42449aac73b6050"
+#define predator_prey_SPEC_SHA256 "68567398b4ba43e83320ab7370f0cc0065b496e42c92688e630cf74def14bede"
 enum { predator_prey_DIM = 2 };           /* coordinates: prey, predator */
 enum { predator_prey_ORDER = 4 };         /* order of the method */
 enum { predator_prey_CASIMIRS = 0 };      /* Casimirs: none */
@@ -19,8 +19,8 @@ enum { predator_prey_DIFFERENCES = 9 };   /* for the predictor; more would ampli
 
 typedef struct {
     double growth; /* growth rate of the prey without predators */
-    double attack; /* prey lost per predator and unit time */
-    double gain;   /* predators born per prey and unit time */
+    double attack; /* fraction of the prey lost per predator and per unit time */
+    double gain;   /* births per predator, per prey and per unit time */
     double death;  /* death rate of the predators without prey */
 } predator_prey_params;
 extern const predator_prey_params predator_prey_default_params;

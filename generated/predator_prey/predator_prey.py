@@ -6,11 +6,11 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e4fb0e111a67f6c4ff6ad19cc8e14140de6132d77c82c0c79508159de63819f5
+# body-sha256: 5a049dbdbfff7ab84fd13467cf6a60a6bf59f12ea0fae82302be8d50675989e6
 import numpy as np
 
 VERSION = "0.1.0"
-SPEC_SHA256 = "f6638ff9b1337f893f25016dded17f0b3c333d111afbf6afd42449aac73b6050"
+SPEC_SHA256 = "68567398b4ba43e83320ab7370f0cc0065b496e42c92688e630cf74def14bede"
 DIM = 2
 ORDER = 4
 COORDINATES = ("prey", "predator",)

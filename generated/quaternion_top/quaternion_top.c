@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: aa1629f157aa4b13128b361fd15163a97911a4ace944564cd5ea7ae33804b43a
+ * body-sha256: d825f8057e1c7cab9f00a7b0e9e4afa32b40458c306d7097c9ace077632bdde7
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -897,7 +897,7 @@ static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return quaternion_top_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
         quaternion_top_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c7424b2d6304e60576141ed56f58d3b82538cc84d475937050e8b7c6b52d617d
+ * body-sha256: de9d19bc158c3a88572ef45490d6b7bd2a4bc2bb21e721396debab595661f029
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -11,12 +11,12 @@ extern "C" {
 #endif
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
 #define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
-enum { quaternion_top_DIM = 7 };           /* coordinates: m1, m2, m3, w, x, y, z */
-enum { quaternion_top_ORDER = 4 };         /* order of the method */
-enum { quaternion_top_CASIMIRS = 1 };      /* Casimirs: length */
+enum { quaternion_top_DIM = 7 }; /* coordinates: m1, m2, m3, w, x, y, z */
+enum { quaternion_top_ORDER = 4 }; /* order of the method */
+enum { quaternion_top_CASIMIRS = 1 }; /* Casimirs: length */
 enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that are functions of params and h */
-enum { quaternion_top_GAUGES = 1 };        /* Casimirs of which multiples are subtracted from H: length */
-enum { quaternion_top_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
+enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs, multiples of which are subtracted from H: length */
+enum { quaternion_top_DIFFERENCES = 9 }; /* for the predictor; more would amplify rounding */
 
 typedef struct {
     double I1;     /* least moment of inertia */

@@ -10,10 +10,10 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Predictors; The implicit step, by Newton's method; The choice of the gauge: multiples of Casimirs
- *   subtracted from H; The solver; SIMD lanes: several steps or members at once; Newton's method in
- *   lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members:
- *   implicit steps; Ensembles
- * body-sha256: 852a3a0cf2492a44e1b5e5b9cec3928c9356c216d4780d5ad2efbd7ec2c4f27a
+ *   subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's method in lanes; The
+ *   residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members: implicit
+ *   steps; Ensembles
+ * body-sha256: 5aaa4beda1b21d28b5e05286897099df85590c6856087ebc476fc2c1c7614146
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -719,7 +719,7 @@ enum {
     rigid_body_FIRST_REACH = 24,  /* points of the first grid on either side */
     rigid_body_REACH_OF_GRID = 8, /* points of the other grids on either side */
 };
-#define rigid_body_MESH 0.125         /* mesh of the first grid, in widths of the error */
+#define rigid_body_MESH 0.125         /* mesh of the first grid, in units of the width of the search */
 #define rigid_body_SAMPLE_LENGTH 0.25 /* distance between successive states, relative to the first */
 /* errors that differ less than this, relative to all on a line, are equal: rounding must not decide */
 #define rigid_body_CLOSE_CALL 1e-12
@@ -774,8 +774,8 @@ static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1],
     return error;
 }
 
-/* Shift of the multiple with index c, in units of width, that minimises the error: searched on successively
-   finer grids. */
+/* Shift of the multiple with index c, in units of the width of the search, that minimises the error: searched
+   on successively finer grids. */
 static double rigid_body_least_on_line(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
     int c, double width, double samples[][rigid_body_DIM])
 {
@@ -872,11 +872,11 @@ static rigid_body_status rigid_body_stage(rigid_body_solver *s)
     return rigid_body_attempt(s);
 }
 
-/* Steps one by one; those who call it update the attitude, if there is one. */
+/* Make steps one by one. */
 static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
         rigid_body_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;
@@ -954,7 +954,7 @@ rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_bo
     if (s == NULL || params == NULL) return rigid_body_BAD_ARGUMENT;
     rigid_body_solver changed = *s;
     changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step computes coefficients and clears predictors */
+    changed.h = (double)NAN; /* so that the next step starts as with a new step size */
     rigid_body_prepare(&changed.params, changed.gauge, rigid_body_PROBE_STEP, changed.coef);
     if (!rigid_body_finite(changed.x, rigid_body_DIM) || !rigid_body_allowed(&changed.params)
         || !rigid_body_finite(changed.coef, rigid_body_COEFFICIENTS))
@@ -978,9 +978,9 @@ const char *rigid_body_status_string(rigid_body_status status)
 size_t rigid_body_solver_size(void) { return sizeof(rigid_body_solver); }
 size_t rigid_body_solver_steps_done(const rigid_body_solver *s) { return s->steps; }
 
-/* ---- SIMD lanes: several steps or members at once ---- */
-/* The functions below evaluate the formulas of a step for several steps of a trajectory, or members of an
-   ensemble, together. Compilers turn the loops over lanes into vector instructions. */
+/* ---- SIMD lanes: one evaluation in each ---- */
+/* The functions below evaluate the formulas of a step several times together, one evaluation in each lane.
+   Compilers turn the loops over lanes into vector instructions. */
 enum { rigid_body_LANES = 8 }; /* numbers in one vector of AVX-512 */
 
 #if defined(__GNUC__)
@@ -1439,7 +1439,7 @@ static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lane
     history->count += rigid_body_LANES;
 }
 
-/* Vector field at x; with a monitor, per unit of tau. */
+/* Vector field at x. */
 static void rigid_body_slope(const rigid_body_solver *s, const double x[rigid_body_DIM],
     double slope[rigid_body_DIM])
 {
@@ -1735,7 +1735,7 @@ enum {
 typedef struct {
     rigid_body_lanes x[rigid_body_DIM], carry[rigid_body_DIM], coef[rigid_body_COEFFICIENTS];
     rigid_body_lanes past[rigid_body_REMEMBERED][rigid_body_DIM]; /* solutions, in a ring buffer */
-    /* factors of past solutions, the latest first */
+    /* coefficients of the recurrences, for the latest solution first */
     rigid_body_lanes weight[rigid_body_WINDOW][rigid_body_DIM];
     int latest; /* row of the latest solutions */
     int count; /* rows in use */

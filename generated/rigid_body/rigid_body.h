@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2f6b01b1d6de6eb42065825de9a11ad2ec33fe5995cb66389f248682ec533977
+ * body-sha256: b65f685cb9cdf0b5cb79ce6644ee0965484b36a8bb254d7d98fa7ce7125b627e
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -15,7 +15,7 @@ enum { rigid_body_DIM = 3 };           /* coordinates: x1, x2, x3 */
 enum { rigid_body_ORDER = 6 };         /* order of the method */
 enum { rigid_body_CASIMIRS = 1 };      /* Casimirs: C */
 enum { rigid_body_COEFFICIENTS = 35 }; /* numbers that are functions of params and h */
-enum { rigid_body_GAUGES = 1 };        /* Casimirs of which multiples are subtracted from H: C */
+enum { rigid_body_GAUGES = 1 };        /* number of Casimirs, multiples of which are subtracted from H: C */
 enum { rigid_body_REMEMBERED = 111 };  /* past solutions that the recurrence is fitted to */
 enum { rigid_body_WINDOW = 40 };       /* largest number of past solutions in the recurrence */
 enum { rigid_body_AHEAD = 8 };         /* number of solutions that the recurrence predicts */
@@ -50,7 +50,7 @@ typedef struct {
     int slow_steps; /* recent steps that took more than one iteration */
     int slow_steps_allowed; /* value of slow_steps at which the recurrence is fitted again */
     double past[rigid_body_STORED_VALUES][rigid_body_DIM]; /* solutions, the latest last */
-    /* factors of past solutions, the latest first, for the next ones */
+    /* coefficients of the recurrences for the next solutions, by the latest solution first */
     double weight[rigid_body_WINDOW][rigid_body_DIM][rigid_body_AHEAD];
 } rigid_body_history;
 
@@ -104,8 +104,8 @@ rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t st
 rigid_body_status rigid_body_set_state(rigid_body_solver *s, const double x[rigid_body_DIM]);
 rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigid_body_DIM]);
 
-/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged.
-   rigid_body_BAD_ARGUMENT, with *s unchanged, for parameters that rigid_body_init refuses. */
+/* Between steps: replace the parameters at the present state. rigid_body_BAD_ARGUMENT, with *s unchanged, for
+   parameters that rigid_body_init refuses. */
 /* The gauge is unchanged. */
 rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_body_params *params);
 

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 93479381e53931e9433b628b3b203c6a3a92afbe647da77bf85e4d12137080d7
+ * body-sha256: 94611b50ed655bb69b567c2a5385a92db6dba1de9fa09ebc321e75c1604194d4
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -485,7 +485,7 @@ const GRIDS = 3;
 const FIRST_REACH = 24;
 /** Points of the other grids on either side */
 const REACH_OF_GRID = 8;
-/** Mesh of the first grid, in widths of the error */
+/** Mesh of the first grid, in units of the width of the search */
 const MESH = 0.125;
 /** Distance between successive states, relative to the first */
 const SAMPLE_LENGTH = 0.25;
@@ -593,7 +593,7 @@ export class Solver {
   t = 0;
   /** Number of successful steps since the start. */
   steps = 0;
-  /** Number of evaluations of the generating function, for statistics. */
+  /** Number of evaluations of the step equations, or of explicit stages, for statistics. */
   evaluations = 0;
   /** Size of the last step. */
   h = NaN;

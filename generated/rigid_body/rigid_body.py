@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 7cabb983711bae43de3db5fdbf7e0a13942ea78097ad773cdce8f41cb79bcc7c
+# body-sha256: 62f58124d214f115eedf6f46ece5ab8cfe86d7e04842901a2a755395f39f94f2
 import numpy as np
 
 VERSION = "0.1.0"
@@ -546,7 +546,7 @@ SWEEPS = 4  # most rounds over all multiples
 GRIDS = 3  # number of grids on a line, each finer than the one before by the factor mesh
 FIRST_REACH = 24  # points of the first grid on either side
 REACH_OF_GRID = 8  # points of the other grids on either side
-MESH = 0.125  # mesh of the first grid, in widths of the error
+MESH = 0.125  # mesh of the first grid, in units of the width of the search
 SAMPLE_LENGTH = 0.25  # distance between successive states, relative to the first
 CLOSE_CALL = 1e-12  # errors that differ less than this, relative to all on a line, are equal: rounding must not decide
 

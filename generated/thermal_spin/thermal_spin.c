@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: a9e8fc5d6e1fe2e34eb8e88552f7fb378867208b51995598b995335ff7aeb833
+ * body-sha256: 4518d718a8eaeee4f33d3e4679e9f880dbaf5256978e70d6f14a61929c855999
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -454,7 +454,7 @@ thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double 
     const double *dw)
 {
     if (s == NULL || !isfinite(h)) return thermal_spin_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients and predictors belong to one step size */
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
         thermal_spin_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

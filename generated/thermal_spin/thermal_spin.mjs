@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b6085e2797c5be0ac66f53e1a8cc9d19e7d9c2be4a1c9005fef01bc594ea41d7
+ * body-sha256: 3724f998695a8dc7cef0b66bee3defc092e407022196b958eb664946fcdf6187
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -396,7 +396,7 @@ export class Solver {
   dw = new Float64Array(DRAWS);
   /** Number of successful steps since the start. */
   steps = 0;
-  /** Number of evaluations of the generating function, for statistics. */
+  /** Number of evaluations of the step equations, or of explicit stages, for statistics. */
   evaluations = 0;
   /** Size of the last step. */
   h = NaN;

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4c7248df3cb39c93f2e9588477ab3622de536b37cf2061b61fd793bd34ce1283
+ * body-sha256: 2b528890b3ff8ed636114003244d92f5914d9b5bcf3277065c05c46cc717dc95
  */
 #ifndef TODA_H
 #define TODA_H
@@ -60,8 +60,9 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     const double *x0, void *work);
 
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. Where steps consist of flows, the last is merged with the first of the
-   next step or call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+   s->steps counts the successful ones. OpenMP updates rows in parallel, with the same bits for any number of
+   threads. */
+/* The last flow of a step is merged with the first flow of the next step or call. */
 toda_status toda_step(toda_solver *s, double h);
 toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 

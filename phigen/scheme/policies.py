@@ -130,7 +130,7 @@ class GaugeSearch(Policy):
     grids: int = count(3, "number of grids on a line, each finer than the one before by the factor mesh")
     first_reach: int = count(24, "points of the first grid on either side")
     reach_of_grid: int = count(8, "points of the other grids on either side")
-    mesh: float = number(0.125, "mesh of the first grid, in widths of the error")
+    mesh: float = number(0.125, "mesh of the first grid, in units of the width of the search")
     sample_length: float = number(0.25, "distance between successive states, relative to the first")
     close_call: float = number(
         1e-12, "errors that differ less than this, relative to all on a line, are equal: rounding must not decide"

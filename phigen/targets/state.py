@@ -62,8 +62,13 @@ STATE = (
     ),
     StateBlock(
         "evaluations",
-        "!GAUSS",
+        "IMPLICIT && !GAUSS",
         ("size_t evaluations;    /* number of evaluations of the generating function, for statistics */",),
+    ),
+    StateBlock(
+        "evaluations",
+        "!IMPLICIT && !GAUSS",
+        ("size_t evaluations;    /* number of steps or of their stages that were computed, for statistics */",),
     ),
     StateBlock(
         "t",
@@ -95,7 +100,7 @@ STATE = (
     StateBlock(
         "gauge",
         "GAUGE && MONITOR",
-        ("double gauge[PHI_GAUGES]; /* energy level e = -H(x0); K = monitor (H + e) is 0 along the trajectory */",),
+        ("double gauge[PHI_GAUGES]; /* the energy level e: -H(x0), or the value passed to phi_init_gauge */",),
     ),
     StateBlock(
         "gauge",

@@ -166,7 +166,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
     )
     sizes += _of_noise(program.noise) if program.noise else []
     if program.held:
-        held = f"Casimirs of which multiples are subtracted from H: {', '.join(program.held)}"
+        held = f"number of Casimirs, multiples of which are subtracted from H: {', '.join(program.held)}"
         sizes.append(("GAUGES", len(program.held), "the energy level e" if program.monitor else held))
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:
@@ -200,7 +200,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
         "stack": _stack(program.stack, program.name) if program.stack else [],
         "observables": [
             (said, [declaration(program, k, name=name, returning=one) for k, name, one in kernels])
-            for said, kernels in _observables(program)
+            for said, kernels in _state_functions(program)
         ],
     }
 
@@ -218,7 +218,7 @@ def _stack(bound: StackBound, name: str) -> Sizes:
 Exported = list[tuple[Kernel, str, bool]]
 
 
-def _observables(program: Program) -> Iterator[tuple[str, Exported]]:
+def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
     """Yield the exported functions of a state, in groups with the comment of the header."""
     seen, noise, monitor, modified = program.observables, program.noise, program.monitor, program.modified
     at = " at the time t" if program.time else ""
@@ -339,7 +339,7 @@ def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others
         if step.adjoint.refresh:
             body.append(function(program, step.adjoint.refresh, name="at_time_adjoint"))
     body += [function(program, kernel) for kernel in kernels_of_step if kernel]
-    for _, kernels in _observables(program):
+    for _, kernels in _state_functions(program):
         body += [function(program, k, name=name, exported=True, returning=one) for k, name, one in kernels]
     text = "\n".join(body)
     member = members(program)

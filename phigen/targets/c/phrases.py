@@ -15,10 +15,9 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class Choice:
-    """Phrases by names, with the parameters that they have, and their texts.
+    """A family of macros: for each name, with its parameters, one text per condition on switches.
 
-    Each text has one of the ``conditions`` on switches; the first condition that holds selects the text. The last
-    text has no condition.
+    The first of the ``conditions`` that holds selects the text. The last text has no condition.
     """
 
     about: str
@@ -26,12 +25,12 @@ class Choice:
     phrases: Mapping[str, tuple[str, ...]]
 
     def definitions(self, switches: Mapping[str, bool]) -> Iterator[str]:
-        """The definitions for a solver."""
+        """Yield the ``#define`` lines for a solver."""
         which = next((k for k, c in enumerate(self.conditions) if holds(c, switches)), len(self.conditions))
         yield from (_definition(name, texts[which]) for name, texts in self.phrases.items())
 
     def header(self) -> Iterator[str]:
-        """The definitions for all solvers."""
+        """Yield the definitions for all solvers, under ``#if`` for each condition."""
         yield f"/* {self.about} */"
         for k, condition in enumerate((*self.conditions, "")):
             expression = " ".join(
@@ -319,7 +318,7 @@ RUN = Choice(
         ),
         "AND_RECORD": ("", ", const double *dw", ", double (*tape)[PHI_DIM]", ""),
         "ABOUT_RUN": (
-            "/* Steps one by one; those who call it update the attitude, if there is one. */",
+            "/* Make steps one by one. */",
             "",
             "/* phi_integrate, which writes the states before all flows to tape, unless that is NULL. */",
             "",

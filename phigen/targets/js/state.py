@@ -79,7 +79,7 @@ SOLVER = (
         fields=(
             "/** Number of successful steps since the start. */",
             "steps = 0;",
-            "/** Number of evaluations of the generating function, for statistics. */",
+            "/** Number of evaluations of the step equations, or of explicit stages, for statistics. */",
             "evaluations = 0;",
             "/** Size of the last step. */",
             "h = NaN;",
@@ -87,9 +87,7 @@ SOLVER = (
             "params;",
         )
     ),
-    StateFields(
-        "MONITOR", ("/** Energy level e = -H(x0); K = monitor (H + e) is 0 along the trajectory. */", "gauge;")
-    ),
+    StateFields("MONITOR", ("/** The energy level e: -H(x0), or the value passed as gauge. */", "gauge;")),
     StateFields(
         "GAUGE && !MONITOR",
         ("/** Factors of the Casimirs in GAUGE that are subtracted from H. */", "gauge;"),

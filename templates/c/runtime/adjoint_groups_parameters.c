@@ -4,7 +4,11 @@
 
 #include "adjoint_members.c"
 
-/* Add the derivatives of L by the parameters of a member, and by its energy level if it has one. */
+#if PHI_MONITOR
+/* Add the derivatives of L by the parameters of a member and by its energy level. */
+#else
+/* Add the derivatives of L by the parameters of a member. */
+#endif
 static void phi_pull_parameters(const phi_pulled *all, const phi_cotangent *bar, size_t at PHI_AND_GAUGE(const double *gauge))
 {
     phi_params *params_bar_of_m = all->params_bar != NULL ? all->params_bar + at : NULL;

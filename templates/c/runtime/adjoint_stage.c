@@ -14,8 +14,15 @@ typedef struct {
 #include "state_of_cotangent.h"
 } phi_cotangent;
 
-/* Tape of one step: the states before its flows (splitting), the start and the stage increments (Gauss), the solutions
-   of implicit stages, or the starts of explicit stages. */
+#if PHI_SPLITTING
+/* Tape of one step: the states before its flows. */
+#elif PHI_GAUSS
+/* Tape of one step: its start and its stage increments. */
+#elif PHI_EXPLICIT
+/* Tape of one step: the states before its stages. */
+#else
+/* Tape of one step: the solutions of the equations of its stages. */
+#endif
 typedef PHI_RECORD_OF_STEP;
 
 #include "adjoint_path.c"

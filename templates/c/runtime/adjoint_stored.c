@@ -5,8 +5,11 @@
 #include "adjoint_batches.c"
 #include "model.h"
 
-/* The tape holds the starting points of explicit stages, or the solutions of implicit ones, of all steps. So no step is
-   repeated. */
+#if PHI_EXPLICIT
+/* The tape holds the states before all stages of all steps, so no step is repeated. */
+#else
+/* The tape holds the solutions of the equations of all stages of all steps, so no step is repeated. */
+#endif
 enum { PHI_POINT = PHI_DIM * PHI_LANES }; /* doubles on the tape for one point in all lanes */
 
 #include "adjoint_stored_groups.c"

@@ -14,15 +14,15 @@ PHI_CHAPTER_OF_ALGEBRA
 
 #include "elapsed.c"
 
-/* Within a step, moved holds the sum of the increments so far and the compensation term; x is start + moved, rounded.
-   */
+/* Add change to coordinate i within a step: displacement is the sum of the changes so far and the compensation term,
+   and x is start + displacement, rounded. */
 static inline void phi_add(double x[PHI_DIM], double displacement[PHI_DIM], const double start[PHI_DIM], int i, double change)
 {
     displacement[i] += change;
     x[i] = start[i] + displacement[i];
 }
 
-/* At the end of a step, add moved to x in compensated arithmetic. */
+/* At the end of a step, add displacement to x in compensated arithmetic. */
 static void phi_settle(double x[PHI_DIM], double carry[PHI_DIM], const double displacement[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {

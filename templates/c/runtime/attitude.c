@@ -12,8 +12,10 @@
 #include "attitude_gauge.c"
 
 /* Multiply the group element of the attitude by the attitude increment of a step, given minus the identity, in
-   compensated arithmetic. A gauge rotation, if there is one, multiplies from the other side by the same factor in every
-   step; it may be NULL. */
+   compensated arithmetic. */
+#if PHI_RATE_OF_GAUGE
+/* The gauge rotation aside multiplies from the other side, by the same factor in every step; it may be NULL. */
+#endif
 static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND_DOUBLE_ASIDE)
 {
     double change[PHI_ELEMENT], element[PHI_ELEMENT], carry[PHI_ELEMENT];

@@ -75,7 +75,11 @@ static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM]
     history->count += PHI_LANES;
 }
 
-/* Vector field at x; with a monitor, per unit of tau. */
+#if PHI_MONITOR
+/* Vector field at x, per unit of tau. */
+#else
+/* Vector field at x. */
+#endif
 static void phi_slope(const phi_solver *s PHI_AND_DOUBLE_T, const double x[PHI_DIM], double slope[PHI_DIM])
 {
     phi_vector_field(&s->params PHI_AND_T(t), x, slope);

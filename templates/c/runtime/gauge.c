@@ -55,7 +55,7 @@ static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
     return error;
 }
 
-/* Shift of the multiple with index c, in units of width, that minimises the error: searched on successively finer
+/* Shift of the multiple with index c, in units of the width of the search, that minimises the error: searched on successively finer
    grids. */
 static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
     double samples[][PHI_DIM])

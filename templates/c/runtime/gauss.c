@@ -104,7 +104,7 @@ static inline double phi_change_of(double scale, int count, phi_lanes *before, p
 }
 
 #if PHI_STAGED
-/* What sweeps read, as a predictor derives it from the increments of the last steps. */
+/* Predict the values that sweeps read, from the increments of the last steps. */
 static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads[PHI_READS])
 {
     double(*last)[PHI_WIDTH] = past->increments[past->latest], (*older)[PHI_WIDTH] = past->increments[1 - past->latest];
@@ -114,7 +114,7 @@ static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads
         for (int r = 0; r < PHI_READS; ++r) phi_mix(phi_prediction[predictor], last[PHI_READ(r)], reads[r]);
 }
 
-/* The predictor that would have come nearest to what the sweeps of a step have read in the end. */
+/* Number of the predictor that would have come nearest to the values that the last sweep of a step has read. */
 static int phi_best_predictor(phi_history *past, double scale, phi_lanes *reads)
 {
     phi_lanes predicted[PHI_READS];
@@ -132,7 +132,7 @@ static int phi_best_predictor(phi_history *past, double scale, phi_lanes *reads)
 }
 
 #else
-/* The values of the unknowns that the predictor derives from the increments of the last two steps. */
+/* Predict the unknowns from the increments of the last two steps. */
 static void phi_predict(phi_history *past, phi_lanes *z)
 {
     double(*last)[PHI_WIDTH] = past->increments[past->latest], (*older)[PHI_WIDTH] = past->increments[1 - past->latest];

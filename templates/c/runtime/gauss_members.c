@@ -27,8 +27,8 @@ typedef struct {
     phi_batch increments[PHI_EARLIER];    /* stage increments of the last steps, in the frame of the end of the last one */
     int latest;    /* index of the last step in increments */
     int count;     /* steps in increments */
-    int predictor; /* number of the predictor */
-    int age;       /* steps since all predictors were compared for the first time */
+    int predictor; /* row of phi_prediction that predicts the next step */
+    int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS */
     int sweeps;    /* number of the first sweep whose change is measured */
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int active[PHI_LANES];        /* whether the lane holds a member that has not failed */

@@ -19,7 +19,7 @@ enum {
 typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM], PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];
     phi_lanes PHI_OF(past, PHI_STAGES)[PHI_REMEMBERED][PHI_DIM]; /* solutions, in a ring buffer */
-    phi_lanes PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM]; /* factors of past solutions, the latest first */
+    phi_lanes PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM]; /* coefficients of the recurrences, for the latest solution first */
     int latest;     /* row of the latest solutions */
     int count;      /* rows in use */
     int PHI_OF(extrapolation_order, PHI_STAGES); /* number of solutions that the extrapolation uses */

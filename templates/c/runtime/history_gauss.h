@@ -7,8 +7,8 @@ typedef struct {
     int latest;    /* index of the last step in increments */
     int sweeps;    /* number of the first sweep over the stages whose change is measured */
 #if PHI_STAGED
-    int predictor; /* number of the predictor */
-    int age;       /* steps since all predictors were compared for the first time */
+    int predictor; /* row of phi_prediction that predicts the next step */
+    int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS */
 #endif
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int kicked;    /* whether the state was changed since the last step */

@@ -13,6 +13,6 @@ typedef struct {
     int slow_steps;                  /* recent steps that took more than one iteration */
     int slow_steps_allowed;          /* value of slow_steps at which the recurrence is fitted again */
     double past[PHI_STORED_VALUES][PHI_DIM]; /* solutions, the latest last */
-    double weight[PHI_WINDOW][PHI_DIM][PHI_AHEAD]; /* factors of past solutions, the latest first, for the next ones */
+    double weight[PHI_WINDOW][PHI_DIM][PHI_AHEAD]; /* coefficients of the recurrences for the next solutions, by the latest solution first */
 } phi_history;
 #endif

@@ -2,9 +2,9 @@
 #define PHI_FILE_LANES
 #include "model.h"
 
-/* ---- SIMD lanes: several steps or members at once ---- */
-/* The functions below evaluate the formulas of a step for several steps of a trajectory, or members of an ensemble,
-   together. Compilers turn the loops over lanes into vector instructions. */
+/* ---- SIMD lanes: one evaluation in each ---- */
+/* The functions below evaluate the formulas of a step several times together, one evaluation in each lane. Compilers turn
+   the loops over lanes into vector instructions. */
 #if PHI_NARROW
 enum { PHI_LANES = 4 }; /* more would need too much stack */
 #else

@@ -26,8 +26,12 @@ static double phi_distance(const phi_solver *s, int side, double added)
     return sum;
 }
 
-/* Correct s->y[now] by a Newton step, with a matrix that is reused while it contracts or with a Krylov space, into the
-   other array. Returns the change relative to the size of each field; not finite on failure. */
+#if PHI_BANDED
+/* Correct s->y[now] by a Newton step into the other array; the factors of the matrix are reused while steps contract. */
+#else
+/* Correct s->y[now] by a Newton step into the other array, with the linear equations solved in a Krylov space. */
+#endif
+/* Returns the change relative to the size of each field; not finite on failure. */
 static double phi_corrected(phi_solver *s, const double *coef, int now)
 {
 #if PHI_BANDED

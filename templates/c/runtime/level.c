@@ -4,7 +4,7 @@
 
 #include "model.h"
 
-/* ---- Energy level e = -H(x0): K = monitor (H + e) is 0 along a monitored trajectory ---- */
+/* ---- The energy level e = -H(x0) and the monitor dt/dtau ---- */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {
     gauge[0] = -phi_hamiltonian(params, x);

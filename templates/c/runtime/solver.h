@@ -18,7 +18,11 @@ typedef struct {
 size_t phi_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t phi_solver_steps_done(const phi_solver *s);
 double phi_solver_time(const phi_solver *s);
-void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]); /* the attitude, then the position, if there is one */
+#if PHI_POSITION
+void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]); /* the attitude, then the position */
+#else
+void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]);
+#endif
 size_t phi_trail_size(void); /* PHI_TRAIL, the number of doubles */
 size_t phi_trail_size_each(void); /* PHI_TRAIL_EACH, the number of doubles */
 
@@ -73,8 +77,8 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM]);
 phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
 
-/* Between steps: replace the parameters; state, time, attitude and random numbers are unchanged. PHI_BAD_ARGUMENT, with *s
-   unchanged, for parameters that phi_init refuses. */
+/* Between steps: replace the parameters at the present state. PHI_BAD_ARGUMENT, with *s unchanged, for parameters that
+   phi_init refuses. */
 #if PHI_MONITOR
 /* The energy level e becomes -H with the new parameters. */
 #elif PHI_GAUGE

@@ -5,7 +5,7 @@ import { energy, monitor } from "./model.mjs";
 
 const one = new Float64Array(1);
 
-/** e = -H(x0), constant along a trajectory: K = monitor (H + e) is 0 along it. */
+/** The energy level e = -H(x0), a constant of the steps. */
 export function chooseGauge(params, x) {
   energy(params, x, one);
   return Float64Array.of(-one[0]);
