@@ -366,7 +366,7 @@ def test_tune_measures_up_to_the_end_of_the_run(phigen, write, asked, text, name
 def test_tune_finds_an_orbit_in_tau_and_tells_lines_for_the_run(phigen, write):
     """All methods make their steps in τ, so that an orbit can be compared."""
     spec = write("spec.yaml", BODY.replace("stride: 5", "stop: x1 + 10"))
-    result = phigen("tune", spec, "--accuracy", 0.001, "--budget", 3, "--measure", "orbit", "--json")
+    result = phigen("tune", spec, "--accuracy", 0.001, "--budget", 8, "--measure", "orbit", "--json")
     assert result.exit_code == 0, result.stderr
     assert "over τ = 0 … 6.63191" in result.stderr
     document = json.loads(result.stdout)
