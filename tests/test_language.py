@@ -60,6 +60,12 @@ def test_rooms_keep_the_rules(room: str) -> None:
     assert {str(f): b for f in files if (b := breaches(f.read_text(encoding="utf-8")))} == {}
 
 
+def test_variables_of_tests_name_their_content() -> None:
+    trees = {file: ast.parse(file.read_text(encoding="utf-8")) for file in (ROOT / "tests").rglob("*.py")}
+    assert len(trees) > 200
+    assert {str(file): names for file, tree in trees.items() if (names := empty_names(tree))} == {}
+
+
 def test_breaches_are_seen() -> None:
     source = (
         '"""What a module has."""\ndef f(given):\n    """Of it."""\n    for found in given:\n        kept = found\n'

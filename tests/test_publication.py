@@ -49,8 +49,8 @@ def test_conda_recipe_agrees_with_the_package():
 def test_conda_recipe_is_rendered():
     """By rattler-build: unknown keys, requirements that are no specifications and unset variables are errors."""
     rattler_build = pytest.importorskip("rattler_build", reason="py-rattler-build is not installed")
-    given = text("packaging/conda/recipe.yaml")
-    (variant,) = rattler_build.Stage0Recipe.from_yaml(given).render()
+    recipe = text("packaging/conda/recipe.yaml")
+    (variant,) = rattler_build.Stage0Recipe.from_yaml(recipe).render()
     rendered = variant.recipe.to_dict()
     assert rendered["package"] == {"name": "phigen", "version": __version__}
     assert rendered["build"]["noarch"] == "python"
@@ -62,7 +62,7 @@ def test_conda_recipe_is_rendered():
     ]
     for mistake in mistakes:
         with pytest.raises(rattler_build.RattlerBuildError):
-            rattler_build.Stage0Recipe.from_yaml(given.replace(*mistake)).render()
+            rattler_build.Stage0Recipe.from_yaml(recipe.replace(*mistake)).render()
 
 
 def test_paper_cites_what_its_bibliography_has():

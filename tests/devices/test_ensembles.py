@@ -228,8 +228,8 @@ def test_sizes_of_kernels_are_those_of_the_generated_code(name, options):
     (text,) = emit(program, "device", "phigen build").values()
 
     def constants(*names):
-        found = {n: re.search(rf"{program.name}_{n} =? ?(\d+)", text) for n in names}
-        return [int(match[1]) for match in found.values() if match]
+        matches = {n: re.search(rf"{program.name}_{n} =? ?(\d+)", text) for n in names}
+        return [int(match[1]) for match in matches.values() if match]
 
     launch = interface_of(program).ensemble
     assert constants("GROUP") == [launch.group]

@@ -110,8 +110,8 @@ def test_short_code_changes_parameters_where_the_spec_has_inputs(profile):
     text += "hamiltonian: p**2/2 + k*q**2/2\n"
     for more, has in [("", False), ("inputs: [k]\n", True), ("inputs: [k]\nwithout: [parameters]\n", False)]:
         compilation = compile_text(text + more, profile=profile)
-        for made, expected in [(compilation, has), (compilation.including("parameters"), True)]:
-            assert any("_set_parameters(" in code for code in files(made, "c").values()) is expected
+        for variant, expected in [(compilation, has), (compilation.including("parameters"), True)]:
+            assert any("_set_parameters(" in code for code in files(variant, "c").values()) is expected
     session = phigen.compile(compile_text(text).system, "c", profile=profile).session([1, 0])
     assert session.set_parameters(k=4).parameters == {"k": 4}
 
