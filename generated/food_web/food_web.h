@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 872dab69b696b844b16024b27d60c25813a1cf733d2dd679ebf48a9aa1858643
+ * body-sha256: 32ab711347963b4d2a012b271427763723619193347f91ed55b5a261d7ba897b
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -9,10 +9,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-enum { food_web_AXES = 1 }; /* i */
-enum { food_web_DIM = 1 };  /* fields of a site: x */
-enum { food_web_ORDER = 4 };
-enum { food_web_CASIMIRS = 0 };
+#define food_web_AXES 1 /* i */
+#define food_web_DIM 1  /* fields of a site: x */
+#define food_web_ORDER 4
+#define food_web_CASIMIRS 0
 #define food_web_PHIGEN_VERSION "0.1.0"
 #define food_web_SPEC_SHA256 "33c365aeaaa9fcce1fd6f031be62040b3dc02f6bbb423e97e7a20f413586bc35"
 
@@ -75,9 +75,8 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     const size_t sizes[food_web_AXES], const food_web_bonds *bonds, const double *x0, void *work);
 
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. OpenMP updates rows in parallel, with the same bits for any number of
-   threads. */
-/* The last flow of a step is merged with the first flow of the next step or call. */
+   s->steps counts the successful ones. The last flow of a step is merged with the first of the next step or
+   call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 food_web_status food_web_step(food_web_solver *s, double h);
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 

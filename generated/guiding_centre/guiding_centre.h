@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f5ccc9264930ba359698f0a38cec10a54ed9fa90f130052074463b20e28bbf38
+ * body-sha256: 84c70c662dd485cbb28afc8cb8a0c854952b5a2ec3d7db0f8eb2c5394dd2d613
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#define guiding_centre_DIM 4      /* coordinates: x, y, z, u */
+#define guiding_centre_ORDER 4    /* order of the method */
+#define guiding_centre_CASIMIRS 0 /* Casimirs: none */
 #define guiding_centre_PHIGEN_VERSION "0.1.0"
 #define guiding_centre_SPEC_SHA256 "82d5ea90095e73077a2671c7c2e7b96d51802a2b6398fe46f5396c4225a32104"
-enum { guiding_centre_DIM = 4 };          /* coordinates: x, y, z, u */
-enum { guiding_centre_ORDER = 4 };        /* order of the method */
-enum { guiding_centre_CASIMIRS = 0 };     /* Casimirs: none */
 enum { guiding_centre_STAGES = 5 };       /* of a step */
 enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
 enum { guiding_centre_DIFFERENCES = 9 };  /* for the predictor; more would amplify rounding */

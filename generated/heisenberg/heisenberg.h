@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 10b457b097c49d79fd2a6635f1839bb9e18c8d9bab84f5ef6ee15807af4806cb
+ * body-sha256: 0dfbd212eb5f43d228efdca82d6494ff733a8e4d95cea624e4905dd19a27a172
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -9,10 +9,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-enum { heisenberg_AXES = 3 }; /* the slowest first: i, j, k */
-enum { heisenberg_DIM = 3 };  /* fields of a site: x, y, z */
-enum { heisenberg_ORDER = 2 };
-enum { heisenberg_CASIMIRS = 1 }; /* C */
+#define heisenberg_AXES 3 /* the slowest first: i, j, k */
+#define heisenberg_DIM 3  /* fields of a site: x, y, z */
+#define heisenberg_ORDER 2
+#define heisenberg_CASIMIRS 1 /* C */
 #define heisenberg_PHIGEN_VERSION "0.1.0"
 #define heisenberg_SPEC_SHA256 "a040bb6c643cd4238f4939d26b6bf47e380070926cd42f82989a61b8182d0d32"
 
@@ -62,9 +62,8 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     const size_t sizes[heisenberg_AXES], const double *x0, void *work);
 
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. OpenMP updates rows in parallel, with the same bits for any number of
-   threads. */
-/* The last flow of a step is merged with the first flow of the next step or call. */
+   s->steps counts the successful ones. The last flow of a step is merged with the first of the next step or
+   call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h);
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps);
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 22cc074042a5cb26f0f1d1b115cb3323e9a0958f6cf15bbf5243a8243d05498d
+ * body-sha256: cff74cbb365ab0ce6519c4cb247dbadcaea4703dd3ea75bcd6b92b7744f29e3c
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#define kepler_eccentric_DIM 4      /* coordinates: q1, q2, p1, p2 */
+#define kepler_eccentric_ORDER 8    /* order of the method */
+#define kepler_eccentric_CASIMIRS 0 /* Casimirs: none */
 #define kepler_eccentric_PHIGEN_VERSION "0.1.0"
 #define kepler_eccentric_SPEC_SHA256 "9f8cc7f788b5fd46c22be5f35d1f064d371462a0b9c6814a9326d129431a0702"
-enum { kepler_eccentric_DIM = 4 };            /* coordinates: q1, q2, p1, p2 */
-enum { kepler_eccentric_ORDER = 8 };          /* order of the method */
-enum { kepler_eccentric_CASIMIRS = 0 };       /* Casimirs: none */
 enum { kepler_eccentric_COEFFICIENTS = 140 }; /* numbers that are functions of params and h */
 enum { kepler_eccentric_GAUGES = 1 };         /* the energy level e */
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 81922ee5ec3ecce620fdf6d90e30bd577c1afbc229208d6c6b26ef9e6a45ea7d
+ * body-sha256: 8e92c4edb29eea4a856620f8592bdb285b097bfe2d9f0cd094ea52c4fe4905f8
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#define kowalevski_gauss_DIM 6      /* coordinates: P1, P2, P3, G1, G2, G3 */
+#define kowalevski_gauss_ORDER 16   /* order of the method */
+#define kowalevski_gauss_CASIMIRS 2 /* Casimirs: A, B */
 #define kowalevski_gauss_PHIGEN_VERSION "0.1.0"
 #define kowalevski_gauss_SPEC_SHA256 "207f4ed5fd3660d4975c60c4ec873885b380480a09e812d4abf3ef5acac67116"
-enum { kowalevski_gauss_DIM = 6 };          /* coordinates: P1, P2, P3, G1, G2, G3 */
-enum { kowalevski_gauss_ORDER = 16 };       /* order of the method */
-enum { kowalevski_gauss_CASIMIRS = 2 };     /* Casimirs: A, B */
 enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* numbers that are functions of params and h */
 enum { kowalevski_gauss_NODES = 8 };        /* stages of a step */
 enum { kowalevski_gauss_WIDTH = 8 };        /* of an array over the stages */

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7df21f428c9a7ba0bfab6f1b1a2991aaacfa37ffaf501519be9a6ed8be533998
+ * body-sha256: 6e9137e430b2917766a8fafb0b7833c0fd4dc290aa98a10b954e45fb2663f843
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#define pendulum_euler_DIM 2      /* coordinates: q, p */
+#define pendulum_euler_ORDER 1    /* order of the method */
+#define pendulum_euler_CASIMIRS 0 /* Casimirs: none */
 #define pendulum_euler_PHIGEN_VERSION "0.1.0"
 #define pendulum_euler_SPEC_SHA256 "d5fee8a2d3fff23ddbddeab960102f5ac0a598b14e727457465bbf012b8b6b14"
-enum { pendulum_euler_DIM = 2 };          /* coordinates: q, p */
-enum { pendulum_euler_ORDER = 1 };        /* order of the method */
-enum { pendulum_euler_CASIMIRS = 0 };     /* Casimirs: none */
 enum { pendulum_euler_COEFFICIENTS = 2 }; /* numbers that are functions of params and h */
 
 typedef struct {

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9705ce91735e95a7b17774026c1e0c0e8c5ddfbaa3b24ae8492f2433c31f8ea6
+ * body-sha256: d272962fc7052ff83a1f6e4e9ea16320d3bcadef1e1d43c36ac4b783613dd4c0
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -9,10 +9,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-enum { point_vortices_AXES = 1 }; /* i */
-enum { point_vortices_DIM = 2 };  /* fields of a site: x, y */
-enum { point_vortices_ORDER = 4 };
-enum { point_vortices_CASIMIRS = 0 };
+#define point_vortices_AXES 1 /* i */
+#define point_vortices_DIM 2  /* fields of a site: x, y */
+#define point_vortices_ORDER 4
+#define point_vortices_CASIMIRS 0
 #define point_vortices_PHIGEN_VERSION "0.1.0"
 #define point_vortices_SPEC_SHA256 "d965bd92c708d41161c8d57d8630c9397f72d5c2059658e2d8ea3f1387ba2750"
 

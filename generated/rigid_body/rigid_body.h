@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b65f685cb9cdf0b5cb79ce6644ee0965484b36a8bb254d7d98fa7ce7125b627e
+ * body-sha256: d6ab455a5072728804626f1bad7df01d3252d2f6ddedf9e55d6d886bf3fd5bc3
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -9,11 +9,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#define rigid_body_DIM 3      /* coordinates: x1, x2, x3 */
+#define rigid_body_ORDER 6    /* order of the method */
+#define rigid_body_CASIMIRS 1 /* Casimirs: C */
 #define rigid_body_PHIGEN_VERSION "0.1.0"
 #define rigid_body_SPEC_SHA256 "b4b33963b7078ab9acec7b44c596aff8b157783c38bfcd02fe22b99e983ef041"
-enum { rigid_body_DIM = 3 };           /* coordinates: x1, x2, x3 */
-enum { rigid_body_ORDER = 6 };         /* order of the method */
-enum { rigid_body_CASIMIRS = 1 };      /* Casimirs: C */
 enum { rigid_body_COEFFICIENTS = 35 }; /* numbers that are functions of params and h */
 enum { rigid_body_GAUGES = 1 };        /* number of Casimirs, multiples of which are subtracted from H: C */
 enum { rigid_body_REMEMBERED = 111 };  /* past solutions that the recurrence is fitted to */

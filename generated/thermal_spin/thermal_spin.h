@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 25ffb634470e3bd3713f3d26af43d0f51d5648b79e487cd5966d7985cfd27689
+ * body-sha256: 2ae94dabffcad709f55042c8b0f1eb6660153c0c87e22af170e4cf29fa7a6fef
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -10,11 +10,11 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
+#define thermal_spin_DIM 3      /* coordinates: x, y, z */
+#define thermal_spin_ORDER 2    /* order of the method */
+#define thermal_spin_CASIMIRS 1 /* Casimirs: length */
 #define thermal_spin_PHIGEN_VERSION "0.1.0"
 #define thermal_spin_SPEC_SHA256 "a5f42591d561fe7e58ccb74799a7eee10f3fc732e46da02243f1394d987d4a7d"
-enum { thermal_spin_DIM = 3 }; /* coordinates: x, y, z */
-enum { thermal_spin_ORDER = 2 }; /* order of the method */
-enum { thermal_spin_CASIMIRS = 1 }; /* Casimirs: length */
 enum { thermal_spin_COEFFICIENTS = 13 }; /* numbers that are functions of params and h, and of the noise */
 enum { thermal_spin_SOURCES = 3 }; /* sources of noise: bath_x, bath_y, bath_z */
 enum { thermal_spin_DRAWS = 3 }; /* increments of all sources in a step */

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3724f998695a8dc7cef0b66bee3defc092e407022196b958eb664946fcdf6187
+ * body-sha256: 778b388cb71b356b3368568ec2742e402299bbb64e1ca6358ada762b24f9eb8b
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -402,7 +402,7 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size, then of the time or noise too. */
+  /** Coefficients of each stage: functions of parameters and step size; then those of the time or noise. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());

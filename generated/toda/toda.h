@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2b528890b3ff8ed636114003244d92f5914d9b5bcf3277065c05c46cc717dc95
+ * body-sha256: 13af0ddc5745a106d04c5ced75cda5db4f0e7addbdc85e63dcbb86f9042b6477
  */
 #ifndef TODA_H
 #define TODA_H
@@ -9,10 +9,10 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-enum { toda_AXES = 1 }; /* i */
-enum { toda_DIM = 2 };  /* fields of a site: a, b */
-enum { toda_ORDER = 4 };
-enum { toda_CASIMIRS = 2 }; /* momentum, length */
+#define toda_AXES 1 /* i */
+#define toda_DIM 2  /* fields of a site: a, b */
+#define toda_ORDER 4
+#define toda_CASIMIRS 2 /* momentum, length */
 #define toda_PHIGEN_VERSION "0.1.0"
 #define toda_SPEC_SHA256 "fdb12f10a633d60a892c40686358bece67d0d7d2e0a768bf8ec3914cdf17aeac"
 
@@ -60,9 +60,8 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     const double *x0, void *work);
 
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and
-   s->steps counts the successful ones. OpenMP updates rows in parallel, with the same bits for any number of
-   threads. */
-/* The last flow of a step is merged with the first flow of the next step or call. */
+   s->steps counts the successful ones. The last flow of a step is merged with the first of the next step or
+   call. OpenMP updates rows in parallel, with the same bits for any number of threads. */
 toda_status toda_step(toda_solver *s, double h);
 toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 

@@ -170,7 +170,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
 
 
 def described_averages(names: Sequence[str], averages: Averages, observables: Sequence[str] = ()) -> dict[str, Any]:
-    """Return time averages of observables as JSON has them, ``observables`` some of them or of all."""
+    """Return the time averages as dictionaries for JSON, by the names of observables; ``observables`` selects some."""
     from dataclasses import asdict
 
     named_results = zip(names, averages.results(), strict=True)
@@ -178,7 +178,7 @@ def described_averages(names: Sequence[str], averages: Averages, observables: Se
 
 
 def described_spectrum(spectrum: Spectrum) -> dict[str, Any]:
-    """Lyapunov exponents as JSON has them."""
+    """Return Lyapunov exponents and their uncertainty as a dictionary for JSON."""
     return {
         "exponents": spectrum.exponents.tolist(),
         "largest": spectrum.largest,

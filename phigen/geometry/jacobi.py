@@ -12,7 +12,7 @@ from phigen.symbolic.verdict import Statement, decide_elements
 
 
 def jacobi_identity(system: System) -> Statement:
-    """Σ_a (∂_a π_ij π_ak + ∂_a π_jk π_ai + ∂_a π_ki π_aj) = 0 for all i < j < k, parameters symbolic.
+    """Prove or refute Σ_a (∂_a π_ij π_ak + ∂_a π_jk π_ai + ∂_a π_ki π_aj) = 0, i < j < k, with symbolic parameters.
 
     A refutation names the first failing triple that has a point where the sum is not zero.
     """

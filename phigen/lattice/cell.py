@@ -138,7 +138,7 @@ class Cell:
             yield density
 
     def extent(self, expression: Expression) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the least and the largest offset along each axis among the symbols of a term, and 0."""
+        """Return, for each axis, the smallest and the largest offset among 0 and the symbols of a term."""
         offsets = [steps(self.origin), *(steps(o) for _, o in self.places(expression).values())]
         return tuple(map(min, zip(*offsets, strict=True))), tuple(map(max, zip(*offsets, strict=True)))
 

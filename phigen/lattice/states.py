@@ -53,7 +53,7 @@ def start_of(spec: Spec, run: Run) -> Start:
 def defaults_at(spec: Spec, names: Collection[str], sizes: tuple[int, ...], bonds: int) -> dict[str, Floats]:
     """Return the defaults of parameters that are formulas, lists, files or random, at the given sizes.
 
-    ``bonds`` is the number of bonds of a graph. Raises `SpecError` for those that do not fit, with their place.
+    ``bonds`` is the number of bonds of a graph. Raises `SpecError`, with its place, for an array of another length.
     """
     arrays = {}
     for p in spec.parameters:

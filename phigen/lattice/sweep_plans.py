@@ -394,7 +394,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
 
 
 def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
-    """Return a method for any number of flows; see `Sweeps`.
+    """Return the schedule of a method for a number of colours that is known at run time only; see `Sweeps`.
 
     If H is ``dated`` (depends on the time), the advance of the time takes the place of a last flow.
     """

@@ -71,7 +71,7 @@ def companion(path: Path) -> Path:
 
 
 def mark(path: Path, origin: Origin) -> None:
-    """Write the companion of a ``.csv``; other files hold their origin."""
+    """Write the origin of a ``.csv`` into a file of metadata beside it. Other files contain their origin already."""
     if path.suffix.lower() != ".csv":
         return
     columns = [{"titles": title, "datatype": "double"} for title in _header(path)]

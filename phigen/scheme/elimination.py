@@ -134,7 +134,7 @@ def transposed_elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Ex
 def inversion(pattern: Pattern) -> tuple[list[Expression], list[Expression]]:
     """Return J⁻¹, row by row, by Gauss–Jordan elimination, and the reciprocal pivots.
 
-    The symbols ``J:i:j`` follow the pattern.
+    J has the symbol ``J:i:j`` where the pattern is true and on the diagonal, 0 elsewhere.
     """
     n = len(pattern)
     a = [[symbol(Symbol("J", i, j)) if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]

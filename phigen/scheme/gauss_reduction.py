@@ -93,7 +93,10 @@ def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
 
 
 def _followed(rate: Expression, row: Mapping[str, Expression], integrals: Mapping[str, Expression]) -> Expression:
-    """Return a follower at a stage: the time of the stage times the rate at the start, and integrals of the others."""
+    """Return the increment of a follower up to a stage, from the increments ``integrals`` of the other unknowns.
+
+    A follower has the constant ``rate`` at the start, and depends on each other unknown by the slope in ``row``.
+    """
     (start,) = substitute([rate], {z: ZERO for z in symbols_of(rate) if kind_of(z) == OFFSET})
     terms = [symbol(TIME) * start, *(slope * integrals[z] for z, slope in row.items())]
     # the times are exact, and their products with the step would not be

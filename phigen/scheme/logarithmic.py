@@ -71,7 +71,7 @@ def fact_of(negative: str) -> str:
 def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:
     """Return the monitor of a splitting, or None if the spec has none.
 
-    Raises `SpecError` where it does not apply.
+    Raises `SpecError` if H is not split in two parts A and B as the monitor requires.
     """
     if spec.monitor is None:
         return None

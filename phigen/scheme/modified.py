@@ -89,7 +89,7 @@ def modified_of(
     time = {"t": system.times} if system.time else {}
     kernel = Kernel(
         "modified",
-        f"the Hamiltonian whose flow the step is, with {count} corrections",
+        f"the Hamiltonian whose flow the step is, with {count} correction{'s' * (count != 1)}",
         {"params": system.parameter_names, **gauge.inputs, "h": (STEP,), **time, "x": system.coordinates},
         (Output("energy", (value,)),),
     )

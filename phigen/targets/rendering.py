@@ -1,4 +1,4 @@
-"""Templates: loops over printed strings, nothing else."""
+"""Rendering of Jinja templates. Their values are printed strings and lists of these: templates decide nothing."""
 
 from __future__ import annotations
 

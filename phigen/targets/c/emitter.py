@@ -150,16 +150,16 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
 def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
     """Return the values of the template of declarations."""
     member, step = members(program), program.step
-    sizes: Sizes = [
+    public: Sizes = [
         ("DIM", program.dimension, f"coordinates: {', '.join(program.coordinates)}"),
         ("ORDER", program.order, "order of the method"),
         ("CASIMIRS", len(program.casimirs), f"Casimirs: {', '.join(program.casimirs) or 'none'}"),
     ]
     if program.observed:
-        sizes.append(("OBSERVABLES", len(program.observed), f"observables: {', '.join(program.observed)}"))
+        public.append(("OBSERVABLES", len(program.observed), f"observables: {', '.join(program.observed)}"))
     if program.modified:
-        sizes.append(("MODIFIED_POWER", program.modified.power, "power of h in the error of the modified Hamiltonian"))
-    sizes += [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
+        public.append(("MODIFIED_POWER", program.modified.power, "power of h in the error of the modified Hamiltonian"))
+    sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
     also = f", and of {_renewing(program)}" if program.step.refresh else ""
     sizes.append(
         ("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that are functions of params and h{also}")
@@ -195,6 +195,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
         "defaults": _defaults(program),
         "members": [(f"double {member[p.name]};", _member_comment(p, member[p.name])) for p in program.parameters]
         or [("char unused;", "this system has no parameters")],
+        "public": public,
         "sizes": sizes,
         "compiler": program.stack.compiler if program.stack else "",
         "stack": _stack(program.stack, program.name) if program.stack else [],

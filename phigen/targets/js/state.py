@@ -98,7 +98,7 @@ SOLVER = (
     ),
     StateFields(
         "RENEWED",
-        ("/** Coefficients of each stage: functions of parameters and step size, then of the time or noise too. */",),
+        ("/** Coefficients of each stage: functions of parameters and step size; then those of the time or noise. */",),
     ),
     StateFields("!RENEWED", ("/** Coefficients of each stage: functions of parameters and step size. */",)),
     StateFields(fields=("coef = emptyTables();",)),

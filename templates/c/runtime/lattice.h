@@ -31,10 +31,13 @@ phi_status phi_set_planes(phi_solver *s, size_t first, size_t planes);
    and before each step of caller-driven stepping. */
 phi_status phi_passed(phi_solver *s, double h, size_t steps);
 
+#if PHI_SERIES || PHI_NOISE
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and s->steps counts
    the successful ones. OpenMP updates rows in parallel, with the same bits for any number of threads. */
-#if !PHI_SERIES
-/* The last flow of a step is merged with the first flow of the next step or call. */
+#else
+/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and s->steps counts
+   the successful ones. The last flow of a step is merged with the first of the next step or call. OpenMP updates rows in
+   parallel, with the same bits for any number of threads. */
 #endif
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);

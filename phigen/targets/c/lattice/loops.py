@@ -38,7 +38,7 @@ Forms = Mapping[str, Mapping[str, str]]
 
 
 def printed(program: Program, loop: ir.Function, purposes: Iterable[str] = (), *, inline: bool = True) -> str:
-    """Return the text of a loop, below its purpose or those of all loops that are equal to it."""
+    """Return the C function of a loop below a comment: the purposes of all equal loops, by default its own."""
     sentences = [plain(sentence(purpose)) for purpose in _merged_purposes(purposes or (loop.doc,))]
     lines = [line for text in sentences for line in comment(text, "   ")]
     lines[0] = f"/* {lines[0].strip()}"
