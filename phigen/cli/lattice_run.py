@@ -187,6 +187,8 @@ def _integrated(
         except MismatchError as error:
             raise click.UsageError(str(error)) from None
         except StepError as error:
+            if error.trajectory is None:  # no step can be made
+                raise
             return error.trajectory, error
     if section and result.crossings is not None:
         result.crossings.save(section)

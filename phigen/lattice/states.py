@@ -101,6 +101,10 @@ class _Reader:
             where = f"{float(values[worst]):g} at {noun} {place if len(worst) == 1 else f'({place})'}"
             message = f"the parameter is {p.bound} by declaration, but {where}"
             raise self.arrays.refused(p.name, message)
+        if self.spec.coordinates_from and p.at == "sites" and values.flat[0] == 0:
+            # the only parameter at sites is the mass: further terms of H are refused
+            message = f"with coordinates_from: {self.spec.coordinates_from} the first body needs a mass, which is 0"
+            raise self.arrays.refused(p.name, message)
 
     def _expect_room(self, sizes: Sequence[int]) -> None:
         """Raise `SpecError` if the arrays over sites do not fit in memory together."""

@@ -248,8 +248,12 @@ def _no_order(system: Host, composition: str, offered_orders: Sequence[int], ord
     place = system.locations.get(("composition",)) or system.locations.get(("order",))
     offered = ", ".join(map(str, offered_orders)) or "none"
     subject = "splittings offer" if composition == "auto" else f"composition {composition} offers"
-    message = f"scheme splitting: {subject} the orders {offered}, not {order}"
-    return SpecError([Diagnostic(message, place, "scheme: series reaches order 16")])
+    default = "" if ("order",) in system.locations else ", the default"
+    message = f"scheme splitting: {subject} the order{'s' * (len(offered_orders) != 1)} {offered}, not {order}{default}"
+    if composition == "auto" or not offered_orders:
+        return SpecError([Diagnostic(message, place, "scheme: series reaches order 16")])
+    closest = min(offered_orders, key=lambda offered_order: abs(offered_order - order))
+    return SpecError([Diagnostic(message, place, f"write order: {closest}, or composition: auto")])
 
 
 def _not_applicable(

@@ -157,3 +157,17 @@ def test_check_says_that_nothing_is_proved_of_a_spec_with_errors(phigen, tmp_pat
     result = phigen("check", path)
     assert (result.exit_code, result.stdout) == (1, "")
     assert f"{path}: nothing was proved, because the spec has errors" in result.stderr
+
+
+def test_parameters_with_which_no_step_can_be_made_end_a_run(phigen, tmp_path):
+    spec = tmp_path / "chain.yaml"
+    spec.write_text(
+        "phigen: 1\nname: chain\nlattice: {axes: [i]}\ncoordinates: [q, p]\nparameters: {k: 2}\n"
+        "poisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/(2*(k - 1)) + (q[i+1] - q)**2/2\n"
+        "scheme: splitting\nruns:\n"
+        "  one: {sizes: [4], initial: {q: 0.1, p: 1}, parameters: {k: 1}, step: 0.1, steps: 3}\n",
+        encoding="utf-8",
+    )
+    result = phigen("run", spec, "-t", "numpy")
+    assert "error: chain: no step can be made with k = 1.0" in result.stderr
+    assert (result.exit_code, "internal error" in result.stderr) == (7, False)

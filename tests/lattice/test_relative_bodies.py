@@ -18,6 +18,7 @@ from phigen.api import lattice_solver_of
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit, examine
 from phigen.errors import SpecError, StepError
+from phigen.lattice.states import start_of
 from phigen.runtime.lattice import LatticeSolver
 
 TEXT = """\
@@ -302,6 +303,14 @@ def test_masses_are_checked(target: str) -> None:
     of_momenta = text(momenta=True).replace(", positive: true", "")
     with pytest.raises((StepError, ValueError)):
         solver(of_momenta, target).integrate(x, h=0.1, steps=1, m=np.array([1, 1e-3, 0]))
+
+
+def test_a_first_body_without_mass_is_refused_at_its_place() -> None:
+    run = "runs: {one: {initial: {x: [0, 1], y: 0, vx: 0, vy: [0, 1]}, step: 0.1, steps: 3}}\n"
+    spec = phigen.spec.loads(text(axes="xy").replace("value: 0", "value: [0, 1]") + run)
+    with pytest.raises(SpecError, match="the first body needs a mass, which is 0") as caught:
+        start_of(spec, spec.runs["one"])
+    assert caught.value.diagnostics[0].location.line == 5
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])

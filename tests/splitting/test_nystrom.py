@@ -130,8 +130,9 @@ def test_three_parts_and_orders_that_a_name_lacks_are_refused():
         composition_of(lattice, 6, "force-gradient")
     with pytest.raises(SpecError, match="here there is one"):
         composition_of(PLANE + "hamiltonian: p**2/2\n", 6, "force-gradient")
-    with pytest.raises(SpecError, match="composition force-gradient offers the orders 4, 6, 8, not 10"):
+    with pytest.raises(SpecError, match="composition force-gradient offers the orders 4, 6, 8, not 10") as caught:
         composition_of(PLANE + "hamiltonian: p**2/2 + cos(q)\n", 10, "force-gradient")
+    assert caught.value.diagnostics[0].hint == "write order: 8, or composition: auto"
     with pytest.raises(SpecError, match="needs scheme: splitting"):
         compile_text(PLANE + "hamiltonian: p**2/2 + cos(q)\ncomposition: force-gradient\n", 6, "series")
 
