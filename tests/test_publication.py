@@ -48,7 +48,7 @@ def test_conda_recipe_agrees_with_the_package():
 
 def test_conda_recipe_is_rendered():
     """By rattler-build: unknown keys, requirements that are no specifications and unset variables are errors."""
-    rattler_build = pytest.importorskip("rattler_build", reason="py-rattler-build is not installed")
+    rattler_build = pytest.importorskip("rattler_build", reason="the recipe needs py-rattler-build of PyPI")
     recipe = text("packaging/conda/recipe.yaml")
     (variant,) = rattler_build.Stage0Recipe.from_yaml(recipe).render()
     rendered = variant.recipe.to_dict()
