@@ -197,7 +197,7 @@ def command(
     if failure:
         raise failure
     if interrupted:
-        raise InterruptedRunError(_print_status(recorder))
+        raise InterruptedRunError(_interruption_message(recorder))
 
 
 #: Options that contradict each other, or that have no effect together.
@@ -213,7 +213,7 @@ def _expect_together(*options: dict[str, object]) -> None:
             raise click.UsageError(f"{first} and {second} exclude each other")
 
 
-def _print_status(recorder: Recorder) -> str:
+def _interruption_message(recorder: Recorder) -> str:
     status_text = f"interrupted after {recorder.steps} of {recorder.experiment.run.steps} steps"
     return f"{status_text}; repeat the command with --resume to continue" if recorder.files.checkpoint else status_text
 

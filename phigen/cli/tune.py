@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 )
 @settings_option
 @click.option(
-    "--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="Time limit of the command."
+    "--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="Time limit of the search."
 )
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw error against time: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip

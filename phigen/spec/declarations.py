@@ -74,10 +74,8 @@ class Declarations:
 
     def _counters(self) -> dict[str, tuple[str, str]]:
         """The names of indices and sizes, which are no part of a density."""
-        reason, hint = (
-            "this expression must be the same for all sites",
-            "a parameter at: sites has a value for each site",
-        )
+        reason = "this expression must be the same for all sites"
+        hint = "a parameter at: sites has a value for each site"
         index_names = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
         return {
             n: (f"{reason}; {n!r} depends on the site" if n[:2] != "N_" else f"{reason} and sizes", hint)

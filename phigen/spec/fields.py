@@ -417,10 +417,6 @@ SWEEP = Record(
 )
 
 
-def _switch(key: str, *help_text: str) -> Kind:
-    return OneOf(help_text)
-
-
 #: Hints for keys of runs outside of runs.
 _IN_RUNS = {f.key: f"{f.key}: belongs to a run, runs: {{NAME: {{{f.key}: …}}}}" for f in RUN.fields}
 _IN_RUNS["step"] += "; monitor: adapts steps to the motion"
@@ -475,31 +471,29 @@ SPEC = Record(
         ),
         RecordKey("order", Integer(1, limits.ORDER, limit=True), "order of the method", default=DEFAULT_ORDER),
         RecordKey("terms", Integer(1, limits.ORDER, limit=True), "instead of order: use exactly S_1, …, S_k"),
-        RecordKey(
-            "composition", _switch("composition", *COMPOSITIONS), "symmetric composition of steps", default="auto"
-        ),
+        RecordKey("composition", OneOf(COMPOSITIONS), "symmetric composition of steps", default="auto"),
         RecordKey(
             "gauge",
-            Either({Scalar: _switch("gauge", "auto", "none"), Mapping: FORMULAS}),
+            Either({Scalar: OneOf(("auto", "none")), Mapping: FORMULAS}),
             "Casimirs subtracted from H before discretising",
             default="auto",
         ),
         RecordKey("monitor", FORMULA, "equal steps of τ, dt = g dτ: g > 0, or log for a splitting"),
         RecordKey(
             "scheme",
-            _switch("scheme", *SCHEMES),
+            OneOf(SCHEMES),
             "how the one-step map is made; auto chooses by the expected cost",
             default="series, of lattices auto",
         ),
         RecordKey(
             "structure",
-            _switch("structure", *STRUCTURES),
+            OneOf(STRUCTURES),
             "scheme gauss: exact for steps that are Poisson maps, or to truncation for steps that are none",
             default="exact",
         ),
         RecordKey(
             "coordinates_from",
-            _switch("coordinates_from", *RELATIVE),
+            OneOf(RELATIVE),
             "scheme splitting: attracting bodies are split in their motions in these coordinates and a small remainder",
         ),
         RecordKey(

@@ -335,13 +335,13 @@ class Record(Kind):
         return f"a mapping ({self.what})" if " " in self.what else "a mapping"
 
     def read(self, node: Node, path: Path, reader: Reader) -> dict[str, Any] | None:
-        fields_by_key = {f.key for f in self.fields}
+        fields_by_key = {f.key: f for f in self.fields}
         if not isinstance(node, MappingNode):
             return self.mismatch(node, path, reader, self.instructions(node))
         values = {}
         for name, (key, item) in node.entries.items():
             if name in fields_by_key:
-                value = self._read_value(name, key, item, path, reader)
+                value = self._read_value(fields_by_key[name], key, item, path, reader)
                 if value is not None:
                     values[name] = value
         for name in [name for name in node.entries if name not in fields_by_key]:
@@ -351,10 +351,9 @@ class Record(Kind):
         self.check_presence(node, reader)
         return values
 
-    def _read_value(self, name: str, key: Scalar, item: Node, path: Path, reader: Reader) -> Any:
+    def _read_value(self, known: RecordKey, key: Scalar, item: Node, path: Path, reader: Reader) -> Any:
         """Return the value of a known key; for a misspelt word, which is an error, the word that it resembles."""
-        known = next(f for f in self.fields if f.key == name)
-        inner = (*path, name)
+        inner = (*path, known.key)
         reader.locations[inner] = place(key, item)
         reader.purposes[inner] = known.description
         value = known.kind.read(item, inner, reader)
@@ -377,7 +376,8 @@ class Record(Kind):
             reader.locations.setdefault((*path, meant), key.location)  # so that nobody says it is missing
             return meant, None
         before = reader.problems.copy()
-        value = self._read_value(meant, key, item, path, reader)
+        known = next(f for f in self.fields if f.key == meant)
+        value = self._read_value(known, key, item, path, reader)
         if value is None:
             reader.problems.restore(before)
         return meant, value

@@ -46,9 +46,8 @@ class Summary:
     """Errors of one method; ``exact`` is the largest error against the closed form, None if there is none.
 
     ``good`` rows of the states are finite; the numbers are about these. The errors of a method that breaks down at once
-    are infinite. Where H is no invariant, ``energy`` is
-    about H − ``work``, an integral that may be ``off`` by so much in the same unit, and ``change`` is the largest
-    change of H itself.
+    are infinite. Where H is no invariant, ``energy`` is about H − ``work``, where ``work`` is an integral with an error
+    of about ``off`` in the same unit, and ``change`` is the largest change of H itself.
     """
 
     method: str

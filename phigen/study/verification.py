@@ -425,10 +425,10 @@ def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Flo
         for solver_group in (fixed_solvers, solvers if program.monitor else fixed_solvers)
     )
     apart = max(gradients.members_error(s, np.array(states), *arguments) for s in fixed_solvers)
-    reason = f"gradients of members differ from those of single runs by {apart:.1e}"
-    members = "gradients of members against single runs", apart, gradients.TRANSPOSED, reason
-    for name, value, limit, refusal in (*gradients.measured(fixed_level_runs, free_level_runs), members):
-        yield Check(name, value, f"at most {limit:g}", value <= limit, refusal)
+    members_reason = f"gradients of members differ from those of single runs by {apart:.1e}"
+    members = "gradients of members against single runs", apart, gradients.TRANSPOSED, members_reason
+    for name, value, limit, reason in (*gradients.measured(fixed_level_runs, free_level_runs), members):
+        yield Check(name, value, f"at most {limit:g}", value <= limit, reason)
 
 
 def _approximate(

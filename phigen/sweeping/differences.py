@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ _ENTRIES = {
 _AVERAGED = {"after": "average: after:", "blocks": "average: blocks:", "stride": "stride:"}
 
 #: Further facts about a plan, by their names in messages.
-_FACTS = {"target": "target", "phigen": "version of phigen", "file": "folder of the spec"}
+_FACTS = {"target": "target", "phigen": "version of phigen", "folder": "folder of the spec", "contents": "data files"}
 
 #: Longest value that a message shows.
 _SHORT = 40
@@ -53,24 +54,32 @@ def differences(
     """
     ours, theirs = plan.as_json(), job.plan.as_json()
     entries = _ENTRIES | (_AVERAGED if any("(" in word for word in plan.keep) else {})
-    phrases = [_phrase(name, theirs[key], ours[key]) for key, name in entries.items() if theirs[key] != ours[key]]
-    before, now = theirs["about"], ours["about"]
-    phrases += [
-        _phrase(name, before.get(key), now.get(key)) for key, name in _FACTS.items() if before.get(key) != now.get(key)
-    ]
+    phrases = [phrase for key, name in entries.items() for phrase in _phrases(name, theirs[key], ours[key])]
+    before, now = _facts(theirs["about"]), _facts(ours["about"])
+    phrases += [phrase for key, name in _FACTS.items() for phrase in _phrases(name, before.get(key), now.get(key))]
     if not phrases:
         phrases += _differences_of_solver(job, beside)
         phrases += _differences_of_run(job, plan, spec)
-        if any(not np.array_equal(job.root[name][:], values) for name, values in listed.items()):
+        if any(not np.array_equal(job.root[name][:], values, equal_nan=True) for name, values in listed.items()):
             phrases.append("other values in the file of members")
     return phrases
 
 
-def _phrase(name: str, stored: Any, requested: Any) -> str:
-    """``number of steps 60, not 61``, or ``other initial values``."""
+def _facts(about: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the further facts about a plan, with the folder of the spec in place of its file."""
+    return {**about, "folder": str(Path(about["file"]).parent) if "file" in about else None}
+
+
+def _phrases(name: str, stored: Any, requested: Any) -> list[str]:
+    """Return ``number of steps 60, not 61``, or ``other initial values``; for mappings, one phrase for each entry."""
+    if stored == requested:
+        return []
+    if isinstance(stored, dict) and isinstance(requested, dict) and stored.keys() == requested.keys():
+        noun = name.removesuffix("s")
+        return [p for key, value in stored.items() for p in _phrases(f"{noun} {key}", value, requested[key])]
     if max(len(str(stored)), len(str(requested))) > _SHORT or isinstance(stored, list | tuple | dict):
-        return f"other {name.rstrip(':')}"
-    return f"{name} {stored}, not {requested}"
+        return [f"other {name.rstrip(':')}"]
+    return [f"{name} {stored}, not {requested}"]
 
 
 def _differences_of_solver(job: store.Job, beside: Mapping[str, Any]) -> list[str]:

@@ -6,6 +6,7 @@ import csv
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -81,7 +82,9 @@ def made(
     """
     store.imported("zarr")
     target = chosen_target(setting.target or sweep.target)
-    workers = setting.workers or _workers(target, spec, sweep, setting)
+    # On this machine a target without a device is refused first of all, also if the number of workers is given.
+    default = 0 if setting.scheduler else _workers(target, spec, sweep, setting)
+    workers = setting.workers or default
     compilation = compilation_of(
         _with_ensembles(spec),
         order=setting.order,
@@ -180,13 +183,19 @@ def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int]
     )
 
 
-def _files(spec: Spec, run: Run) -> dict[str, str]:
-    """Return the folder of the spec if a run of a lattice reads files from there."""
+def _files(spec: Spec, run: Run) -> dict[str, Any]:
+    """Return the path of the spec and the digests of the files that a run of a lattice reads; empty without files."""
     if run.lattice is None:
         return {}
     values = [*run.lattice.state.values(), *run.lattice.arrays.values(), *(p.values for p in spec.parameters)]
-    reads = isinstance(run.lattice.bonds, str) and run.lattice.bonds
-    return {"file": str(Path(spec.file).resolve())} if reads or any(v and v.file for v in values) else {}
+    names = {v.file for v in values if v and v.file}
+    if isinstance(run.lattice.bonds, str) and run.lattice.bonds:
+        names.add(run.lattice.bonds)
+    if not names:
+        return {}
+    path = Path(spec.file).resolve()
+    digests = {name: sha256((path.parent / name).read_bytes()).hexdigest() for name in sorted(names)}
+    return {"file": str(path), "contents": digests}
 
 
 def _worker_data(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:

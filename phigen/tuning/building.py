@@ -123,10 +123,10 @@ def build_all(
                 unfinished = [*waiting, *(setting for setting, _, _ in running.values())]
                 yield from ((setting, Refusal(LATE)) for setting in unfinished)
                 return
-            for future in wait(list(running), max(0.0, deadline - time.perf_counter())):
-                assert isinstance(future, Connection)
-                setting, process, start = running.pop(future)
-                outcome = _received(future, time.perf_counter() - start)
+            for connection in wait(list(running), max(0.0, deadline - time.perf_counter())):
+                assert isinstance(connection, Connection)
+                setting, process, start = running.pop(connection)
+                outcome = _received(connection, time.perf_counter() - start)
                 process.join(_GRACE)
                 yield setting, outcome
     finally:

@@ -170,12 +170,11 @@ def charts(system: System, current: Setting) -> list[Setting]:
     # The other side is the adjoint, with the same errors in reversed time.
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
     composed = _near_integrable(system)
-    splittings = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
-    splittings += [Setting(GAUSS, order, "none") for order in (8, 16)]
+    # They are built in seconds, where series of order 8 may take minutes.
+    quick = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
+    quick += [Setting(GAUSS, order, "none") for order in (8, 16)]
+    quick = [s for s in quick if s.chart != current.chart]
     first = [replace(current, order=order, composition=direct(current)) for order in (4, 8)]
-    quick = [
-        s for s in splittings if s.chart != current.chart
-    ]  # seconds to build, where series of order 8 may take minutes
     candidates = [s for s in (*plain_settings, *nested, *euler) if s.chart != current.chart]
     return [s for s in (*quick, *first, *composed, *candidates) if s != current]
 

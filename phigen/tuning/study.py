@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import median
@@ -25,10 +24,13 @@ from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
 #: The number of finalists, their largest cost relative to the best, and the rounds in which all are timed in turn.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
-#: Shares of the budget after which only what a result needs is confirmed, and methods are timed once.
-CONFIRMED, TIMED = 1.0, 1.1
-#: The time for monitors, as a share of the budget and in addition to it.
-MONITORS = 0.5
+#: Share of the budget after which only what a result needs is confirmed.
+CONFIRMED = 1.0
+#: Share of the budget after which methods are timed once: a round of timings of confirmed methods takes some tenth.
+TIMED = 1.1
+#: Share of the budget, counted from its start, after which no monitor and no automatic scheme is tried: monitors have
+#: half of the budget if the search used it up.
+MONITORED = 1.5
 #: Costs within this factor count as equal: then the lower order wins.
 EQUAL = 1.1
 
@@ -128,7 +130,8 @@ def tune(
         next((f for f in ranked if f.curve is current), None), timed[-1] if current_run else None, tuple(peers),
         {s: reason for s, reason in tuner.refused.items() if reason}, finished,
         tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None, problem.unit,
-        monitored(tuner, current), problem.sizes, problem.clock, automatic(tuner.compilation, ranked),
+        monitored(tuner, current), problem.sizes, problem.clock,
+        automatic(tuner.compilation, ranked) if clock.left(MONITORED) > 0 else "",
     )  # fmt: skip
 
 
@@ -147,7 +150,7 @@ def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
         return None
     tuner.note("trying monitors")
     requested = settings(setting, current.order, list(candidates(compilation.system, problem.parameters, states)))
-    deadline = time.perf_counter() + MONITORS * tuner.clock.budget
+    deadline = tuner.clock.at(MONITORED)
     return compare(spec, compilation.system, requested, problem, states, tuner.piece, tuner.accuracy, deadline)
 
 

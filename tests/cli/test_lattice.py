@@ -171,3 +171,11 @@ def test_parameters_with_which_no_step_can_be_made_end_a_run(phigen, tmp_path):
     result = phigen("run", spec, "-t", "numpy")
     assert "error: chain: no step can be made with k = 1.0" in result.stderr
     assert (result.exit_code, "internal error" in result.stderr) == (7, False)
+
+
+def test_check_does_not_compute_starts_that_fill_the_memory(phigen, lattice):
+    spec = lattice("toda")
+    spec.write_text(spec.read_text(encoding="utf-8").replace("sizes: [4]", "sizes: [2000000000]"), encoding="utf-8")
+    result = phigen("check", spec)
+    assert result.exit_code == 0, result.stderr
+    assert "the start of the run waves is not examined: more than 1000000 sites" in result.stderr

@@ -139,7 +139,7 @@ def test_compilation_time_is_bounded(tmp_path, compiler):
     began = time.monotonic()
     with pytest.raises(ToolchainError, match=r"within 0\.2 s"):
         toolchain.compile_library([tmp_path / "a.c"], tmp_path / "a.so", slow, timeout=0.2)
-    assert time.monotonic() - began < 25  # not the 30 s that the compiler takes
+    assert time.monotonic() - began < 10  # not the 30 s that the compiler takes
 
 
 def test_a_library_that_was_there_does_not_stand_for_the_one_that_was_not_made(tmp_path, compiler):

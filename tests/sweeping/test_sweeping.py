@@ -449,6 +449,23 @@ def test_only_what_determines_results_makes_another_sweep(cluster, tmp_path):
     (tmp_path / "m.csv").write_text("I2\n2.0\n2.6\n")
     with pytest.raises(FileError, match=r"holds another sweep: other values in the file of members\n"):
         sweep(BODY, over={"file": "m.csv"})
+    setting["output"] = tmp_path / "refused.zarr"
+    (tmp_path / "m.csv").write_text("I2\n2.0\nnan\n")
+    assert [(sweep(BODY, over={"file": "m.csv"}).status != 0).values.tolist() for _ in range(2)] == [[False, True]] * 2
+    with pytest.raises(FileError, match=r"holds another sweep: parameter I1 1.0, not 1.5\n"):
+        sweep(BODY.replace("I1: 1", "I1: 1.5", 1), over={"file": "m.csv"})
+
+
+def test_other_contents_of_a_data_file_make_another_sweep(cluster, tmp_path):
+    setting = {"output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
+    for name in ("s", "renamed"):
+        (tmp_path / f"{name}.yaml").write_text(SPRINGS.replace('"i"', "w.npy"))
+    np.save(tmp_path / "w.npy", np.arange(4.0))
+    for name in ("s", "renamed"):
+        phigen.sweep(tmp_path / f"{name}.yaml", over={"k": [1.0]}, **setting)
+    np.save(tmp_path / "w.npy", 2 * np.arange(4.0))
+    with pytest.raises(FileError, match=r"holds another sweep: other data file w\.npy\n"):
+        phigen.sweep(tmp_path / "s.yaml", over={"k": [1.0]}, **setting)
 
 
 def test_the_target_of_a_sweep_is_that_of_the_spec_unless_another_is_requested(cluster, tmp_path, monkeypatch):
@@ -481,8 +498,9 @@ def test_a_target_that_is_unknown_or_unavailable_is_refused_at_its_place(tmp_pat
 
     monkeypatch.setattr(sweeping, "workers_of", none)
     (tmp_path / "s.yaml").write_text(text % "cuda")
-    with pytest.raises(MissingPackageError, match=r"s\.yaml:10:43: target cuda needs CuPy\n  hint: .* by -t"):
-        phigen.sweep(tmp_path / "s.yaml")
+    for workers in (None, 2):
+        with pytest.raises(MissingPackageError, match=r"s\.yaml:10:43: target cuda needs CuPy\n  hint: .* by -t"):
+            phigen.sweep(tmp_path / "s.yaml", workers=workers)
     with pytest.raises(MissingPackageError, match=r"^target cuda needs CuPy$"):
         phigen.sweep(tmp_path / "s.yaml", target="cuda")
 
@@ -499,8 +517,8 @@ def test_numbers_common_to_all_members_are_passed_once(spec, varied):
         passed.append(members)
         return members.x0
 
-    monkeypatched = SimpleNamespace(interface=solver.interface, backend=SimpleNamespace(ensemble=ensemble))
-    chunk._measured(SimpleNamespace(plan=plan), monkeypatched, {n: values[n] for n in ("x1", *varied)}, np.arange(2))
+    stub = SimpleNamespace(interface=solver.interface, backend=SimpleNamespace(ensemble=ensemble))
+    chunk._measured(SimpleNamespace(plan=plan), stub, {n: values[n] for n in ("x1", *varied)}, np.arange(2))
     (members,) = passed
     shapes = {"I1": members.parameters["I1"], "I2": members.parameters["I2"], "step": members.h, "start": members.t0}
     assert {name for name, value in shapes.items() if np.ndim(value)} == {*varied}
