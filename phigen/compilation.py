@@ -101,8 +101,8 @@ class _Compiled(ABC):
         extras = replace(extras, without=extras.without - {part}, included=extras.included | {part})
         return replace(self, program=replace(program, extras=extras))
 
-    def with_stack(self, stack: StackBound) -> Self:
-        """Return the compilation whose C states a measured bound of its stack."""
+    def with_stack(self, stack: StackBound | None) -> Self:
+        """Return the compilation whose C states a measured bound of its stack, or none."""
         return replace(self, program=replace(self.program, stack=stack))
 
     @property

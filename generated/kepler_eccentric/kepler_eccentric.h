@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cff74cbb365ab0ce6519c4cb247dbadcaea4703dd3ea75bcd6b92b7744f29e3c
+ * body-sha256: 1c575acfe5074c0f493c790c8a651fe864e20bca091ffdbf9f6e682a706d74cb
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -36,10 +36,10 @@ const char *kepler_eccentric_status_string(kepler_eccentric_status status); /* t
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
-    double x[kepler_eccentric_DIM]; /* the state; change it only by the functions below */
+    double x[kepler_eccentric_DIM];     /* the state; change it only by the functions below */
     double carry[kepler_eccentric_DIM]; /* rounding error of x: x + carry is more accurate */
-    size_t steps; /* number of successful steps since kepler_eccentric_init */
-    size_t evaluations; /* number of steps or of their stages that were computed, for statistics */
+    size_t steps;                       /* number of successful steps since kepler_eccentric_init */
+    size_t evaluations;                 /* number of computed stages (splitting: of steps), for statistics */
     /* physical time since kepler_eccentric_init, t + t_carry; steps are equal in tau, not t */
     double t, t_carry;
     double h;                       /* size of the last step; NaN before the first step */

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6e9137e430b2917766a8fafb0b7833c0fd4dc290aa98a10b954e45fb2663f843
+ * body-sha256: ee1b2167b99e1bbb9beb4a2527cebd39504b757e2b28f72a67e52cf1339fdcf8
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -35,7 +35,7 @@ typedef struct {
     double x[pendulum_euler_DIM]; /* the state; change it only by the functions below */
     double carry[pendulum_euler_DIM]; /* rounding error of x: x + carry is more accurate */
     size_t steps; /* number of successful steps since pendulum_euler_init */
-    size_t evaluations; /* number of steps or of their stages that were computed, for statistics */
+    size_t evaluations; /* number of computed stages (splitting: of steps), for statistics */
     double t; /* time since pendulum_euler_init */
     double h; /* size of the last step; NaN before the first step */
     pendulum_euler_params params; /* the parameters, set by pendulum_euler_init; do not change them */

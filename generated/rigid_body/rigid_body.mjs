@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 94611b50ed655bb69b567c2a5385a92db6dba1de9fa09ebc321e75c1604194d4
+ * body-sha256: 618c4a02fe7bafd00c2c55e9bb66df2f04e8853b140375c3ad8d2cd9fd822d53
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -517,7 +517,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for options that are not known, such as misspelled ones, unless they are undefined. */
+/** Throw StepError for options that are not known, such as misspelled ones, unless their value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 778b388cb71b356b3368568ec2742e402299bbb64e1ca6358ada762b24f9eb8b
+ * body-sha256: e97ee2a3c2fc3bd5fb48a3c32f4e155864408e2c8b71e3c078e9e9c2dcebbd26
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -314,7 +314,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for options that are not known, such as misspelled ones, unless they are undefined. */
+/** Throw StepError for options that are not known, such as misspelled ones, unless their value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));

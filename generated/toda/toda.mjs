@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2a328dbf60dad5aa15c9c639bf82c9e9076b3ca5a7c62f80af85af89bb5f3e72
+ * body-sha256: c0c0aa25bf64807fa2ff4bf6c20c9a0556be642f577e4af91de940bc2ef5552a
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -166,7 +166,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for options that are not known, such as misspelled ones, unless they are undefined. */
+/** Throw StepError for options that are not known, such as misspelled ones, unless their value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));

@@ -25,10 +25,11 @@ def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str,
     """Return the FMU of each system by its name. Raises `SpecError` that lists all systems without one."""
     from phigen.fmu.archive import unit_of
 
-    collector, units, of_c = Collector(), {}, replace(options, single_file=False)
+    # A stack that --stack measured is that of the C alone, without the functions of FMI.
+    collector, units, of_c = Collector(), {}, replace(options, single_file=False, stack=None)
     for compilation in compilations:
         with collector.collecting():
-            changeable = compilation.including("parameters")
+            changeable = compilation.including("parameters").with_stack(None)
             units[compilation.spec.name] = unit_of(changeable, generate(changeable, "c", of_c))
     collector.finish()
     return units

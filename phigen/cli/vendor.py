@@ -121,7 +121,7 @@ def command(
     orders = _from_specs(spec_files, folder, options, entries, checking, collector)
     if not spec_files:
         orders = _from_manifest(folder, entries, collector)
-    vendored = [m for m in (_vendored_files(order, collector) for order in orders) if m]
+    vendored = [m for m in (_vendored_solver(order, collector) for order in orders) if m]
     if checking:
         problems = [p for m in vendored for p in _problems(folder, entries, m, spec_files)]
         problems += [] if spec_files else [*_extra(folder, entries), *_wrong_builds(folder, entries, build_systems)]
@@ -197,7 +197,7 @@ def _path_of_spec(folder: Path, entry: ManifestEntry) -> Path | None:
     return path if path.is_file() else None
 
 
-def _vendored_files(order: VendorRequest, collector: Collector) -> VendoredSolver | None:
+def _vendored_solver(order: VendorRequest, collector: Collector) -> VendoredSolver | None:
     options = order.options
     with collector.collecting():
         compilation = options.compiled(order.spec)
@@ -240,7 +240,7 @@ def _write(
     listing = Change(folder / manifest.FILE, read(folder / manifest.FILE), text)
     apply([*(c for _, changes in planned for c in changes), *build_changes, listing])
     for m, changes in planned:
-        console.note(_print_changes(folder, m, changes))
+        console.note(_changes_sentence(folder, m, changes))
     for change in build_changes:
         if change.state != "unchanged":
             console.note(f"{folder}: wrote {change.path.name}")
@@ -256,7 +256,7 @@ def _obstacle(change: Change, entry: ManifestEntry | None) -> str:
     return f"{change.path} was edited by hand after phigen generated it" if edited else ""
 
 
-def _print_changes(folder: Path, vendored: VendoredSolver, changes: Sequence[Change]) -> str:
+def _changes_sentence(folder: Path, vendored: VendoredSolver, changes: Sequence[Change]) -> str:
     written_files = [c.path.name for c in changes if c.state in ("missing", "different")]
     removed = [c.path.name for c in changes if c.state == "stale"]
     sentences = [f"wrote {', '.join(written_files)}"] if written_files else []

@@ -25,11 +25,14 @@ _TIMEOUT = 300.0  # seconds
 
 @dataclass(frozen=True)
 class CallGraph:
-    """Functions of a solver: bytes of stack and the functions called by each; those of libraries have no bytes."""
+    """Functions of a solver: bytes of stack and the functions called by each; those of libraries have no bytes.
+
+    ``kinds`` are those of gcc: ``static``; ``dynamic,bounded``, where the bytes are an upper bound; and ``dynamic``.
+    """
 
     stack: Mapping[str, int]
     calls: Mapping[str, set[str]]
-    kinds: set[str]
+    kinds: Mapping[str, str]
 
     def deepest(self, function: str, above: tuple[str, ...] = ()) -> int:
         """Return the bytes of stack of a call of a function, without those of libraries.
@@ -54,8 +57,8 @@ def stack_bound(files: Mapping[str, str], name: str, flags: str) -> StackBound:
     """
     words = tuple(shlex.split(flags))
     graph = call_graph(files, name, words)
-    if graph.kinds != {"static"}:
-        raise ToolchainError(f"{name}: the stack of a function depends on its arguments ({', '.join(graph.kinds)})")
+    if unbounded := sorted(function for function, kind in graph.kinds.items() if kind == "dynamic"):
+        raise ToolchainError(f"{name}: the stack of {', '.join(unbounded)} depends on arguments, without a bound")
     by_pointer = sorted(f for f in graph.external if f.startswith(_BY_POINTER))
     if by_pointer:
         raise ToolchainError(f"{name}: {', '.join(by_pointer)} calls functions that the graph of calls does not show")
@@ -78,11 +81,10 @@ def call_graph(files: Mapping[str, str], name: str, flags: Sequence[str]) -> Cal
         if not graphs:
             raise ToolchainError(f"{command[0]} does not report the stack of functions\n  hint: use {_HINT}")
         text = graphs[0].read_text(encoding="utf-8")
-    stack, kinds, calls = dict[str, int](), set[str](), dict[str, set[str]]()
-    for title, size, kind in _NODE.findall(text):
-        if size:
-            stack[_plain(title)] = int(size)
-            kinds.add(kind)
+    sizes = {_plain(title): (int(size), kind) for title, size, kind in _NODE.findall(text) if size}
+    stack = {function: size for function, (size, _) in sizes.items()}
+    kinds = {function: kind for function, (_, kind) in sizes.items()}
+    calls: dict[str, set[str]] = {}
     for caller, callee in _EDGE.findall(text):
         calls.setdefault(_plain(caller), set()).add(_plain(callee))
     return CallGraph(stack, calls, kinds)

@@ -68,7 +68,7 @@ STATE = (
     StateBlock(
         "evaluations",
         "!IMPLICIT && !GAUSS",
-        ("size_t evaluations;    /* number of steps or of their stages that were computed, for statistics */",),
+        ("size_t evaluations;    /* number of computed stages (splitting: of steps), for statistics */",),
     ),
     StateBlock(
         "t",

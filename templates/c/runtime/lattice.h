@@ -34,6 +34,10 @@ phi_status phi_passed(phi_solver *s, double h, size_t steps);
 #if PHI_SERIES || PHI_NOISE
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and s->steps counts
    the successful ones. OpenMP updates rows in parallel, with the same bits for any number of threads. */
+#elif PHI_CORRECTED
+/* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and s->steps counts
+   the successful ones. Each call begins and ends with the flows of the corrector. OpenMP updates rows in parallel, with
+   the same bits for any number of threads. */
 #else
 /* Make one step, or many, of size h, which may be negative. If one fails, the state is that before it, and s->steps counts
    the successful ones. The last flow of a step is merged with the first of the next step or call. OpenMP updates rows in
