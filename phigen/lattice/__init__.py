@@ -1,1 +1,1 @@
-"""Systems of many identical sites: one cell and its relations, from which code of constant length is made."""
+"""Systems of many identical sites, described by one cell: fields, brackets, energies and the generated step."""

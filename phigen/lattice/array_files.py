@@ -1,6 +1,7 @@
 """Arrays and bonds of lattices in files: ``.npy`` arrays, and ``.csv`` tables with or without a line of names.
 
-A file is used whole or refused: `ValueError`, with the line where there is one, or `OSError`.
+A file that does not fit is refused as a whole: `ValueError`, with the line number where one applies. `OSError` is
+raised if the file cannot be read.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from phigen.spec.problems import counted, did_you_mean, one_of, shown
 
 Floats = NDArray[np.float64]
 
-#: Names of the columns of bonds that hold their ends.
+#: Column names for the two sites that a bond connects.
 ENDS = ("a", "b")
 
 

@@ -36,17 +36,16 @@ def common_powers(values: Sequence[Expression], names: Iterable[str]) -> dict[st
 
 
 def powers(exponents: Mapping[str, int]) -> Expression:
-    """Return the product of powers of symbols."""
+    """Return the product of the symbols raised to these ``exponents``."""
     return product(power(symbol(name), k) for name, k in exponents.items())
 
 
 @dataclass(frozen=True)
 class SumFactors:
-    """Powers of parameters at sites that may be 0, by which all forces of bonds or pairs on one field are
-    multiplied.
+    """Common factors of the forces of bonds or pairs on one field: powers of parameters at sites that may be 0.
 
-    They are left out of the sums over bonds and pairs: ``at_site`` is their product, and ``at_end`` has their
-    exponents by the symbols ``m[a]``.
+    The sums over bonds and pairs are computed without these factors, and multiplied by ``at_site`` afterwards.
+    ``at_end`` has the exponents of the factors by the symbols ``m[a]``.
     """
 
     at_site: Expression = ONE
@@ -54,7 +53,10 @@ class SumFactors:
 
 
 def sum_factors(cell: Cell, name: str) -> SumFactors:
-    """Return the powers that are taken out of the sums in the force on a field; none if brackets run along bonds."""
+    """Return the powers that all terms of the sums in the force on a field have in common.
+
+    There are none on a grid, with brackets along bonds, or if no parameter may be 0.
+    """
     if not cell.vanishing or cell.bond_bracket or cell.relation == GRID:
         return SumFactors()
     density = cell.bond_hamiltonian + cell.pair_hamiltonian

@@ -25,12 +25,14 @@ PERIODIC, OPEN = "periodic", "open"
 class Cell:
     """A lattice, defined by one cell.
 
-    ``axes`` name the directions of a grid, the slowest first; ``boundary`` is `PERIODIC` or `OPEN` along each. Graphs
-    and pairs have neither. ``bracket`` maps (f, g at some offset), as symbols, to {f, g}: all brackets that are not 0,
-    in both orders. ``hamiltonian`` is the density of a site, ``bond_hamiltonian`` that of a bond from a to b, and
-    ``pair_hamiltonian`` that of a pair; ``bond_bracket`` maps ("f[a]", "g[b]") and ("g[b]", "f[a]") to their bracket
-    along a bond. H is the sum of the densities, without the `terms` that reach beyond an open end.
-    ``casimirs`` maps names to a density and ``sites`` (one Casimir for each site), ``sum`` or ``product``;
+    ``axes`` name the directions of a grid, the slowest first; ``boundary`` is `PERIODIC` or `OPEN` for each axis.
+    Graphs and pairs have neither. ``bracket`` maps a pair of symbols, f at the site and g at some offset, to {f, g}; it
+    has all nonzero brackets, in both orders. ``bond_bracket`` maps ("f[a]", "g[b]") and ("g[b]", "f[a]") to their
+    bracket along a bond. ``hamiltonian`` is the density of a site, ``bond_hamiltonian`` that of a bond from a to b, and
+    ``pair_hamiltonian`` that of a pair. H is the sum of the densities, without the `terms` that reach beyond an open
+    end.
+
+    ``casimirs`` maps names to a density and its kind: ``sites`` (one Casimir for each site), ``sum`` or ``product``.
     ``invariants`` are sums over sites. ``time`` is the symbol of t, which H and the invariants may contain, or "".
     ``forces`` and the sources of ``noise`` act at a site, with independent noise at each site. ``observables`` are
     fields, or densities that ``reductions`` turn into numbers. ``derived`` are values at sites that a solver computes
@@ -99,7 +101,7 @@ class Cell:
         return self.neighbours.place(name)
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
-        """Return all symbols of the expressions that have a value at every site, with their places."""
+        """Return the places of those symbols of the expressions that have a value at every site, by symbol."""
         return self.neighbours.places(*expressions)
 
     def shifted(self, expression: Expression, offset: Offset) -> Expression:
@@ -107,18 +109,20 @@ class Cell:
         return self.neighbours.shifted([expression], offset)[0]
 
     def on(self, expression: Expression, end: str) -> Expression:
-        """Return the density of a site at one end of a bond or a pair."""
+        """Return an expression of one site, written for the site at an ``end`` of a bond or a pair: x becomes ``x[a]``
+        or ``x[b]``."""
         return self.neighbours.on(expression, end)
 
     # --- the density of H
 
     @cached_property
     def terms(self) -> tuple[Expression, ...]:
-        """The additive terms of the density of a site, as they are written; an open end removes single terms."""
+        """The additive terms of the density of a site; a term that reaches beyond an open end is left out there."""
         return tuple(self.additive_terms(self.hamiltonian))
 
     def additive_terms(self, density: Expression) -> Iterator[Expression]:
-        """Yield the terms of a sum; a common factor with one value at all sites is multiplied into each of them."""
+        """Yield the additive terms of a density. A common factor that is the same at all sites is multiplied into each
+        term."""
         yield from self._terms(density, ())
 
     def _terms(self, density: Expression, factors: tuple[Expression, ...]) -> Iterator[Expression]:
@@ -138,13 +142,17 @@ class Cell:
             yield density
 
     def extent(self, expression: Expression) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return, for each axis, the smallest and the largest offset among 0 and the symbols of a term."""
+        """Return the smallest offsets along the axes, then the largest, over the site itself and all symbols of a
+        term."""
         offsets = [steps(self.origin), *(steps(o) for _, o in self.places(expression).values())]
         return tuple(map(min, zip(*offsets, strict=True))), tuple(map(max, zip(*offsets, strict=True)))
 
     @cached_property
     def poisson_reach(self) -> tuple[int, ...]:
-        """Largest offset along each axis in the brackets: of their second field, and of the symbols of their values."""
+        """Largest offset along each axis in the brackets.
+
+        The offsets are those of the second fields of the brackets, and of the symbols in their values.
+        """
         second_fields = [symbol(other) for _, other in self.bracket]
         return self._reach([*second_fields, *self.bracket.values()])
 
@@ -212,7 +220,8 @@ def forces(cell: Cell) -> dict[str, Expression]:
 
 
 def bond_forces(cell: Cell) -> dict[str, Expression]:
-    """Return the nonzero derivatives of the density of a bond, or a pair, by ``f[a]`` and ``f[b]`` for all f."""
+    """Return the nonzero derivatives of the density of a bond or a pair with respect to ``f[a]`` and ``f[b]``, by
+    symbol."""
     density = cell.bond_hamiltonian + cell.pair_hamiltonian
     names = [cell.at(f, (end,)) for end in ENDS for f in cell.fields]
     return {n: slope for n, slope in zip(names, gradient(density, names), strict=True) if not slope.is_zero}
@@ -232,7 +241,7 @@ def vector_field(cell: Cell) -> dict[str, Expression]:
 
 
 def _tangent(cell: Cell, covector: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return π of a covector field, at a site, from the covector at the same site."""
+    """Return πp at a site of a grid, by field, for a covector p that is given at the same site."""
     rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         base, offset = cell.place(other)

@@ -1,4 +1,4 @@
-"""From a spec with ``lattice:`` to its `Cell`."""
+"""Construction of the `Cell` of a spec with ``lattice:``, with all checks on the spec."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from phigen.symbolic.neighbours import Neighbours, minus
 
 @dataclass(frozen=True)
 class Misfit:
-    """A size of a run that is not a multiple of the colour period; ``fitting`` is a multiple near it."""
+    """A size of a run that is not a multiple of the period of the colouring; ``fitting`` is a multiple near it."""
 
     run: str
     axis: str
@@ -28,7 +28,7 @@ class Misfit:
 
 
 class MisfitError(SpecError):
-    """Sizes of runs that are not multiples of the colour periods; ``reason`` says so in one line."""
+    """Sizes of runs that are not multiples of the periods of the colouring; ``reason`` says so in one line."""
 
     def __init__(self, diagnostics: list[Diagnostic], reason: str = "") -> None:
         super().__init__(diagnostics)
@@ -38,7 +38,7 @@ class MisfitError(SpecError):
 def cell_from_spec(spec: Spec) -> Cell:
     """Return the cell of a spec.
 
-    Raises `SpecError` where a form of π does not fit, or a run is too small for the stencil.
+    Raises `SpecError` if a form of π is not possible on this lattice, or a run is smaller than the stencil.
     """
     lattice = spec.lattice
     if lattice is None:
@@ -114,14 +114,15 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
 
 
 def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
-    """Return one line on all sizes that do not fit, for a splitting with this number of ``colours``; else ""."""
+    """Return one line on all sizes that do not fit, for a splitting with this number of ``colours``; "" if all fit."""
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     requirement = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"
     return f"{' and '.join(distinct)}, {requirement}" if wrong_sizes else ""
 
 
 def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
-    """Return one line on all sizes that do not fit, where a boundary seam makes the splitting possible."""
+    """Return one line on the sizes that are no multiples of the period, for a splitting that treats them by a boundary
+    seam."""
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would do without"
 
@@ -170,7 +171,7 @@ def _noise_beyond(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
 
 
 def _too_small(spec: Spec, cell: Cell, run: Run) -> Iterator[Diagnostic]:
-    """Yield an error for each size of a run that the stencil does not fit in."""
+    """Yield an error for each size of a run that is smaller than the stencil."""
     sizes = run.lattice.sizes if run.lattice else ()
     for axis, size, least in zip(cell.axes, sizes, least_sizes(cell), strict=False):
         if size < least:

@@ -1,7 +1,7 @@
-"""Kick parts of lattices: which of two parts has a modified potential; see `phigen.splitting.kicks`.
+"""Search for a kick part V among two parts of H of a lattice, and its modified potential V + κ{V, {V, T}}.
 
-The bracket of two sums over sites is a sum over sites, {F, G} = Σ_s Σ ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d). The range of
-its density is at most that of F and G together.
+See `phigen.splitting.kicks`. The bracket of two sums over sites is a sum over sites, {F, G} = Σ_s Σ ∂F/∂f(s) {f, g}(s)
+∂G/∂g(s + d). The range of its density is at most the sum of the ranges of F and G.
 """
 
 from __future__ import annotations
@@ -18,7 +18,11 @@ from phigen.symbolic.tower import Tower
 
 
 def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
-    """Return the parts that can be V, proved by degrees; none unless there are two parts without colours."""
+    """Return the parts of H that can be the V of a Nyström method: {V, {V, {V, T}}} = 0 is proved by degrees.
+
+    Only a splitting into two parts without colours has such parts. On a grid the flow of the modified potential is
+    added.
+    """
     coloured = splitting.colouring.count > 1 or any(flow.by_colour for flow in splitting.flows)
     if len(splitting.flows) != 2 or coloured or cell.bond_bracket:
         return ()
@@ -31,7 +35,7 @@ def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
 
 
 def _graded(cell: Cell, v: CellFlow, t: CellFlow) -> bool:
-    """Whether {V, {V, {V, T}}} = 0 follows from degrees."""
+    """Whether {V, {V, {V, T}}} = 0 follows from the polynomial degrees of T and of the brackets."""
     potential_fields = {f for s, _ in v.summands for f in _fields(cell, s.expression)}
     while True:
         entries = [e for (f, _), e in cell.bracket.items() if f in potential_fields]
@@ -71,7 +75,7 @@ def _modified(cell: Cell, splitting: CellSplitting, v: CellFlow, t: CellFlow) ->
 
 
 def _bracket(cell: Cell, left: Sequence[Summand], right: Sequence[Summand]) -> Iterator[Summand]:
-    """Yield {Σ left, Σ right} term by term."""
+    """Yield the terms of {Σ left, Σ right}."""
     slopes = {f: list(_slopes(cell, left, f)) for f in cell.fields}
     right_slopes = {f: list(_slopes(cell, right, f)) for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
@@ -85,7 +89,7 @@ def _bracket(cell: Cell, left: Sequence[Summand], right: Sequence[Summand]) -> I
 
 
 def _slopes(cell: Cell, summands: Sequence[Summand], field: str) -> Iterator[Summand]:
-    """Yield the derivatives by a field at a site, of all terms that mention it."""
+    """Yield the derivatives of a sum over sites with respect to a field at one site, term by term."""
     for s in summands:
         places = {n: o for n, (f, o) in cell.places(s.expression).items() if f == field}
         for slope, offset in zip(gradient(s.expression, list(places)), places.values(), strict=True):

@@ -25,7 +25,7 @@ from phigen.symbolic.neighbours import ENDS
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.symbols import GATHERED, Symbol
 
-#: The variation of the time of a flow, as a symbol.
+#: Symbol of the variation of the duration of a flow, in tangent kernels.
 LATE = Symbol("late")
 
 
@@ -53,7 +53,10 @@ def expect_applicable(cell: Cell, spec: Spec) -> None:
 
 
 def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
-    """Return the number of the part B. Raises `SpecError` unless there are two parts, one of them negative."""
+    """Return the index of the part B. Raises `SpecError` unless there are two parts, one of them negative.
+
+    The sign is decided for all states or, if that fails, at the initial states of all runs.
+    """
     if len(flows) != 2:
         message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
         raise SpecError(
@@ -80,7 +83,7 @@ def _positive(cell: Cell, e: Expression) -> set[str]:
 
 def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
     """Return the energy of a part at the start of a run."""
-    import numpy as np  # which takes as long to import as a small system takes to compile
+    import numpy as np  # numpy is imported here: its import takes as long as the compilation of a small system
 
     from phigen.lattice.states import start_of
     from phigen.symbolic.arrays import evaluate
@@ -120,11 +123,14 @@ def rates_of(
 
 
 def fact(flows: Sequence[CellFlow], negative: int) -> str:
-    """Return the line of the header."""
+    """Return the line about the monitor in the header of generated files."""
     return fact_of(f"the sum of {shortened(flows[negative].hamiltonian)}")
 
 
 def delayed(increments: Sequence[Expression], slopes: Sequence[Expression]) -> list[Expression]:
-    """Return the variations of the increments of a flow, with a variation `LATE` of the time of the flow."""
+    """Return the variations of the increments of a flow whose duration varies by `LATE`.
+
+    ``slopes`` are the variations at fixed duration.
+    """
     rates = (gradient(e, [TIME])[0] for e in increments)
     return [slope + rate * symbol(LATE) for slope, rate in zip(slopes, rates, strict=True)]

@@ -1,9 +1,9 @@
-"""Bi-realisations on a lattice: α and β at a site depend on covectors p on its neighbourhood.
+"""Bi-realisations on a lattice: α and β at a site depend on covectors p in its neighbourhood.
 
-Where π is local, so are α and β: any bi-realisation in closed form of the system of one site serves. Where π couples
-neighbours, it must be constant in coordinates φ(f) of each field f, with φ(f) = f or log f. With p' the covector in
-these coordinates and D = π'p', which is a stencil, α = φ⁻¹(φ − ½D) and β = φ⁻¹(φ + ½D). This covers constant π,
-log-canonical π, and the brackets of the Toda lattice.
+Where π is local, so are α and β, and any bi-realisation in closed form of the system of one site can be used. Where π
+couples neighbours, it must be constant in coordinates φ(f) of each field f, with φ(f) = f or log f. With p' the
+covector in these coordinates and D = π'p', which is a stencil, α = φ⁻¹(φ − ½D) and β = φ⁻¹(φ + ½D). This covers
+constant π, log-canonical π, and the brackets of the Toda lattice.
 """
 
 from __future__ import annotations
@@ -57,7 +57,10 @@ class CellRealisation:
 
     @cached_property
     def middle(self) -> dict[str, Expression]:
-        """y of α(y, p) = x at a site, from x there (`initial`); an explicit formula where α is affine in y."""
+        """The solution y of α(y, p) = x at a site, by field, with the symbols `initial` for x at this site.
+
+        The formula is explicit where α is affine in y.
+        """
         fields, values = list(self.displacement), list(self.displacement.values())
         slopes = [gradient(e, fields) for e in values]
         start = [symbol(initial(f)) for f in fields]

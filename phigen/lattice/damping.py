@@ -1,8 +1,8 @@
-"""Flows of damping at sites, as parts of the splitting of a lattice: λππb with b = ∇H.
+"""Flows of damping at sites, as parts of the splitting of a lattice: ẋ = λππb with b = ∇H.
 
 b depends on neighbours, which are damped too. The terms of b that do not depend on the site itself have a flow while
-the neighbours stand still, so they are applied colour by colour: no two sites of one colour are neighbours. The
-other terms of b depend on the site alone, and have flows at all sites.
+the neighbours stand still. This flow is applied colour by colour: no two sites of one colour are neighbours. The other
+terms of b depend on the site alone; their flow is applied to all sites.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _HINT = "that of a spin has one where H is linear or quadratic along an axis in 
 def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
     """Return the flows of damping.
 
-    Raises `SpecError` with the reason where there is none in closed form, `TogetherError` if the colouring is the
-    reason.
+    Raises `SpecError` with the reason if there is no flow in closed form, and its subclass `TogetherError` if another
+    colouring might have one.
     """
     try:
         return tuple(_flows(cell, colouring))
@@ -48,15 +48,15 @@ def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlo
 
 
 class TogetherError(SpecError):
-    """The colouring damps neighbours at the same time; another colouring may not."""
+    """Error of a colouring in which neighbours have one colour, so that they would be damped at the same time."""
 
 
 class _NoFlowError(Exception):
-    """There is no elementary flow; the text is the reason."""
+    """The damping has no elementary flow; the text is the reason."""
 
 
 class _TogetherError(_NoFlowError):
-    """There is none because of the colouring."""
+    """The damping has no elementary flow with this colouring; another colouring may have one."""
 
 
 def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
@@ -64,7 +64,7 @@ def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
         raise _NoFlowError("brackets couple sites" if not cell.is_local else "every site is a neighbour of all others")
     fixed_slopes, own_slopes = _slopes(cell)
     sums = _sums(cell)
-    _flow(cell, fixed_slopes, [0], sums)  # raises: without a flow here, no colouring has one
+    _flow(cell, fixed_slopes, [0], sums)  # raises the error that no colouring avoids
     for colour in _colours(cell, colouring, fixed_slopes):
         flow = _flow(cell, fixed_slopes, [colour], sums)
         if colouring.seams and colour is not None:
@@ -95,7 +95,10 @@ def _slopes(cell: Cell) -> tuple[Covector, Covector]:
 
 
 def _sums(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums over bonds in the slopes at sites of the colour; they must not depend on the site itself."""
+    """Return the sums over bonds in the slopes at sites of the colour.
+
+    Raises `_NoFlowError` if they depend on the site itself.
+    """
     sums = site_sums(cell) if cell.relation == GRAPH else ()
     for base, offset in cell.places(*(e for s in sums for e in s.values.values())).values():
         if base in cell.fields and offset == ("a",):
@@ -104,7 +107,8 @@ def _sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def _colours(cell: Cell, colouring: Colouring, fixed_slopes: Covector) -> list[int | None]:
-    """Return the colours that are damped one after the other; a single one where sites are independent."""
+    """Return the colours that are damped one after the other; one entry if sites are independent of their
+    neighbours."""
     if cell.relation == GRAPH:
         return [0]
     places = cell.places(*fixed_slopes.values(), *([cell.forces.damping] if cell.forces.damping is not None else []))
@@ -123,7 +127,7 @@ def _flow(
     sums: tuple[BondSum, ...] = (),
     weight: Expression = ONE,
 ) -> CellFlow:
-    """Return the flow of λππb for a covector b at sites of these colours, or where ``weight`` is 1."""
+    """Return the flow of λππb for a covector b at sites of these colours; ``weight`` multiplies the motion."""
     site_fields, n = SiteFields(cell), cell.fields
     fields_in_covector = {f for f, e in covector.items() if set(symbols_of(e)) & set(n)}
     b = {f: e if fields_in_covector or e.is_zero else symbol(Symbol(FORCE, f)) for f, e in covector.items()}

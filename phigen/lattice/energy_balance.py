@@ -20,15 +20,16 @@ from phigen.symbolic.expression import Expression, gradient, symbol, symbols_of,
 from phigen.symbolic.neighbours import ENDS, Offset
 from phigen.symbolic.symbols import VARIATION, Symbol, variation
 
-#: Nodes of the interpolating polynomials, and of coarser ones; the difference of the two integrals estimates the error.
+#: Numbers of nodes of the interpolating polynomials, and of the coarser ones for the error estimate: the error is
+#: estimated by the difference of the two integrals.
 FINE_NODES, COARSE_NODES = 8, 6
 
 
 class Power:
-    """The power P of states of a lattice: ``power(x, rate, parameters)``.
+    """The power P = dH/dt of states of a lattice: ``power(x, rate, parameters)``.
 
-    ``x`` and its time derivative ``rate`` have the shape (fields, *sizes). ``parameters`` are those of a solver, with
-    the bonds of a graph, and the time under its name.
+    ``x`` and its time derivative ``rate`` have the shape (fields, *sizes). ``parameters`` are the parameters of a
+    solver, with the bonds of a graph, and the time under its name.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -76,12 +77,13 @@ def _variations(term: Expression) -> Iterator[Symbol]:
 
 
 def shifted(array: Floats, offset: Offset) -> Floats:
-    """Return for each site the value at the site ``offset`` away; the grid is taken to be periodic."""
+    """Return an array with, at each site, the value of the site ``offset`` away; the grid wraps around."""
     return np.roll(array, [-int(o) for o in offset], tuple(range(array.ndim))) if offset else array
 
 
 def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: Sequence[int]) -> NDArray[np.bool_]:
-    """Return a mask (*sizes) of the sites at which a term with this ``extent`` reaches beyond no open end."""
+    """Return a mask (*sizes) that is true at sites where a term of this ``extent`` does not reach beyond an open
+    end."""
     mask = np.ones(tuple(sizes), dtype=bool)
     if cell.relation != GRID:
         return mask
@@ -95,18 +97,18 @@ def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: 
 
 
 def integral(values: Floats, h: float, row_positions: Floats | None = None) -> tuple[Floats, float]:
-    """Return the integrals of P from the first time to each, and an estimate of their error.
+    """Return the integrals of P from the first time to later times, and an estimate of their error.
 
-    ``values`` (steps + 1,) are taken at times ``h`` apart. The integrals end at these times or, with ``row_positions``
-    (rows,), after these numbers of steps, which may have a fraction. Beyond the last value, the polynomial through
-    the values before it is integrated.
+    ``values`` (steps + 1,) are P at times ``h`` apart. There is an integral for each of these times or, with
+    ``row_positions`` (rows,), for times at these numbers of steps, fractions included. Beyond the last value, the
+    polynomial through the last values is integrated.
     """
     fine, coarse = (_integrals_to(values, count, h, row_positions) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())
 
 
 def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | None) -> Floats:
-    """Return the integrals from the first time to each, by polynomials through ``count`` values."""
+    """Return the integrals from the first time to the times of `integral`, by polynomials through ``count`` values."""
     intervals = len(values) - 1
     integrals = np.append(
         0.0, h * np.cumsum(_interval_integrals(values, count, np.arange(intervals), np.ones(intervals)))
@@ -121,7 +123,8 @@ def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | 
 def _interval_integrals(values: Floats, count: int, stencil_starts: NDArray[np.int64], lengths: Floats) -> Floats:
     """Return the integral over each interval, by the polynomial through the ``count`` values around the interval.
 
-    Intervals begin at the values numbered ``stencil_starts``; ``lengths`` are in units of the distance of two values.
+    Intervals begin at the values numbered ``stencil_starts``; ``lengths`` are in units of the distance between two
+    values.
     """
     count = min(count, len(values))
     starts = np.clip(stencil_starts - (count // 2 - 1), 0, len(values) - count)

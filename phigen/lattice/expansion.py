@@ -1,6 +1,6 @@
 """The expansion of a small lattice as an ordinary spec, with a coordinate for each field of each site.
 
-The expansion defines the meaning of a cell.
+The expansion defines the meaning of a cell: both have the same equations of motion.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ Site = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Expansion:
-    """A cell at given sizes.
+    """A cell at given sizes, with all sites written out.
 
-    Graphs have their bonds; pairs and graphs have the number of sites as the one size. ``names`` maps (field or
-    parameter, site) to the coordinate or parameter of the ordinary spec, ``bond_names`` maps (parameter, number of
-    the bond). Coordinates go field by field, and within a field site by site with the last axis fastest: a state of
-    shape (fields, *sizes), flattened, is a state of the expansion.
+    Graphs have their bonds; graphs and pairs have one size, the number of sites. ``names`` maps (field or parameter,
+    site) to the coordinate or parameter of the ordinary spec; ``bond_names`` maps (parameter, index of the bond).
+    Coordinates are ordered by field, then by site with the last axis fastest: a state of shape (fields, *sizes),
+    flattened, is a state of the expansion.
     """
 
     cell: Cell
@@ -131,7 +131,7 @@ class Expansion:
         return casimirs
 
     def forces(self) -> SpecForces:
-        """Return the forces. Damping that differs from site to site becomes a covector."""
+        """Return the forces of all sites. Damping that differs from site to site becomes a covector."""
         cell_forces = self.cell.forces
         if not cell_forces:
             return cell_forces
@@ -157,7 +157,7 @@ class Expansion:
         return {(f, site): total(rates[self.names[f, site]]) for f in self.cell.fields for site in self.sites}
 
     def _terms(self, e: Expression, site: Site) -> list[Expression]:
-        """Return the terms of an expression at a site, without those that reach beyond open ends."""
+        """Return the additive terms of an expression at a site, without those that reach beyond open ends."""
         values = (self.at(term, site) for term in self.cell.additive_terms(e))
         return [value for value in values if value is not None]
 
@@ -237,7 +237,7 @@ def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()
 
 
 def ring(sites: int) -> list[tuple[int, int]]:
-    """Return the bonds of a ring and a chord: the graph of lattices whose user names none."""
+    """Return the bonds of a ring and a chord, the graph of a lattice for which the user names no graph."""
     chord = [(0, sites // 2)] if sites > 3 else []
     return [(k, (k + 1) % sites) for k in range(sites if sites > 2 else sites - 1)] + chord
 
@@ -245,7 +245,7 @@ def ring(sites: int) -> list[tuple[int, int]]:
 def run_of(expansion: Expansion, run: Run, state: Any, numbers: Mapping[str, float]) -> Run:
     """Return a run of the ordinary spec, from the state and the parameters of a run of the lattice.
 
-    It has no section and no stop: they are about observables, which the ordinary spec does not have.
+    Sections and stops are left out: they refer to observables, which the ordinary spec does not have.
     """
     return replace(
         run,
@@ -259,7 +259,7 @@ def run_of(expansion: Expansion, run: Run, state: Any, numbers: Mapping[str, flo
 
 
 def _decimal(value: float) -> Fraction:
-    """Return the shortest decimal that reads back as the double."""
+    """Return the shortest decimal that is read back as the same double."""
     return Fraction(repr(float(value)))
 
 

@@ -1,7 +1,8 @@
 """Proofs that the splitting of a lattice is correct, for all sizes at once.
 
-The parts sum to H. The coordinates of a part commute over the whole lattice, so the components of its gradient are
-constant along its flow. With constant components and fixed neighbours, the motion of a site solves its equation.
+Three kinds of statements are proved: the parts sum to H; the coordinates of a part commute over the whole lattice, so
+the components of its gradient are constant along its flow; with constant components and fixed neighbours, the motion of
+a site solves its equation.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 
 def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
-    """Yield the statements, those on flows in the order of the parts."""
+    """Yield the statements on a splitting; statements on single flows follow the order of the parts."""
     count, flows = plan.parts.colouring.count, plan.flows
     positive = tuple(p.name for p in cell.parameters if p.positive)
     parts = [number(len(colours)) * s.expression for flow in flows for s, colours in flow.summands]
@@ -61,7 +62,8 @@ def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequenc
 
 
 def motion_residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals that vanish if and only if the motion of a site is the flow of its rates."""
+    """Yield the residuals, by field, that vanish if and only if the increments of a motion solve its equation ẋ =
+    ``rates``."""
     names, increments = list(motion.solution), list(motion.solution.values())
     start = substitute(increments, {TIME: ZERO})
     speeds = derivatives(increments, TIME)

@@ -60,7 +60,8 @@ def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow,
 
 
 def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """Return the flows of πζ: one flow, one for each covector, or those of damping and of the other covectors."""
+    """Return the flows of πζ: a single flow, else a flow for each covector, else those of damping and of the other
+    covectors."""
     site_fields = SiteFields(cell, sums_by_field(cell))
     tangent = {f: site_fields.tangent(f, site_fields.push) for f in cell.fields}
     try:
@@ -91,7 +92,7 @@ def _summand_flows(
 
 
 def _tangent_of_covector(cell: Cell, site_fields: SiteFields, field: str) -> dict[str, Expression]:
-    """Return π of the one covector ζ_field, by field."""
+    """Return πζ for the covector force whose only component is that of ``field``, by field."""
     return {f: site_fields.tangent(f, lambda g, d: site_fields.push(g, d) if g == field else ZERO) for f in cell.fields}
 
 
@@ -146,7 +147,7 @@ def _of_unit_time(flow: CellFlow) -> CellFlow:
 
 
 def casimir_rate(cell: Cell, name: str) -> Expression:
-    """Return a density of dC/dt under the vector force f; πζ does not change a Casimir."""
+    """Return a density of dC/dt for a Casimir C. Only the vector force f contributes: πζ leaves C constant."""
     density, kind = cell.casimirs[name]
     vector, terms = cell.forces.vector, []
     field_places = {n: p for n, p in cell.places(density).items() if p[0] in vector}
@@ -162,7 +163,8 @@ def pushed_casimirs(cell: Cell) -> tuple[str, ...]:
 
 
 def force_statements(cell: Cell) -> Iterator[Statement]:
-    """Yield how forces change the Casimirs, and that damping dissipates energy; π is known to be skew."""
+    """Yield the statements on the Casimirs that forces change, and on the energy that damping dissipates; π is known to
+    be skew."""
     if not cell.forces:
         return
     positive = tuple(p.name for p in cell.parameters if p.positive)
@@ -176,9 +178,10 @@ def force_statements(cell: Cell) -> Iterator[Statement]:
 
 
 def noise_statements(cell: Cell) -> Iterator[Statement]:
-    """Yield whether the sources commute, and which density is stationary.
+    """Yield statements on noise: whether the sources commute, and which density is stationary.
 
-    Local noise is examined at one site, with any slope of H there; else a small periodic box, or a small graph, is.
+    Noise of a single site is examined at one site, for an arbitrary gradient of H there. Other noise is examined on a
+    small periodic box or a small graph.
     """
     if not cell.noise:
         return

@@ -1,10 +1,12 @@
 """Parts of H on a graph: forces and motions are sums over the bonds that meet at a site.
 
-The copies of a term on two bonds may not commute if the bonds share a site. Sites are then coloured, when the bonds
-are known, so that no bond connects two sites of one colour. A part of one colour is the sum of its
-terms over the bonds that begin at sites of the colour or, for some terms, end there; the flows of all colours follow
-one another. Two terms may be mirror images under the exchange of the ends, as x[a]*y[b] and y[a]*x[b] in a cross
-product. They form one part, where each term is assigned to the end that makes them commute.
+The copies of a term on two bonds may not commute if the bonds share a site. The sites are then coloured at run time,
+when the bonds are known, so that no bond connects two sites of one colour. The part of one colour is the sum of its
+terms over the bonds that begin at sites of the colour or, for some terms, end there. A step applies the flows of all
+colours one after the other.
+
+Two terms may be mirror images under the exchange of the ends, as x[a]*y[b] and y[a]*x[b] in a cross product. They form
+one part, in which each term is assigned to the end for which they commute.
 """
 
 from __future__ import annotations
@@ -32,11 +34,11 @@ from phigen.symbolic.neighbours import ENDS, Offset
 from phigen.symbolic.symbols import CHOSEN, GATHERED, Symbol, kind_of
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Sites of the coordinates of a part: all sites; sites of its colour; sites of other colours.
+#: Sets of sites that have a coordinate of a part: all sites; the sites of its colour; the sites of other colours.
 ANYWHERE, INSIDE, OUTSIDE = 0, 1, 2
-#: Classes of terms: at all sites; over bonds that begin at sites of one colour; over bonds that end there.
+#: Classes of terms: at all sites; over bonds that begin at sites of one colour; over bonds that end at them.
 WHOLE, BEGINS, ENDS_THERE = 0, 1, 2
-#: The end of a bond that lies at a site of the colour.
+#: End of a bond at the site that has the colour of the part.
 _CHOSEN_END = {BEGINS: "a", ENDS_THERE: "b"}
 
 _OTHER = {"a": "b", "b": "a"}
@@ -44,7 +46,8 @@ _OTHER = {"a": "b", "b": "a"}
 
 @dataclass
 class GraphSearch(PartSearch):
-    """The search for parts on a graph. A term belongs to `WHOLE`, `BEGINS` or `ENDS_THERE` in place of a colour."""
+    """The search for parts on a graph. The second member of a term's pair is `WHOLE`, `BEGINS` or `ENDS_THERE`, not a
+    colour."""
 
     _along_bonds: set[tuple[str, str]] = field(default_factory=set)
 
@@ -66,7 +69,8 @@ class GraphSearch(PartSearch):
         return []
 
     def _end_of(self, term: Summand) -> int:
-        """Return the end of a bond that has the colour; a term and its mirror image get different ends."""
+        """Return the class `BEGINS` or `ENDS_THERE` of a term of a bond; a term and its mirror image get different
+        classes."""
         places = self.cell.places(term.expression).values()
         fields_at = {end: sorted(f for f, o in places if o == (end,) and f in self.cell.fields) for end in ENDS}
         return ENDS_THERE if fields_at["b"] > fields_at["a"] else BEGINS
@@ -115,7 +119,7 @@ class GraphSearch(PartSearch):
 class _SiteEquation:
     """The equation of motion of a site in a part.
 
-    ``rates`` contain symbols for the ``forces``, which read the sums over bonds ``gathered``.
+    ``rates`` contain symbols for the ``forces``; the forces depend on the sums over bonds ``gathered``.
     """
 
     cell: Cell
@@ -147,7 +151,10 @@ class _SiteEquation:
         )
 
     def _bond_forces(self) -> list[BondSum]:
-        """Return the forces of bonds on this site, at the end to which the energy of a bond belongs in this part."""
+        """Return the sums of the forces that bonds exert on this site.
+
+        In a part of one colour, a bond counts at the end to which the part assigns its energy.
+        """
         sums, selection = [], {ANYWHERE: "", INSIDE: "here", OUTSIDE: "there"}[self.place]
         for end in ENDS:
             coloured_end = {ANYWHERE: None, INSIDE: end, OUTSIDE: _OTHER[end]}[self.place]
@@ -158,7 +165,7 @@ class _SiteEquation:
     def _bond_motions(self, rates: dict[str, list[Expression]]) -> list[BondSum]:
         """Return the sums of brackets along bonds, and add their contributions to ``rates``.
 
-        A rate is a sum of monomials in the fields of this site, each times a sum over the neighbours.
+        A rate is a sum of products: a monomial in the fields of this site times a sum over the neighbours.
         """
         selection = "there" if self.place == OUTSIDE else ""
         values: dict[str, dict[str, Expression]] = {"a": {}, "b": {}}
@@ -175,10 +182,10 @@ class _SiteEquation:
 
 
 def bond_rates(cell: Cell, density: Expression) -> Iterator[tuple[str, str, Expression]]:
-    """Yield the rates that brackets along a bond cause at its ends, where H is the sum of a density of sites.
+    """Yield the rates that brackets along a bond cause at its ends, where H is the sum of a ``density`` of sites.
 
-    Triples of the field, the end of the bond that has it, and the rate, in ``x[a]`` at this end and ``x[b]`` at the
-    other.
+    Each item is a field, the end of the bond that the field belongs to, and its rate, written with ``x[a]`` for this
+    end and ``x[b]`` for the other end.
     """
     slopes = dict(zip(cell.fields, gradient(density, cell.fields), strict=True))
     for (f, g), entry in cell.bond_bracket.items():
@@ -189,7 +196,7 @@ def bond_rates(cell: Cell, density: Expression) -> Iterator[tuple[str, str, Expr
 
 
 def energies(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the energy of a bond, for each of its ends, or of a pair."""
+    """Return the energy of a bond as sums at its two ends, or the energy of a pair."""
     name = Symbol(GATHERED, "energy")
     if cell.relation == PAIRS:
         return merged_ends([BondSum({name: cell.pair_hamiltonian})])
@@ -197,10 +204,10 @@ def energies(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def site_sums(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums over bonds or pairs of the forces at a site.
+    """Return the sums over bonds or pairs of the forces on a site.
 
-    Where brackets run along bonds, the sums are those of rates. Forces on fields without brackets are left out: they
-    move nothing.
+    Where brackets run along bonds, the sums are those of rates. Forces on fields without brackets are left out, since
+    they have no effect.
     """
     if cell.relation == PAIRS:
         return merged_ends([BondSum(_moving_forces(cell, cell.pair_hamiltonian, "a"))])
@@ -213,7 +220,8 @@ def site_sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def sums_by_field(cell: Cell) -> dict[str, Expression]:
-    """Return the sums, with their factors, in the force on a field or, with brackets along bonds, in its rate."""
+    """Return the sums in the force on a field, times their factors, by field; with brackets along bonds, those in its
+    rate."""
     names = {n for s in site_sums(cell) for n in s.values} if cell.relation != GRID else set()
     at_site = {f: sum_factors(cell, f).at_site for f in cell.fields if _gathered(f) in names}
     return {f: factor * symbol(_gathered(f)) for f, factor in at_site.items()}
@@ -228,7 +236,8 @@ def field_with_sums(cell: Cell) -> list[Expression]:
 
 
 def with_first_end(cell: Cell, e: Expression, end: str) -> Expression:
-    """Return an expression of a bond with ``end`` renamed to a, this site, and the other end to b."""
+    """Return an expression of a bond as seen from ``end``: symbols of this end get [a], symbols of the other end get
+    [b]."""
     if end == "a":
         return e
     places = cell.places(e)
@@ -237,7 +246,7 @@ def with_first_end(cell: Cell, e: Expression, end: str) -> Expression:
 
 
 def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
-    """Return one sum for both ends where both are proved to be equal; all sums get the same symbols."""
+    """Return the sums of both ends with the same symbols, as one sum if the two are proved to be equal."""
     names = dict.fromkeys(n for s in sums for n in s.values)
     completed = [replace(s, values={n: s.values.get(n, ZERO) for n in names}) for s in sums]
     completed = [s for s in completed if any(not e.is_zero for e in s.values.values())]
@@ -249,20 +258,22 @@ def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
 
 
 def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
-    """Return the derivatives of the density of a bond by the fields of an end, without the `sum_factors`."""
+    """Return the derivatives of the density of a bond with respect to the fields of an end, divided by the
+    `sum_factors`."""
     slopes = gradient(density, [cell.at(f, (end,)) for f in cell.fields])
     forces = {f: with_first_end(cell, e, end) for f, e in zip(cell.fields, slopes, strict=True) if not e.is_zero}
     return {_gathered(f): divided(e, sum_factors(cell, f).at_end) for f, e in forces.items()}
 
 
 def _moving_forces(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
-    """Return the forces of `_forces_at` that the vector field reads."""
+    """Return those forces of `_forces_at` that occur in the vector field."""
     read_symbols = symbols_of(*field_at_site(cell, {f: symbol(_gathered(f)) for f in cell.fields}))
     return {name: e for name, e in _forces_at(cell, density, end).items() if name in read_symbols}
 
 
 def _monomials(cell: Cell, rate: Expression) -> Iterator[tuple[Expression, Expression]]:
-    """Yield a rate as products of an expression of this site, written as at a site, and a cofactor."""
+    """Yield a rate as pairs of factors: an expression in the fields of this site, written as at a site, and a
+    cofactor."""
     ring = bracketless_ring([cell.at(f, ("a",)) for f in cell.fields], [rate])
     site_symbols = {cell.at(f, ("a",)): symbol(f) for f in cell.fields}
     for m, c in ring.terms(ring.tower.convert(rate), ring.state).items():

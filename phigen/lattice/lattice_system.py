@@ -25,7 +25,7 @@ class LatticeSystem:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Raise an `AttributeError` that says where runs are."""
+            """Raise an `AttributeError` that names the attribute of ``spec`` or of a compilation to use instead."""
             raise missing_attribute(self, name)
 
     def __repr__(self) -> str:

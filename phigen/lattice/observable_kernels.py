@@ -20,7 +20,7 @@ from phigen.spec.names import ADDITIVE
 from phigen.symbolic.expression import ONE, Expression, call, number, symbol, total
 from phigen.symbolic.symbols import GATHERED, Symbol
 
-#: The share of each of its two sites in the value of a pair.
+#: Share of a pair in the value at each of its two sites.
 _SHARE = number(Fraction(1, 2))
 
 
@@ -50,8 +50,10 @@ def observables(cell: Cell, *, single: bool = False) -> Observables:
 
 
 def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums and extremes of observables of bonds (at the site where they start) or of pairs (in both
-    orders)."""
+    """Return the sums and extremes over bonds or pairs in the observables.
+
+    A bond counts at the site where it starts; a pair counts in both orders.
+    """
     names = [name for name, reduction in cell.reductions.items() if reduction.over != "sites"]
     sums: dict[str, Expression] = {Symbol(GATHERED, name): cell.observables[name] for name in names}
     kinds = {name: cell.reductions[name].kind for name in names}
@@ -62,7 +64,7 @@ def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
 def _density(cell: Cell, name: str, *, single: bool) -> Expression:
     """Return the density of an observable at a site, with symbols for sums and extremes over bonds and pairs.
 
-    If it reaches beyond an open end, the density is a number that no extreme selects.
+    Where the density of an extreme reaches beyond an open end, its value is one that no maximum or minimum selects.
     """
     reduction = cell.reductions[name]
     if reduction.over != "sites":
@@ -84,5 +86,5 @@ def _within(cell: Cell, density: Expression) -> Expression:
 
 
 def _present(cell: Cell, term: Expression) -> Expression:
-    """Return 1 if all sites of a term are on the lattice, else 0."""
+    """Return the weight of a term: 1 if all its sites are on the lattice, else 0."""
     return present(cell, *cell.extent(term), [0] * len(cell.axes)) if cell.axes else ONE

@@ -1,4 +1,4 @@
-"""Places in a plane for the sites of a graph: distances are close to the numbers of bonds between sites."""
+"""Positions in a plane for the sites of a graph, whose distances approximate the numbers of bonds between sites."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from numpy.typing import NDArray
 
 from phigen.symbolic.arrays import Floats
 
-#: Most sites that are placed: time and memory grow with the square of their number, and 600 take some seconds.
+#: Largest number of sites that are placed: time and memory grow with its square, and 600 sites take some seconds.
 MOST_PLACED = 600
 #: Iterations of the majorisation; each decreases the stress.
 ROUNDS = 60
 
 
 def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
-    """Return places (sites, 2) in a square from 0 to 1, or None for more than `MOST_PLACED` sites.
+    """Return positions (sites, 2) in the unit square, or None for more than `MOST_PLACED` sites.
 
     The start is the classical scaling of distances along ``bonds`` (bonds, 2), by the two largest eigenvalues. Then
     follow iterations of the majorisation of the stress: J. de Leeuw, Applications of convex analysis to
-    multidimensional scaling (1977). The same bonds give the same places.
+    multidimensional scaling (1977). The same bonds give the same positions.
     """
     if sites > MOST_PLACED:
         return None
@@ -40,7 +40,10 @@ def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
 
 
 def _distances(bonds: NDArray[np.int64], sites: int) -> Floats:
-    """Return the numbers of bonds between sites (sites, sites); unconnected sites are farther apart than all others."""
+    """Return the least numbers of bonds between sites, as a matrix (sites, sites).
+
+    Unconnected sites have a distance larger than all others.
+    """
     connected = np.eye(sites, dtype=np.float32)
     for a, b in bonds:
         connected[a, b] = connected[b, a] = 1.0

@@ -1,12 +1,12 @@
 """Statements about lattices of every size at once, by translation: brackets, Jacobi identity, Casimirs, invariants.
 
-On a grid the statements are decided on the infinite lattice. A periodic box is its quotient: brackets, sums and
-telescoping densities descend to the box. At open ends the functions of the sites inside are closed under brackets, so
-the Jacobi identity and Casimirs of single sites remain true; sums are examined on a box so large that no term reaches
-both ends.
+On a grid the statements are decided on the infinite lattice. A periodic box is its quotient, so brackets, sums and
+telescoping densities carry over to the box. At open ends the functions of the sites inside are closed under brackets,
+so the Jacobi identity and Casimirs of single sites remain true; sums are examined on a box so large that no term
+reaches both ends.
 
 On a graph the statements are at most quadratic in the bonds, so they hold for every graph if they hold for all graphs
-of one or two bonds; for pairs, if they hold for one and for two sites.
+of one or two bonds. For pairs, they hold if they hold for one and for two sites.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ JACOBI = "Jacobi identity"
 
 
 def tensor(cell: Cell) -> tuple[Statement, ...]:
-    """Return that π is skew and satisfies the Jacobi identity; the latter is left out if π is not skew."""
+    """Return the statements that π is skew and satisfies the Jacobi identity; the second one only if π is skew."""
     if cell.relation != GRID:
         return _tensor_of_graphs(cell)
     skew = _decided(cell, "π is skew", _skewness(cell), "for all sizes")
@@ -57,7 +57,7 @@ def tensor(cell: Cell) -> tuple[Statement, ...]:
 
 
 def casimirs(cell: Cell) -> Iterator[Statement]:
-    """Yield π∇C = 0 for each Casimir: for the Casimirs of every site, for the sum, or for the product."""
+    """Yield the statement π∇C = 0 for each Casimir C: one for each site, a sum or a product."""
     for name, (density, kind) in cell.casimirs.items():
         title = f"{name} is a Casimir"
         domain_text = {
@@ -77,7 +77,8 @@ def casimirs(cell: Cell) -> Iterator[Statement]:
 
 
 def invariants(cell: Cell) -> Iterator[Statement]:
-    """Yield {F, H} = 0 for each further first integral F, a sum of densities: the terms of {F, H} telescope."""
+    """Yield the statement {F, H} = 0 for each further first integral F, a sum of densities: the terms of {F, H}
+    telescope."""
     for name, density in cell.invariants.items():
         title = f"{name} is invariant"
         if cell.relation != GRID:
@@ -98,7 +99,8 @@ def invariants(cell: Cell) -> Iterator[Statement]:
 
 
 def euler(cell: Cell, density: Expression) -> dict[str, Expression]:
-    """Return the discrete Euler operator: the derivatives of the sum of a density by the symbols of a site.
+    """Return the discrete Euler operator of a density: the derivatives of its sum over sites by the symbols of one
+    site.
 
     All are 0 if and only if the density is a constant plus a difference of densities of neighbouring sites.
     """
@@ -110,20 +112,20 @@ def euler(cell: Cell, density: Expression) -> dict[str, Expression]:
 
 
 def rate_of(cell: Cell, density: Expression) -> Expression:
-    """Return a density of the time derivative of the sum of a density."""
+    """Return a density whose sum over sites is the time derivative of the sum of ``density``."""
     slopes, rates = euler(cell, density), vector_field(cell)
     along_motion = total(slopes[f] * rates[f] for f in cell.fields if not (slopes[f].is_zero or rates[f].is_zero))
     return along_motion + total(gradient(density, cell.times))
 
 
 def _uniform(cell: Cell, density: Expression) -> Expression:
-    """Return a density of a state that is the same at all sites."""
+    """Return a density with all symbols of neighbours replaced by those of the site itself."""
     same_symbols = {name: symbol(base) for name, (base, _) in cell.places(density).items()}
     return substitute([density], same_symbols)[0]
 
 
 def _decided(cell: Cell, name: str, residuals: Iterable[Labelled], detail: str = "") -> Statement:
-    """Return `decide_zero` of the residuals; a positive parameter at sites is positive at every site."""
+    """Return `decide_zero` of the residuals. A positive parameter at sites counts as positive at every site."""
     residual_list, positive_parameters = list(residuals), {p.name for p in cell.parameters if p.positive}
     positive = [n for n in symbols_of(*(e for _, e in residual_list)) if n.partition("[")[0] in positive_parameters]
     return decide_zero(name, residual_list, positive, detail)
@@ -140,7 +142,7 @@ def _skewness(cell: Cell) -> Iterator[Labelled]:
 
 
 def _partners(cell: Cell) -> dict[str, list[tuple[Point, Expression]]]:
-    """Return by field the coordinates that have a bracket with the field at the origin, with the brackets."""
+    """Return, for each field, the coordinates with a nonzero bracket with this field at the origin, and the bracket."""
     partners: dict[str, list[tuple[Point, Expression]]] = {f: [] for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         g, offset = cell.place(other)
@@ -149,9 +151,10 @@ def _partners(cell: Cell) -> dict[str, list[tuple[Point, Expression]]]:
 
 
 def _jacobi(cell: Cell) -> Iterator[Labelled]:
-    """Yield the cyclic sums of the triples of coordinates with brackets, one of each class of translations.
+    """Yield the residuals of the Jacobi identity, one for each class of triples of coordinates that differ by a
+    translation.
 
-    The terms come from all ordered pairs of coordinates, so each sum is twice that of the identity.
+    All ordered pairs of coordinates contribute, so each residual is twice the cyclic sum.
     """
     partners, sums = _partners(cell), dict[tuple[Point, ...], list[Expression]]()
     for f, bracket_partners in partners.items():
@@ -171,7 +174,7 @@ def _jacobi(cell: Cell) -> Iterator[Labelled]:
 
 
 def _canonical(triple: tuple[Point, Point, Point]) -> tuple[tuple[Point, ...], int, Offset]:
-    """Return the sorted triple with its first point at the origin, the sign of the permutation, the translation."""
+    """Return the sorted triple with its first point at the origin, the sign of the permutation, and the translation."""
     order = min(permutations(range(3)), key=lambda p: [triple[k] for k in p])
     sign = 1 if order in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1
     ordered = [triple[k] for k in order]
@@ -180,7 +183,7 @@ def _canonical(triple: tuple[Point, Point, Point]) -> tuple[tuple[Point, ...], i
 
 
 def _of_site(cell: Cell, name: str, density: Expression) -> Iterator[Labelled]:
-    """Yield {C, f} for all f that have a bracket with some argument of C."""
+    """Yield {C, f} for a Casimir C of one site and all f that have a bracket with some argument of C."""
     field_places = {n: p for n, p in cell.places(density).items() if p[0] in cell.fields}
     partners, sums = _partners(cell), dict[Point, list[Expression]]()
     for (base, position), slope in zip(field_places.values(), gradient(density, list(field_places)), strict=True):
@@ -191,7 +194,7 @@ def _of_site(cell: Cell, name: str, density: Expression) -> Iterator[Labelled]:
 
 
 def _of_sum(cell: Cell, name: str, density: Expression, product: bool) -> Iterator[Labelled]:
-    """Yield {f, Σ C}, or {f, Π C}/Π C, for all f of a site."""
+    """Yield the residuals for a Casimir of the whole lattice: {f, Σ C}, or {f, Π C}/Π C, for all fields f of a site."""
     slopes = _logarithmic(cell, density) if product else euler(cell, density)
     for f, bracket_partners in _partners(cell).items():
         terms = [entry * cell.shifted(slopes[g], offset) for (g, offset), entry in bracket_partners]
@@ -220,7 +223,7 @@ def _closed(cell: Cell) -> bool:
 
 
 def _box(cell: Cell) -> tuple[int, ...]:
-    """Return sizes at which no term reaches both ends."""
+    """Return the sizes of a box in which no term reaches both ends of an axis."""
     densities = [*cell.terms, *(d for d, _ in cell.casimirs.values()), *cell.invariants.values()]
     extents = [cell.extent(t) for d in densities for t in cell.additive_terms(d)]
     widths = [max((high[k] - low[k] for low, high in extents), default=0) for k in range(len(cell.axes))]
@@ -228,7 +231,8 @@ def _box(cell: Cell) -> tuple[int, ...]:
 
 
 def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], domain_text: str = "") -> Statement:
-    """Return a statement on a box with open ends; in one dimension, on all smaller boxes as well."""
+    """Return a statement decided by ``examine`` on a box with open ends; in one dimension, on all smaller boxes as
+    well."""
     sizes = _box(cell)
     count = len(cell.fields)
     for size in sizes:
@@ -278,7 +282,7 @@ def _any(cell: Cell) -> str:
 
 
 def _representative_systems(cell: Cell) -> Iterator[tuple[str, System]]:
-    """Yield the systems that represent all graphs or numbers of sites, each with its name."""
+    """Yield the systems that represent all graphs, or all numbers of sites of pairs, each with its name."""
     graphs: Sequence[tuple[int, Sequence[tuple[int, int]]]] = [(1, ()), (2, ())]
     if cell.relation == "graph":
         graphs = [(1, ()), *((1 + max(max(b) for b in bonds), bonds) for bonds in GRAPHS)]
@@ -315,7 +319,7 @@ def _invariant_of_graphs(cell: Cell, name: str) -> Iterator[tuple[str, Statement
 
 
 def pair_symmetry(cell: Cell) -> Iterator[Statement]:
-    """Yield that the density of a pair is symmetric under exchange of its sites."""
+    """Yield the statement that the density of a pair is symmetric under exchange of its sites."""
     if not cell.pair_hamiltonian.is_zero:
         places = cell.places(cell.pair_hamiltonian)
         other = {"a": "b", "b": "a"}
@@ -325,7 +329,7 @@ def pair_symmetry(cell: Cell) -> Iterator[Statement]:
 
 
 def _worst(name: str, detail: str, statements: Iterator[tuple[str, Statement]]) -> Statement:
-    """Return one statement for several: refuted if one is, proved if all are."""
+    """Return one statement for several named ones: refuted if one of them is refuted, proved if all are proved."""
     unproved: Statement | None = None
     for graph_name, s in statements:
         if s.verdict == REFUTED:

@@ -1,8 +1,8 @@
 """Recognition of lattices among ordinary systems whose specs list the coordinates of all sites.
 
 Numbers in names are read as sites: ``x1 … x16``, ``q_0_0 … q_7_7``, ``S3_x``. The terms of H are translated to one
-site; kinds of terms that occur at every site form a density, and brackets likewise. Terms are compared by their
-values at one point, so the lattice is then expanded and proved to be the original system.
+site, and terms that occur at every site form a density; brackets are treated likewise. Terms are compared by their
+values at one point only, so the lattice is expanded afterwards and proved to be the original system.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ Terms = list[tuple[Site, Expression]]
 
 
 class _NoLatticeError(Exception):
-    """The system is no lattice, or not by these names."""
+    """The system is no lattice, or its names do not show one."""
 
 
 @dataclass(frozen=True)
 class _SiteNames:
-    """Fields and sites of coordinates, and of parameters that differ from site to site: ``sites`` by name."""
+    """Fields and sites of names: ``sites`` maps coordinates, and parameters that differ from site to site, to them."""
 
     fields: tuple[str, ...]
     sizes: tuple[int, ...]
@@ -55,9 +55,9 @@ class _SiteNames:
 
 
 def recognised_lattice(spec: Spec, least: int) -> Spec | None:
-    """Return the lattice that an ordinary spec is, if it has at least this number of sites.
+    """Return the lattice of an ordinary spec with at least ``least`` sites.
 
-    None for specs that are no lattice, and for π of the wrong shape.
+    None if the spec describes no lattice, or its π has the wrong shape.
     """
     if not any(prod(_sizes(names)) >= least for names in _readings(spec.coordinates)):
         return None
@@ -69,9 +69,9 @@ def recognised_lattice(spec: Spec, least: int) -> Spec | None:
 
 
 def recognised(spec: Spec, poisson: Matrix) -> Spec | None:
-    """Return the lattice that an ordinary spec with this π is, for any number of sites.
+    """Return the lattice of an ordinary spec with this matrix π, for any number of sites.
 
-    None if the system is no lattice, or is driven.
+    None if the system is no lattice, or has forces, noise or a time-dependent H.
     """
     if spec.time or spec.forces or spec.noise:
         return None
@@ -114,7 +114,7 @@ def _sizes(places: Mapping[str, tuple[str, Site]]) -> tuple[int, ...]:
 
 
 def _is_full(places: Mapping[str, tuple[str, Site]]) -> bool:
-    """Whether each field has each site of a box once."""
+    """Whether the sites of each field fill a box, each site once."""
     sizes = _sizes(places)
     sites = Counter(site for _, site in places.values())
     fields = {f for f, _ in places.values()}
@@ -157,7 +157,8 @@ def _lattice(
 
 
 def _names(spec: Spec, coordinates: Mapping[str, tuple[str, Site]], boundary: tuple[str, ...]) -> _SiteNames:
-    """Return the sites counted from 0, with the parameters that have numbers as the coordinates do."""
+    """Return the fields and sites of all coordinates, with sites counted from 0, and of parameters with the same
+    numbers."""
     first = tuple(min(c) for c in zip(*(s for _, s in coordinates.values()), strict=True))
     fields = tuple(dict.fromkeys(f for f, _ in coordinates.values()))
     sizes = _sizes(coordinates)
@@ -195,9 +196,9 @@ def _parameters(spec: Spec, names: _SiteNames, at_sites: set[str]) -> tuple[Para
 
 
 def _translated(e: Expression, names: _SiteNames, base: Site | None = None) -> tuple[Site, Expression]:
-    """Return a term translated to one site, and the site that it was at.
+    """Return the site that a term is assigned to, and the term translated to the origin.
 
-    That site is the corner of the smallest box that contains all symbols of the term.
+    The site is the corner of the smallest box that contains all symbols of the term.
     """
     places = {n: names.sites[n] for n in symbols_of(e) if n in names.sites}
     if base is None:
@@ -210,7 +211,7 @@ def _translated(e: Expression, names: _SiteNames, base: Site | None = None) -> t
 
 
 def _start(sites: set[int], size: int, boundary: str) -> int:
-    """Return the first site of the shortest stretch of an axis that contains the sites."""
+    """Return the first site of the shortest interval of an axis that contains all ``sites``."""
     if boundary == "open":
         return min(sites)
     ordered = sorted(sites)
@@ -232,7 +233,7 @@ def _offset(site: Site, base: Site, names: _SiteNames) -> Site:
 
 
 def _key(e: Expression, names: _SiteNames) -> float:
-    """Return a value that distinguishes the terms of one site."""
+    """Return a key for comparing terms of one site: the value of a term at a fixed point, to 9 digits."""
     for name in symbols_of(e):
         # Multiples of the golden ratio modulo 1 are all different, and evenly spread.
         names.point.setdefault(name, 0.5 + (0.6180339887498949 * (len(names.point) + 1)) % 1)
@@ -240,9 +241,9 @@ def _key(e: Expression, names: _SiteNames) -> float:
 
 
 def _orbits(terms: Iterable[tuple[Site, Expression]], names: _SiteNames) -> list[Expression]:
-    """Return the terms of a density from the terms of a sum.
+    """Return the distinct terms of a density from the terms of a sum, given with their sites.
 
-    Each kind must occur equally often at every site that has room for it.
+    Each term must occur equally often at every site at which it fits between open ends. Raises `_NoLatticeError`.
     """
     kinds: dict[float, tuple[Expression, Counter[Site]]] = {}
     for base, term in terms:
@@ -257,7 +258,7 @@ def _orbits(terms: Iterable[tuple[Site, Expression]], names: _SiteNames) -> list
 
 
 def _room(term: Expression, names: _SiteNames) -> int:
-    """Return the number of sites at which a term fits."""
+    """Return the number of sites at which a term fits between open ends."""
     offsets = [o for _, o in names.space.places(term).values()] or [(0,) * len(names.sizes)]
     wide = [max(map(int, c)) - min(0, *map(int, c)) for c in zip(*offsets, strict=True)]
     return prod(n - (w if b == "open" else 0) for n, w, b in zip(names.sizes, wide, names.boundary, strict=True))
@@ -268,7 +269,8 @@ def _density(e: Expression, names: _SiteNames) -> list[Expression]:
 
 
 def _terms(e: Expression, names: _SiteNames, factor: Expression) -> Iterator[Expression]:
-    """Yield the terms of a sum; a factor that is the same at all sites is multiplied into each."""
+    """Yield the additive terms of an expression; a factor that is the same at all sites is multiplied into each
+    term."""
     args = e.args
     if e.op in ("add", "sub"):
         yield from _terms(args[0], names, factor)
@@ -289,7 +291,7 @@ def _varies(e: Expression, names: _SiteNames) -> bool:
 def _brackets(
     spec: Spec, poisson: Matrix, names: _SiteNames
 ) -> tuple[dict[tuple[str, str], Expression], dict[tuple[str, str], Expression]]:
-    """Return the brackets of fields of one site, and of different sites in one order."""
+    """Return two maps of brackets: between fields of one site, and between fields of different sites in one order."""
     kinds: dict[tuple[str, str], dict[Site, Expression]] = {}
     for c, row in zip(spec.coordinates, poisson, strict=True):
         f, site = names.sites[c]
@@ -312,7 +314,8 @@ def _brackets(
 
 
 def _casimirs(spec: Spec, names: _SiteNames) -> tuple[dict[str, Expression], dict[str, str]]:
-    """Return the Casimirs of every site, sums and products, with their kinds; others are left out."""
+    """Return the densities and the kinds of the Casimirs that belong to sites, or are sums or products; others are left
+    out."""
     densities, kinds = dict[str, Expression](), dict[str, str]()
     by_value: dict[float, list[tuple[str, Expression]]] = {}
     used_names = {*names.space.names, *(p.name for p in spec.parameters)}
@@ -362,7 +365,7 @@ def _invariants(spec: Spec, names: _SiteNames) -> dict[str, Expression]:
 
 
 def _prove(spec: Spec, poisson: Matrix, lattice_spec: Spec, names: _SiteNames) -> None:
-    """Raise `_NoLatticeError` unless the lattice is proved to expand to the spec."""
+    """Raise `_NoLatticeError` unless the lattice is proved to expand to the ordinary spec."""
     by_site = {(f, site): n for n, (f, site) in names.sites.items()}
     expansion = Expansion(cell_from_spec(lattice_spec), names.sizes, (), by_site)
     entries = expansion.poisson()
@@ -390,5 +393,6 @@ def _run(spec: Spec, run: Run, names: _SiteNames) -> Run:
     site_arrays = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
     numbers = {n: v for n, v in run.parameters.items() if n not in names.sites}
     lattice = LatticeRunSettings(names.sizes, state, (), site_arrays)
-    none: dict[str, Any] = {"exact": {}, "section": None, "stop": None}  # of lattices they are about observables
+    # sections and stops of lattices refer to observables
+    none: dict[str, Any] = {"exact": {}, "section": None, "stop": None}
     return replace(run, initial=(), parameters=numbers, lattice=lattice, **none)

@@ -1,17 +1,17 @@
-"""Attracting bodies of a lattice in relative coordinates: Kepler motions, and a small remainder.
+"""Attracting bodies of a lattice in relative coordinates: H is a sum of Kepler motions A and a small remainder B.
 
 H is Σ m_i|v_i|²/2 − Σ γ m_i m_j/|q_i − q_j|, written in momenta m v or in velocities v. In the coordinates of
 `phigen.splitting.relative` each body but the first has a position Q_i and a velocity V_i = w_i P_i, and the first
-stands for the centre of mass. Per unit of mass all equations have a limit at m_i = 0, a body that others attract and
-that attracts none:
+coordinate is the centre of mass. Divided by m_i, all equations have a limit at m_i = 0, where the body is attracted by
+others and attracts none:
 
 - A moves Q_i and V_i along a conic section with the strength γ M_i, and the centre of mass uniformly;
-- B shifts V_i by the pull of the other bodies.
+- B changes V_i by the attraction of the other bodies.
 
-With Jacobi coordinates M_i = m_0 + … + m_i. Let a_i be the acceleration of body i by all others; that of Q_i is
-a_i − (m_0 a_0 + … + m_{i−1} a_{i−1})/M_{i−1}, and B has this without the pull of the Kepler motion, −γ M_i Q_i/|Q_i|³.
-With democratic heliocentric coordinates M_i = m_0; B has the pull of all bodies but the first, and shifts all Q_i by
-Σ m_j V_j/m_0 times the time.
+With Jacobi coordinates M_i = m_0 + … + m_i. Let a_i be the acceleration of body i by all others. The acceleration of
+Q_i is a_i − (m_0 a_0 + … + m_{i−1} a_{i−1})/M_{i−1}. B has this acceleration without that of the Kepler motion, −γ M_i
+Q_i/|Q_i|³. With democratic heliocentric coordinates M_i = m_0; B has the attraction of all bodies but the first, and
+shifts all Q_i by Σ m_j V_j/m_0 times the duration.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 #: M_i, an array over the bodies that the solver computes from the masses.
 INNER_MASS = Symbol("inner", "mass")
 
-#: The key of specs, and the name of the coordinates in which B is a function of positions.
+#: Key of specs for relative coordinates, and the name of Jacobi coordinates, in which B is a function of positions.
 KEY, JACOBI = "coordinates_from", "jacobi"
 
 _FORM = (
@@ -53,9 +53,9 @@ class _OtherFormError(Exception):
 
 @dataclass(frozen=True)
 class LatticeBodies:
-    """Attracting bodies at the sites of a cell, in relative coordinates of the name ``change``.
+    """Attracting bodies at the sites of a cell, in the relative coordinates named ``change``.
 
-    ``axes`` pairs each position with its momentum or, unless there are ``momenta``, its velocity. ``mass`` is a
+    ``axes`` pairs each position with its momentum if ``momenta`` is true, else with its velocity. ``mass`` is a
     parameter at sites, ``gravity`` the factor γ of the attraction.
     """
 
@@ -68,7 +68,7 @@ class LatticeBodies:
 
     @property
     def jacobi(self) -> bool:
-        """Whether the coordinates are those of Jacobi, else democratic heliocentric ones."""
+        """Whether the coordinates are Jacobi coordinates; otherwise they are democratic heliocentric."""
         return self.change == JACOBI
 
     @cached_property
@@ -84,18 +84,18 @@ class LatticeBodies:
 
     @property
     def pulls(self) -> BondSum:
-        """The pull of a body b on a body a along each axis, per unit of mass, with the opposite sign."""
+        """The attraction of a body a by a body b along each axis, per unit of mass, with the opposite sign."""
         slopes = gradient(self.cell.pair_hamiltonian, [self.cell.at(q, ("a",)) for q, _ in self.axes])
         inertia = {self.cell.at(self.mass, ("a",)): 1}
         names = [Symbol(GATHERED, q) for q, _ in self.axes]
         return BondSum({n: divided(e, inertia) for n, e in zip(names, slopes, strict=True)})
 
     def flows(self) -> CellSplitting:
-        """Return A and B; B is the second, and small."""
+        """Return the flows of A and B, in this order."""
         return CellSplitting((self._motions(), self._remainder()), Colouring(1, (0,) * len(self.cell.axes)))
 
     def sites(self, flows: Sequence[CellFlow]) -> RelativeSites:
-        """Return the facts for runtimes, with the flows in the order of the parts of a step."""
+        """Return the description of the bodies for runtimes; ``flows`` are in the order of the parts of a step."""
         fields = self.cell.fields
         axes = tuple((fields.index(q), fields.index(v)) for q, v in self.axes)
         remainder = next(k for k, flow in enumerate(flows) if flow.motion is None)
@@ -110,7 +110,7 @@ class LatticeBodies:
         return CellFlow(motion.hamiltonian, tuple(increments.values()), motion.manner, (moved,), (), motion=motion)
 
     def _remainder(self) -> CellFlow:
-        """Return the flow of B, whose Hamiltonian here is the energy of a pair."""
+        """Return the flow of B. Its field ``hamiltonian`` holds the energy of a pair."""
         pulls, time = self.pulls, symbol(TIME)
         q = [symbol(name) for name, _ in self.axes]
         rates = {v: -symbol(n) for (_, v), n in zip(self.axes, pulls.values, strict=True)}
@@ -144,12 +144,12 @@ def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
 
 
 def of_bodies(parts: tuple[tuple[Sweep, ...], ...], bodies: LatticeBodies) -> tuple[tuple[Sweep, ...], ...]:
-    """Return the sweeps of both parts for all bodies but the first, with the sums that shift positions."""
+    """Return the sweeps of both parts, restricted to all bodies but the first, with the sums that shift positions."""
     return tuple(tuple(_of_bodies(sweep, bodies) for sweep in part) for part in parts)
 
 
 def of_massive(partners: Partners) -> Partners:
-    """Return the energies and forces of pairs as sums over the bodies with a mass, which all contributions contain."""
+    """Return the energies and forces of pairs as sums over the bodies with a mass: massless bodies contribute 0."""
 
     def massive(gather: Gather) -> Gather:
         return replace(gather, ends=tuple(replace(e, massive=True) for e in gather.ends))
@@ -168,7 +168,7 @@ def _of_bodies(sweep: Sweep, bodies: LatticeBodies) -> Sweep:
 
 
 def _expect_supported(cell: Cell, spec: Spec) -> None:
-    """Raise `SpecError` for features that are not offered together with relative coordinates."""
+    """Raise `SpecError` for features that cannot be combined with relative coordinates."""
     refused = {
         "lattice": (cell.relation != PAIRS, "all bodies attract one another, as with lattice: {pairs: all}"),
         "monitor": (spec.monitor is not None, "Kepler motions take equal steps of the time"),
@@ -187,7 +187,7 @@ def _expect_supported(cell: Cell, spec: Spec) -> None:
 
 
 def _positions(cell: Cell) -> list[str]:
-    """Return the fields that the attraction depends on."""
+    """Return the fields that the attraction depends on, the positions."""
     places = cell.places(cell.pair_hamiltonian).values()
     positions = [f for f in cell.fields if (f, ("a",)) in places]
     if len(positions) not in (2, 3) or len(cell.fields) != 2 * len(positions):
@@ -197,7 +197,8 @@ def _positions(cell: Cell) -> list[str]:
 
 
 def _attraction(cell: Cell, positions: Sequence[str]) -> tuple[str, Expression]:
-    """Return the mass and γ, where the energy of a pair is −γ m[a] m[b]/|q_a − q_b|."""
+    """Return the name of the mass and the factor γ of the attraction; the energy of a pair is −γ m[a] m[b]/|q_a −
+    q_b|."""
     at = [[cell.at(f, (end,)) for f in positions] for end in ENDS]
     apart: dict[str, Expression] = dict.fromkeys([*at[0], *at[1]], ZERO) | {at[0][0]: ONE}
     strength = -substitute([cell.pair_hamiltonian], apart)[0]
@@ -216,7 +217,7 @@ def _attraction(cell: Cell, positions: Sequence[str]) -> tuple[str, Expression]:
 
 
 def _axes(cell: Cell, positions: Sequence[str], mass: str) -> tuple[tuple[tuple[str, str], ...], bool]:
-    """Return positions with their momenta or velocities, and whether these are momenta."""
+    """Return the pairs (position, momentum or velocity) of each axis, and whether the second ones are momenta."""
     partners: dict[str, list[tuple[str, Expression]]] = {f: [] for f in cell.fields}
     for (f, g), entry in cell.bracket.items():
         partners[f].append((g, entry))

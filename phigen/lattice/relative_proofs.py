@@ -1,6 +1,6 @@
 """Proofs on bodies in relative coordinates: the change of coordinates, the parts of H, and their flows.
 
-The statements on all bodies together are decided for two and for three bodies, with symbols for masses.
+Statements that involve all bodies are decided for two and for three bodies, with symbols for masses.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ from phigen.symbolic.expression import ZERO, Expression, gradient, power, substi
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import Statement, decide_zero
 
-#: Numbers of bodies for which statements are decided: the second and the third have different places in all sums.
+#: Numbers of bodies for which statements are decided. Bodies after the third have the same place in all sums as the
+#: third.
 COUNTS = (2, 3)
 
 Vector = list[Expression]
 
 
 def check(bodies: LatticeBodies, flows: Sequence[CellFlow]) -> Iterator[Statement]:
-    """Yield the statements, those on flows in the order of the parts."""
+    """Yield the statements on the bodies; statements on single flows follow the order of the parts."""
     few = [_FewBodies(bodies, count) for count in COUNTS]
     positive = [n for f in few for n in f.mass_names]
     detail = "for two and three bodies, with symbols for masses"
@@ -43,7 +44,7 @@ def check(bodies: LatticeBodies, flows: Sequence[CellFlow]) -> Iterator[Statemen
 
 @dataclass(frozen=True)
 class _FewBodies:
-    """A number of bodies with symbols for relative positions and velocities, those of the centre of mass first."""
+    """A number of bodies, with symbols for relative positions and velocities; body 0 stands for the centre of mass."""
 
     bodies: LatticeBodies
     count: int
@@ -60,11 +61,11 @@ class _FewBodies:
 
     @property
     def others(self) -> range:
-        """The bodies but the first."""
+        """The symbols of the masses, by body."""
         return range(1, self.count)
 
     def names(self, kind: str, body: int) -> list[Symbol]:
-        """Return the symbols of a relative position Q, or velocity V, along each axis."""
+        """Return the symbols of a relative position (``kind`` Q) or velocity (``kind`` V) of a body along each axis."""
         return [Symbol(kind, body, axis) for axis, _ in enumerate(self.bodies.axes)]
 
     def inner(self, i: int) -> Expression:
@@ -72,13 +73,13 @@ class _FewBodies:
         return total(self.masses[: i + 1]) if self.bodies.jacobi else self.masses[0]
 
     def inertia(self, i: int) -> Expression:
-        """Return 1/w_i, the mass that belongs to the relative momentum of body i."""
+        """Return 1/w_i, the reduced mass that belongs to the relative momentum of body i."""
         if not self.bodies.jacobi:
             return self.masses[i]
         return self.masses[i] * self.inner(i - 1) * power(self.inner(i), -1)
 
     def cartesian(self, kind: str) -> list[Vector]:
-        """Return the positions or velocities of all bodies."""
+        """Return the Cartesian positions or velocities of all bodies, in terms of the relative ones."""
         m, sum_of_masses = self.masses, total(self.masses)
         centre, *relative = ([symbol(n) for n in self.names(kind, i)] for i in range(self.count))
         if self.bodies.jacobi:
@@ -96,7 +97,7 @@ class _FewBodies:
         return [first, *([c + e for c, e in zip(first, of, strict=True)] for of in relative)]
 
     def product(self, positions: str, velocities: str) -> Expression:
-        """Return Σ m q·v in Cartesian coordinates, less M R·V and Σ Q·V/w in relative ones."""
+        """Return Σ m q·v in Cartesian coordinates minus M R·V + Σ Q·V/w in relative ones."""
         pairs = zip(self.masses, self.cartesian(positions), self.cartesian(velocities), strict=True)
         weights = [total(self.masses), *(self.inertia(i) for i in self.others)]
         relative = (
@@ -107,7 +108,8 @@ class _FewBodies:
         return total(m * a * b for m, q, v in pairs for a, b in zip(q, v, strict=True)) - total(relative)
 
     def canonical(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residual of Σ m q·v = M R·V + Σ Q·V/w, a bilinear form that both coordinates have to share."""
+        """Yield the residual of Σ m q·v = M R·V + Σ Q·V/w: the change of coordinates is canonical if this bilinear form
+        is kept."""
         yield f"{self.count} bodies", self.product("Q", "V")
 
     def recoil(self) -> Expression:
@@ -119,7 +121,7 @@ class _FewBodies:
         return square(moments) * power(self.masses[0], -1) / 2
 
     def sums(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals of the kinetic energy, and of the attraction by the first body."""
+        """Yield the residuals of two sums: the kinetic energy, and the attraction by the first body."""
         yield f"kinetic energy of {self.count} bodies", self.product("V", "V") / 2 - self.recoil()
         q = self.cartesian("Q")
         for i in self.others if not self.bodies.jacobi else (1,):
@@ -141,7 +143,7 @@ class _FewBodies:
         return total([*energies, *kepler]) + self.recoil()
 
     def pull(self, a: int, b: int, k: int) -> Expression:
-        """Return the pull of one body on another along an axis, as the kernel has it."""
+        """Return the attraction of body ``a`` by body ``b`` along axis ``k``, as the kernel of B computes it."""
         q, cell = self.cartesian("Q"), self.bodies.cell
         value = [*self.bodies.pulls.values.values()][k]
         places = {cell.at(self.bodies.mass, ("a",)): self.masses[a], cell.at(self.bodies.mass, ("b",)): self.masses[b]}
@@ -150,7 +152,7 @@ class _FewBodies:
         return substitute([value], places)[0]
 
     def gathered(self, i: int) -> dict[str, Expression]:
-        """Return the sums that the kernel of B reads for a body."""
+        """Return the values of the sums that the kernel of B reads for a body, by symbol."""
         axes, first = range(len(self.bodies.axes)), 0 if self.bodies.jacobi else 1
 
         def pulled(a: int, k: int) -> Expression:
@@ -166,7 +168,7 @@ class _FewBodies:
         return sums
 
     def shifts(self, flow: CellFlow) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals of the rates of relative coordinates by B."""
+        """Yield the residuals of the rates of relative coordinates under the flow of B."""
         (motion,), b = flow.motions, self.remainder()
         for i in self.others:
             values = {**self.gathered(i), INNER_MASS: self.inner(i)}

@@ -1,7 +1,8 @@
-"""The series on a lattice, S_h = hH: a stage is the implicit step of order 2 of a bi-realisation, and stages compose.
+"""Steps of a lattice by the series S_h = hH: a stage is the implicit step of order 2 of a bi-realisation; a step is a
+composition of stages.
 
-A stage solves y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then x is updated by (β − α)(y, h∇H(y)). With
-the covectors written out, both are formulas of a site and its neighbourhood, for all H and π.
+A stage solves y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then x is updated by (β − α)(y, h∇H(y)). With the
+covectors written out, both are formulas of a site and its neighbourhood, for all H and π.
 """
 
 from __future__ import annotations
@@ -37,10 +38,11 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class SeriesPlan:
-    """The bi-realisation, and the stages of order 2 that a step is composed of, as ``fractions`` of it.
+    """Plan of a step by the series: the bi-realisation, and the stages of order 2, each a fraction of the step in
+    ``fractions``.
 
-    ``middle`` is y at a site, as a formula of y at its neighbourhood and of x at the site (`initial`); ``increment``
-    is the increment of x. Both have an entry for each field, with the step of the stage as `TIME`.
+    ``middle`` is y at a site, as a formula of y in its neighbourhood and of x at the site (`initial`); ``increment`` is
+    the increment of x. Both have an entry for each field, with the step of the stage as `TIME`.
     """
 
     realisation: CellRealisation
@@ -51,7 +53,7 @@ class SeriesPlan:
     increment: Mapping[str, Expression]
     since: str = field(default="", kw_only=True)  # reason for using the series although H splits
 
-    #: The scheme, as in specs; a stage is an equation, and H has no parts.
+    #: The scheme, as in specs. A stage of this scheme solves an equation, and H is not split.
     scheme = "series"
     is_implicit, weak_order = True, 1
     flows: ClassVar[tuple[CellFlow, ...]] = ()
@@ -59,7 +61,7 @@ class SeriesPlan:
 
     @property
     def label(self) -> str:
-        """The kind of the method, for the user."""
+        """The kind of the method, for display."""
         return f"{self.kind}, on a lattice"
 
     @property
@@ -69,22 +71,22 @@ class SeriesPlan:
 
     @property
     def site_kind(self) -> str | None:
-        """The kind of the bi-realisation if it is one of a single site."""
+        """The kind of the bi-realisation if it is one of a single site, else None."""
         return self.kind if self.realisation.site else None
 
     @property
     def colouring(self) -> Colouring:
-        """All sites have one colour."""
+        """The colouring with one colour: all sites are updated together."""
         return Colouring()
 
     @property
     def by_colour(self) -> tuple[bool, ...]:
-        """No flow belongs to one colour."""
+        """Whether each flow belongs to one colour: empty, since there are no flows."""
         return ()
 
     @property
     def facts(self) -> list[str]:
-        """Lines of the header on the method."""
+        """Lines about the method in the header of generated files."""
         count = len(self.fractions)
         composed = [f"composition: {self.composition}, {count} stages of order 2"] if count > 1 else []
         step = "step: implicit, by sweeps over the sites until they change nothing"
@@ -98,7 +100,7 @@ class SeriesPlan:
         ]
 
     def acting(self, forces: SpecForces) -> str:
-        """The words of the header on forces: they are in the covector, or are applied in halves."""
+        """Words about forces in the header of generated files: forces enter the covector, or are applied in halves."""
         return "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(forces.vector)
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
@@ -106,7 +108,7 @@ class SeriesPlan:
         yield from ()
 
     def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> Equation:
-        """The kernels of a stage and, if requested, of its derivative."""
+        """Return the kernels of a stage and, if ``tangent``, those of its derivative."""
         size = len(self.middle)
         values = coefficients.hoist([*self.middle.values(), *self.increment.values()])
         relax = site_kernel(
@@ -129,7 +131,7 @@ class SeriesPlan:
         return Equation(relax, advance, slope, (side, follow))
 
     def either(self, splitting: Callable[[SplittingPlan], T], series: Callable[[SeriesPlan], T]) -> T:
-        """The result of the second function, the case of a series."""
+        """Return the result of ``series``, the function for this class of plans."""
         return series(self)
 
     def schedule(self) -> Schedule:
@@ -160,7 +162,7 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return α and β with p = h(∇H + ζ) + Σ ΔW σ∇g at all sites that they mention."""
+    """Return α and β by field, with the covectors p = h(∇H + ζ) + Σ ΔW σ∇g inserted at all sites."""
     site_fields = SiteFields(cell, sums_by_field(cell))
     covectors: dict[str, Expression] = {}
     for name in symbols_of(*maps.values()):
@@ -173,7 +175,8 @@ def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expre
 
 
 def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
-    """Return y and the increment of x, with half of the impulse hf before the motion and half after it."""
+    """Return y and the increment of x, with half of the impulse hf of the vector force before the motion and half after
+    it."""
     site_fields, one_half = SiteFields(cell), number(Fraction(1, 2))
     impulse = {f: symbol(TIME) * site_fields.impulse(f) for f in cell.fields}
     start: dict[str, Expression] = {initial(f): symbol(initial(f)) + one_half * e for f, e in impulse.items()}
@@ -182,7 +185,8 @@ def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, E
 
 
 def _stages(spec: Spec) -> tuple[Order, str, tuple[float, ...]]:
-    """Return the composition of steps of order 2 that gives the order of a spec; odd orders round up."""
+    """Return the order, the name and the stage fractions of the composition for the order of a spec; odd orders round
+    up."""
     order, composition = spec.wanted_order, spec.composition
     even_order = order + order % 2
     note = "" if even_order == order else f"order {order} was asked for; a symmetric method has even order"

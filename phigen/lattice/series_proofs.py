@@ -1,9 +1,9 @@
-"""Proofs that the series on a lattice is correct, made at each build.
+"""Proofs that the series on a lattice is correct, repeated at each build.
 
 The axioms of the bi-realisation are proved at one site where π is local, else on a periodic box. The box is so large
 that the sites of α at two neighbouring sites do not wrap around; by translation the proof holds for every larger box.
 
-The next statement is the equation of a stage: its y at a site solves α(y, p) = x for any p. With p = h∇H the
+The next statement is on the equation of a stage: its y at a site solves α(y, p) = x for any p. With p = h∇H the
 increment is hπ∇H up to O(h²), so a stage, being symmetric, has order 2.
 """
 
@@ -39,7 +39,7 @@ def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
 
 
 def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
-    """Yield the equation of a stage and its order."""
+    """Yield the statements on the equation of a stage and on its order."""
     realisation, positive = plan.realisation, tuple(p.name for p in cell.parameters if p.positive)
     alpha: dict[str, Expression] = {initial(f): symbol(f) + e for f, e in realisation.displacement.items()}
     substituted = substitute([realisation.middle[f] for f in cell.fields], alpha)
@@ -56,7 +56,7 @@ def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
 
 
 def _on_a_box(cell: Cell, realisation: CellRealisation) -> tuple[System, BiRealisation]:
-    """Return the realisation on a small periodic lattice."""
+    """Return the system of a small periodic lattice, and the bi-realisation on all its sites."""
     periodic = replace(cell, boundary=(PERIODIC,) * len(cell.axes))
     box = expand(periodic, [4 * r + 1 for r in cell.poisson_reach])
     coordinates, places = box.coordinates, [(f, site) for f in cell.fields for site in box.sites]
@@ -71,7 +71,7 @@ def _on_a_box(cell: Cell, realisation: CellRealisation) -> tuple[System, BiReali
 
 
 def _at(box: Expansion, e: Expression, site: Site) -> Expression:
-    """Return an expression in fields and covectors around a site."""
+    """Return an expression in fields and covectors around a site with the symbols of the box."""
     values: dict[str, Expression] = {}
     for name in symbols_of(e):
         covector = isinstance(name, Symbol) and name.kind == MOMENTUM

@@ -1,14 +1,14 @@
 """The Hamiltonian of a lattice as a sum of parts whose flows move each site independently.
 
-A part is a sum over sites of terms whose coordinates commute over all the lattice. Its gradient is constant along its
+A part is a sum over sites of terms whose coordinates commute over the whole lattice. Its gradient is constant along its
 flow, so each site moves by ẋ = Σ {x, a} ∂V/∂a with the values of its neighbours as constants: an equation of one site.
 Where π couples neighbours, or a term mixes coordinates that do not commute, the sites are coloured, and the terms that
-begin at sites of one colour form a part. Terms of a single site may also be parts because they have a flow.
+begin at sites of one colour form a part. Terms of a single site are also parts if they have an elementary flow.
 
 Some sizes are no multiples of the period of the colours, such as an odd ring with two colours. The colours are then
-counted from site 0 on, and the terms that begin at the last sites along an axis, the boundary *seam*, form parts
-themselves. A seam is so wide that no other term reaches both its ends. Near a seam the motion of a site depends on
-where the terms around it begin, by the weights `BEGINS`.
+counted from site 0 on, and the terms that begin at the last sites along an axis, the boundary *seam*, form additional
+parts. A seam is so wide that no other term reaches both its ends. Near a seam the motion of a site depends on where the
+terms around it begin, by the weights `BEGINS`.
 """
 
 from __future__ import annotations
@@ -39,20 +39,20 @@ from phigen.symbolic.neighbours import Offset, minus, plus, steps
 from phigen.symbolic.symbols import BEGINS, GATHERED, PRESENT, Symbol
 from phigen.symbolic.tower import Tower
 
-#: Largest number of colours: colourings to try number its power of the number of axes, and each adds flows to a step.
+#: Largest number of colours. The search tries MAX_COLOURS^axes colourings, and each colour adds flows to a step.
 MAX_COLOURS = 4
 
-#: The kind of symbols of the components of the gradient of a part.
+#: Kind of the symbols that stand for components of the gradient of a part.
 FORCE = "force"
 
 Steps = tuple[int, ...]
-#: A field, and the colour of the sites that have it.
+#: A field, and the colour of the sites at which it is taken.
 Coordinate = tuple[str, int]
 
 
 @dataclass(frozen=True)
 class Summand:
-    """A term of H: at sites, or of a ``bond`` or a pair. ``low`` and ``high`` are its extreme offsets."""
+    """A term of H: at sites, or of a bond or a pair (``bond``). ``low`` and ``high`` are its extreme offsets."""
 
     expression: Expression
     low: Steps = ()
@@ -78,7 +78,7 @@ class Colouring:
         return (colour + sum(w * o for w, o in zip(self.weights, steps(offset), strict=True))) % self.count
 
     def periods(self, boundary: Sequence[str]) -> Steps:
-        """Return the periods of the colouring along the axes; sizes are multiples of them."""
+        """Return the period of the colouring along each axis; without seams, sizes must be multiples of these."""
         if self.seams:
             return (1,) * len(boundary)
         return tuple(
@@ -88,12 +88,13 @@ class Colouring:
 
     @property
     def windows(self) -> tuple[int, ...]:
-        """Return the sets of seams that a site may lie on, as bits of the axes; 0 is no seam."""
+        """Return all sets of seams that a site may lie on, as bit masks of the axes; 0 stands for no seam."""
         axes = sum(1 << a for a, seam in enumerate(self.seams) if seam.period > 1)
         return tuple(w for w in range(axes + 1) if w & axes == w)
 
     def on_seams(self) -> set[int]:
-        """Return the colours of sites on a seam; a single seam of width 1 lacks the last colour of a period."""
+        """Return the colours that sites on a seam may have. A single seam of width 1 lacks the last colour of a
+        period."""
         seam_weights = [(s, w) for s, w in zip(self.seams, self.weights, strict=True) if w]
         if len(seam_weights) > 1 or seam_weights[0][0].wide > 1:
             return set(range(self.count))
@@ -103,19 +104,20 @@ class Colouring:
     def with_seams(self, cell: Cell) -> Colouring:
         """Return the colouring with seams so wide that terms at the two ends of a seam commute.
 
-        Values at one end that equations for coordinates at the other end read are constant along the flow too.
+        The equations for coordinates at one end may read values at the other end; these are constant along the flow
+        too.
         """
         return replace(self, seams=tuple(_seam(cell, a, p) for a, p in enumerate(self.periods(cell.boundary))))
 
 
 @dataclass(frozen=True)
 class BondSum:
-    """Sums over bonds or pairs at a site: for each symbol an expression in ``x[a]``, here, and ``x[b]``, there.
+    """Sums over the bonds or pairs of a site: for each symbol an expression in ``x[a]`` and ``x[b]``.
 
-    x[a] is x at the site itself, x[b] at the other end. ``end`` is the end of the bond, as the user lists it, at
-    which the site is: a, b, or "" for either. In a part of one colour, ``chosen`` says which of the two sites has the
-    colour: ``here``, ``there``, or "" for neither. Of the symbols in ``extremes`` the largest or the least value is
-    kept, ``max`` or ``min``, in place of the sum.
+    x[a] is x at the site itself, x[b] at its partner. ``end`` is the end of the bond, in the order in which the user
+    lists bonds, at which the site lies: a, b, or "" for either. In a part of one colour, ``chosen`` says which of the
+    two sites has the colour: ``here`` the site itself, ``there`` its partner, "" neither. For the symbols in
+    ``extremes``, the maximum (``max``) or minimum (``min``) is taken instead of the sum.
     """
 
     values: Mapping[str, Expression]
@@ -128,10 +130,10 @@ class BondSum:
 class SiteMotion:
     """The motion of the sites of one colour, or of all sites if ``colour`` is None.
 
-    ``increments`` of the fields read the site, neighbours that stand still, and, as symbols `GATHERED`, the sums over
-    bonds or pairs ``gathered``. ``solution`` has the increments with a symbol for each component of the gradient; it
-    solves ẋ = ``rates``. ``components`` has the values of these symbols where a force is not the gradient of a part.
-    ``manner`` describes the motion in words.
+    ``increments`` of the fields depend on the site, on neighbours that stand still, and on the sums over bonds or pairs
+    ``gathered``, as symbols `GATHERED`. ``solution`` has the increments with a symbol for each component of the
+    gradient; it solves ẋ = ``rates``. ``components`` has the values of these symbols where a force is not the gradient
+    of a part. ``manner`` describes the motion in words.
     """
 
     colour: int | None
@@ -146,8 +148,8 @@ class SiteMotion:
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
     """Return the seam along an axis.
 
-    A term reads sites up to ``reach`` apart, and moves sites up to ``moved`` from where it begins. The equations of
-    motion read only sites at these distances, unless brackets depend on sites that they do not couple.
+    A term reads sites up to ``reach`` apart, and moves sites up to ``moved`` from the site where it begins. The
+    equations of motion read no sites farther away, unless brackets depend on sites that they do not couple.
     """
     if period == 1:
         return Seam()
@@ -173,11 +175,11 @@ def merged_colours(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotio
 
 @dataclass(frozen=True)
 class CellFlow(Flow):
-    """The flow of a part of H over the lattice; ``motions`` may run in any order, and each over sites in any order.
+    """The flow of a part of H over the lattice. The ``motions`` may run in any order, each over the sites in any order.
 
-    ``summands`` are the terms of the part with the colours of the sites where they begin. On graphs a part of one
-    colour, ``by_colour``, stands for the parts of all colours. Where there are seams, ``beside`` is the motion of
-    sites near them, by the terms that begin on the seams of ``window``; sites on a seam have no other motion.
+    ``summands`` are the terms of the part, with the colours of the sites where they begin. On graphs a part of one
+    colour, marked ``by_colour``, stands for the parts of all colours. With seams, ``beside`` is the motion of sites
+    near them, by the terms that begin on the seams of ``window``; sites on a seam have no other motion.
     """
 
     motions: tuple[SiteMotion, ...] = ()
@@ -211,9 +213,10 @@ class NoPartError(Exception):
 def splittings(
     cell: Cell, place: Location | None = None, search: Callable[[Cell, Colouring], PartSearch] | None = None
 ) -> Iterator[CellSplitting]:
-    """Yield H as sums of parts with elementary flows, for each colouring: few colours first, then few parts.
+    """Yield H as sums of parts with elementary flows, one sum for each colouring: fewest colours first, then fewest
+    parts.
 
-    Raises `SpecError`, at ``place``, with the term that has no flow, if there is no such sum.
+    Raises `SpecError` at ``place`` if there is no such sum; the error names the term that has no flow.
     """
     search = search or PartSearch
     refused: NoPartError | None = None
@@ -246,7 +249,7 @@ def colourings(cell: Cell) -> Iterator[Colouring]:
 
 
 def summands_of(cell: Cell) -> list[Summand]:
-    """Return the terms of H as they are written; H = 0 has the term 0, so that there is a flow."""
+    """Return the additive terms of H; if H = 0, the term 0, so that there is a flow."""
     if cell.relation == GRID:
         return [Summand(term, *cell.extent(term)) for term in cell.terms or (ZERO,)]
     bonds = cell.bond_hamiltonian + cell.pair_hamiltonian
@@ -306,21 +309,21 @@ class PartSearch:
         return not any(self._coupled(f, g) for f in self._support(a) for g in self._support(b))
 
     def _coupled(self, a: Coordinate, b: Coordinate) -> bool:
-        """Whether some site of one colour has a bracket with a site of the other."""
+        """Whether a site with the colour of ``a`` has, for some offset, a bracket of field ``a`` with field ``b``."""
         return any(g == b[0] and self.colouring.at(a[1], d) == b[1] for g, d in self._couples.get(a[0], ()))
 
     def _classes(self, term: Summand) -> list[tuple[Summand, int]]:
-        """Return the term at sites of each colour, or nothing if it does not commute with itself."""
+        """Return the term with each colour, or nothing if its copies at sites of one colour do not commute."""
         classes = [(term, c) for c in range(self.colouring.count)]
         return classes if all(self._commute(c, c) for c in classes) else []
 
     def _is_single_site(self, term: Summand) -> bool:
-        """Whether the term is a function of one site, and π is local."""
+        """Whether the term is a function of the fields of one site, and π is local."""
         places = self.cell.places(term.expression).values()
         return self.cell.is_local and not term.bond and all(o == self.cell.origin for _, o in places)
 
     def _summands(self, term: Summand) -> list[Summand]:
-        """Return the term or, where it mixes coordinates that do not commute at different sites, its monomials."""
+        """Return the term; if it mixes coordinates of different sites that do not commute, return its monomials."""
         if self._classes(term) or self._is_single_site(term):
             return [term]
         names = [n for n, (f, _) in self.cell.places(term.expression).items() if f in self.cell.fields]
@@ -332,13 +335,13 @@ class PartSearch:
     # --- flows
 
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
-        """Return the flow of a sum of terms that commute; the terms ``more`` are multiplied by `KICK`."""
+        """Return the flow of a sum of commuting terms, and of the terms ``more`` multiplied by `KICK`."""
         motions = [m for m in self._motions(part, more) if m.increments]
         by_term: dict[int, tuple[Summand, list[int]]] = {}
         for summand, colour in (*part, *((replace(s, expression=symbol(KICK) * s.expression), c) for s, c in more)):
             by_term.setdefault(id(summand.expression), (summand, []))[1].append(colour)
         coloured_summands = tuple((s, tuple(c)) for s, c in by_term.values())
-        # the expression of one bond or pair determines the cost of the flow
+        # the cost of the flow is that of the expression of one bond or pair
         bond_terms = {n: e for m in motions for gathered in m.gathered for n, e in gathered.values.items()}
         increments = tuple(substitute([e for m in motions for e in m.increments.values()], bond_terms))
         hamiltonian = total(s.expression for s, _ in coloured_summands)
@@ -373,8 +376,8 @@ class PartSearch:
     ) -> Expression:
         """Return ∂V/∂field at the site ``shift`` away, of this colour, from terms at sites.
 
-        Terms have weights that vanish beyond open ends. Near a seam, without a colour, they are weighted by where
-        they begin.
+        Each term has a weight that vanishes if the term reaches beyond an open end. Near a seam (no colour), the weight
+        depends on the site where the term begins.
         """
         slopes = []
         for summand, begin in part:
@@ -396,7 +399,7 @@ class PartSearch:
     def _motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int | None
     ) -> SiteMotion:
-        """Return the motion of sites of a colour, or without a colour that of sites near seams."""
+        """Return the motion of the sites of a colour, or of sites near seams if ``colour`` is None."""
         cell = self.cell
         coordinates: set[tuple[str, int | None]] = {c for s in (*part, *more) for c in self._support(s)}
         if colour is None:
@@ -423,7 +426,7 @@ class PartSearch:
         field = {f: total(r) for f, r in rates.items() if r}
         if (
             colour is not None
-        ):  # no term reaches both ends of a seam, so neighbours that stand still elsewhere do so near a seam
+        ):  # no term reaches both ends of a seam: neighbours that are at rest elsewhere are at rest near a seam too
             self._expect_still(field, colour, part)
         return self._solved_motion(field, forces, [BondSum(gathered)] if gathered else [], colour, part)
 
@@ -435,7 +438,7 @@ class PartSearch:
         colour: int | None,
         part: Sequence[tuple[Summand, int]],
     ) -> SiteMotion:
-        """Return the motion with these ``rates``, in which symbols stand for the ``forces``."""
+        """Return the motion with these ``rates``, which contain symbols for the ``forces``."""
         if not rates:
             return SiteMotion(colour, {})
         solved_rates = self._solved(rates, part)
@@ -453,7 +456,7 @@ class PartSearch:
         return solution
 
     def _expect_still(self, rates: Mapping[str, Expression], colour: int, part: Sequence[tuple[Summand, int]]) -> None:
-        """Raise `NoPartError` if the equation of a site reads neighbours that move."""
+        """Raise `NoPartError` if the equation of a site depends on neighbours that move in the same part."""
         moving = {f for f, e in rates.items() if not e.is_zero}
         for f, o in self.cell.places(*rates.values()).values():
             if f in moving and any(o) and self._moves(f, self.colouring.at(colour, o), part):
@@ -466,7 +469,7 @@ class PartSearch:
         return any((g, self.colouring.at(colour, d)) in coordinates for g, d in self._couples.get(field, ()))
 
     def _site_flows(self, terms: Sequence[Summand]) -> list[CellFlow]:
-        """Return the flows of functions of one site."""
+        """Return the flows of terms that are functions of one site."""
         if not terms:
             return []
         cell = self.cell
@@ -503,7 +506,7 @@ class PartSearch:
 class SiteFields:
     """Covector and vector fields at sites, with weights that vanish beyond open ends.
 
-    ``gathered`` has the symbols of the sums over bonds or pairs in the slopes.
+    ``gathered`` has, by field, the symbols of the sums over bonds or pairs in the slopes.
     """
 
     def __init__(self, cell: Cell, gathered: Mapping[str, Expression] | None = None) -> None:
@@ -516,7 +519,7 @@ class SiteFields:
         return self._search.force(self._every, field, 0, shift) + self.gathered.get(field, ZERO)
 
     def push(self, field: str, shift: Offset = ()) -> Expression:
-        """Return ζ of the forces, including the damping, for a field at the site ``shift`` away."""
+        """Return the covector force ζ, including damping, for a field at the site ``shift`` away."""
         cell_forces = self.cell.forces
         covector = self._shifted(cell_forces.covector.get(field, ZERO), shift)
         if cell_forces.damping is None:
@@ -524,15 +527,16 @@ class SiteFields:
         return covector + self.damping(shift) * self.tangent(field, self.slope, shift)
 
     def damping(self, shift: Offset = ()) -> Expression:
-        """Return λ at the site ``shift`` away, 0 without damping."""
+        """Return the damping coefficient λ at the site ``shift`` away; 0 without damping."""
         return self._shifted(self.cell.forces.damping or ZERO, shift)
 
     def impulse(self, field: str) -> Expression:
-        """Return the vector force on a field."""
+        """Return the vector force f on a field."""
         return self._shifted(self.cell.forces.vector.get(field, ZERO))
 
     def noise(self, field: str, shift: Offset = ()) -> Expression:
-        """Return Σ ΔW σ ∂g/∂field at the site ``shift`` away, with the increments of that site."""
+        """Return Σ ΔW σ ∂g/∂field over the noise sources at the site ``shift`` away, with the increments ΔW of that
+        site."""
         slopes = [
             symbol(dw) * s.amplitude * gradient(s.hamiltonian, [field])[0]
             for dw, s in zip(self.cell.increments, self.cell.noise.values(), strict=True)
@@ -540,7 +544,7 @@ class SiteFields:
         return self._shifted(total(slopes), shift)
 
     def tangent(self, field: str, covector: Callable[[str, Offset], Expression], shift: Offset = ()) -> Expression:
-        """Return π of a covector field, for a field at the site ``shift`` away."""
+        """Return (πp)_field for a covector field p at the site ``shift`` away."""
         terms = []
         for (f, other), entry in self.cell.bracket.items():
             if f == field:
@@ -550,7 +554,7 @@ class SiteFields:
         return total(terms)
 
     def _shifted(self, e: Expression, shift: Offset = ()) -> Expression:
-        """Return an expression at the site ``shift`` away, without terms that reach beyond open ends."""
+        """Return an expression translated to the site ``shift`` away, without terms that reach beyond open ends."""
         cell = self.cell
         if cell.relation != GRID or e.is_zero:
             return e
@@ -576,7 +580,7 @@ def field_at_site(cell: Cell, gathered: Mapping[str, Expression]) -> tuple[Expre
 def present(cell: Cell, low: Sequence[int], high: Sequence[int], offset: Sequence[int]) -> Expression:
     """Return the weight of a term at a site: 1 if all its sites are on the lattice, else 0.
 
-    The term reaches from ``low`` to ``high``, both shifted by ``offset``.
+    The sites of the term lie between the offsets ``low`` and ``high``, both shifted by ``offset``.
     """
     reach = [
         (a + o, b + o) if boundary != PERIODIC else (0, 0)
@@ -588,12 +592,12 @@ def present(cell: Cell, low: Sequence[int], high: Sequence[int], offset: Sequenc
 
 
 def _opposite(offset: Offset) -> tuple[int, ...]:
-    """Return the opposite of an offset of a grid; () at a single site."""
+    """Return the opposite of an offset of a grid; () if the lattice has no axes."""
     return tuple(-o for o in offset if isinstance(o, int))
 
 
 def bracketless_ring(coordinates: Sequence[str], expressions: Iterable[Expression]) -> Ring:
-    """Return a ring with these coordinates, in which all other symbols are constant, and no bracket."""
+    """Return the ring of these coordinates without brackets; all other symbols are constants."""
     roots = list(expressions)
     constants = [n for n in symbols_of(*roots) if n not in coordinates and n != TIME]
     tower = Tower([*coordinates, *constants, TIME], roots, coordinates)
@@ -601,7 +605,7 @@ def bracketless_ring(coordinates: Sequence[str], expressions: Iterable[Expressio
 
 
 def site_ring(cell: Cell, expressions: Sequence[Expression], symbols: Sequence[str] = ()) -> Ring:
-    """Return the ring of one site with its bracket."""
+    """Return the ring of the fields of one site with their bracket. The other ``symbols`` are constants."""
     n = cell.fields
     brackets = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in n) for f in n)
     roots = [*expressions, *(e for row in brackets for e in row)]

@@ -1,11 +1,11 @@
-"""The transpose of a step of a lattice: kernels at a site that pull cotangents back.
+"""The transpose of a step of a lattice: kernels at a site that propagate cotangents backwards.
 
-A sweep adds to some fields of a site increments, which read values around the site. The transposed kernel takes the
-cotangents of these fields and returns, for each value that was read, the contribution to the cotangent of that value;
-targets add the contribution at the site that the value came from.
+A sweep adds increments to some fields of a site; the increments depend on values around the site. The transposed kernel
+takes the cotangents of these fields and returns, for each value that was read, its contribution to the cotangent of
+that value. Targets add the contribution at the site that the value came from.
 
-In the series a stage is y = r(x, y), x' = x + a(y). From the cotangent λ of x' follow μ = (∂r/∂y)ᵀμ + (∂a/∂y)ᵀλ and
-x̄ = λ + (∂a/∂x)ᵀλ + (∂r/∂x)ᵀμ, by the transposed kernels of r and a.
+In the series a stage is y = r(x, y), x' = x + a(y). Let λ be the cotangent of x'. Then μ = (∂r/∂y)ᵀμ + (∂a/∂y)ᵀλ is
+solved for μ, and x̄ = λ + (∂a/∂x)ᵀλ + (∂r/∂x)ᵀμ, by the transposed kernels of r and a.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.staging import TABLE, Coefficients
 from phigen.scheme.steps import BACK, Adjoint, Equation, Partners, Sweep
 
-#: Input arrays of the kernels at sites that have cotangents.
+#: Names of the input arrays of kernels at sites for which cotangents are computed.
 _DIFFERENTIATED_INPUTS = ("site", "start", "gathered", "bonds", "params")
 
 
@@ -30,7 +30,7 @@ def transposed(
     coefficients: Coefficients,
     partners: Partners | None,
 ) -> Adjoint:
-    """Return the transposes of all kernels of a step; the transpose of a kernel has its name followed by `BACK`."""
+    """Return the transposed kernels of a step; the transpose of a kernel has its name followed by `BACK`."""
     kernels: list[Kernel] = []
     for sweep in (sweep for part in swept for sweep in part):
         kernels += [sweep.kernel, *(sweep.gather.kernels if sweep.gather else ())]

@@ -25,9 +25,9 @@ Bonds = NDArray[np.int64]
 class Start:
     """The data of a run before its first step.
 
-    ``sizes`` are those of the axes; of graphs and pairs, the number of sites. ``state`` has the shape (fields,
+    ``sizes`` are the sizes of the axes or, for graphs and pairs, the number of sites. ``state`` has the shape (fields,
     *sizes). ``parameters`` are numbers, and arrays over sites or bonds. ``bonds`` has the shape (bonds, 2); ``graph``
-    says whether the lattice is a graph.
+    is true if the lattice is a graph.
     """
 
     sizes: tuple[int, ...]
@@ -51,9 +51,9 @@ def start_of(spec: Spec, run: Run) -> Start:
 
 
 def defaults_at(spec: Spec, names: Collection[str], sizes: tuple[int, ...], bonds: int) -> dict[str, Floats]:
-    """Return the defaults of parameters that are formulas, lists, files or random, at the given sizes.
+    """Return the default values of parameters that are formulas, lists, files or random, at the given sizes.
 
-    ``bonds`` is the number of bonds of a graph. Raises `SpecError`, with its place, for an array of another length.
+    ``bonds`` is the number of bonds of a graph. Raises `SpecError` at the parameter for an array of another length.
     """
     arrays = {}
     for p in spec.parameters:
@@ -94,7 +94,7 @@ class _Reader:
         return Start(sizes, self._state(sizes), parameters, bonds, bool(self.lattice.graph))
 
     def _expect_in_bound(self, p: Parameter, values: Floats) -> None:
-        """Raise `SpecError` if values at sites or bonds are outside of the declared bound of a parameter."""
+        """Raise `SpecError` if values at sites or bonds are outside the declared bounds of a parameter."""
         if values.size and p.refuses(float(np.min(values))):
             worst = np.unravel_index(np.argmin(values), values.shape)
             place, noun = ", ".join(map(str, worst)), p.at.removesuffix("s")
@@ -102,12 +102,12 @@ class _Reader:
             message = f"the parameter is {p.bound} by declaration, but {where}"
             raise self.arrays.refused(p.name, message)
         if self.spec.coordinates_from and p.at == "sites" and values.flat[0] == 0:
-            # the only parameter at sites is the mass: further terms of H are refused
+            # Only the mass can be a parameter at sites here: other terms of H are refused before.
             message = f"with coordinates_from: {self.spec.coordinates_from} the first body needs a mass, which is 0"
             raise self.arrays.refused(p.name, message)
 
     def _expect_room(self, sizes: Sequence[int]) -> None:
-        """Raise `SpecError` if the arrays over sites do not fit in memory together."""
+        """Raise `SpecError` if the arrays over sites do not fit into memory together."""
         arrays = len(self.lattice.indices) + len(self.spec.coordinates)
         arrays += sum(p.at == "sites" for p in self.spec.parameters)
         place = self.spec.diagnostic(("runs", self.run.name, "sizes"), "").location
@@ -117,7 +117,8 @@ class _Reader:
         return SpecError([self.spec.diagnostic(("runs", self.run.name, key), message, hint)])
 
     def _sites(self, bonds: Bonds) -> int:
-        """Return the number of sites where the run does not state it: the length of lists, or the sites of bonds."""
+        """Return the number of sites of a run that does not state it, from the lengths of lists or the ends of
+        bonds."""
         lengths = [len(v.listed) for v in self.lattice_run.state.values() if v.listed]
         if not lengths and not len(bonds):
             raise self._error("initial", "the number of sites is not known", "sizes: [N]")
@@ -147,9 +148,9 @@ class _Reader:
 
 
 class _Arrays:
-    """Values of a spec as arrays over the sites or bonds of a lattice of these sizes.
+    """Reader of values of a spec as arrays over the sites or bonds of a lattice of these sizes.
 
-    ``run`` is the name of the run that has the values, and ``hint`` the hint of errors.
+    ``run`` is the name of the run that the values belong to; ``hint`` is the hint of errors.
     """
 
     def __init__(self, spec: Spec, sizes: Sequence[int], run: str = "", hint: str = "") -> None:

@@ -1,4 +1,4 @@
-"""From a cell to a program: a step is a schedule of sweeps over the sites.
+"""From a cell to a program: a step of a lattice is a schedule of sweeps over the sites.
 
 Each sweep has a kernel that is evaluated at every site.
 """
@@ -69,16 +69,16 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class SplittingPlan:
-    """The parts of H of a lattice, the method, and the flows of ``noise``."""
+    """Plan of a step by splitting: the parts of H, the method, and the flows of ``noise``."""
 
     parts: CellSplitting
     choice: ScheduledMethod
     noise: tuple[CellFlow, ...] = ()
     since: str = ""  # reason for using more colours than the minimum
-    negative: int | None = None  # with a monitor, the part B of K = log(A + e) − log(−B)
+    negative: int | None = None  # with a monitor: index of the part B of K = log(A + e) − log(−B)
     bodies: LatticeBodies | None = None  # in relative coordinates
 
-    #: The scheme, as in specs, and the name of the method for the user; a step is one stage of explicit flows.
+    #: The scheme, as in specs, and the name of the method for display. A step is a sequence of explicit flows.
     scheme = kind = "splitting"
     label = "splitting of a lattice"
     is_implicit, site_kind, weak_order = False, None, 2
@@ -91,12 +91,12 @@ class SplittingPlan:
 
     @property
     def composition(self) -> str:
-        """The name of the method."""
+        """The name of the composition, such as ``Strang``."""
         return self.choice.method.name
 
     @property
     def colouring(self) -> Colouring:
-        """The colours of the sites."""
+        """The colouring of the sites."""
         return self.parts.colouring
 
     @property
@@ -106,12 +106,12 @@ class SplittingPlan:
 
     @property
     def by_colour(self) -> tuple[bool, ...]:
-        """For each flow whether it belongs to one colour of a graph; empty if none does."""
+        """Whether each flow belongs to one colour of a graph; empty if none does."""
         return tuple(flow.by_colour for flow in self.flows) if any(flow.by_colour for flow in self.flows) else ()
 
     @property
     def facts(self) -> list[str]:
-        """The lines of the header about the method."""
+        """The lines about the method in the header of generated files."""
         choice = self.choice
         count, method = len(choice.splitting.flows), choice.method
         coloured_parts = [f"H_{k}" for k, flow in enumerate(self.flows, 1) if flow.by_colour]
@@ -137,7 +137,7 @@ class SplittingPlan:
         ]
 
     def acting(self, forces: SpecForces) -> str:
-        """The words of the header on forces; forces with flows of their own need none."""
+        """The words about forces in the header of generated files; none if the forces have flows of their own."""
         return ""
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
@@ -148,10 +148,10 @@ class SplittingPlan:
             yield flow, f"F_{k}, a force" if flow.force else f"H_{k} = sum of {flow.hamiltonian}"
 
     def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> None:
-        """No equation: all flows are explicit."""
+        """Return None: a splitting solves no equation, since all flows are explicit."""
 
     def either(self, splitting: Callable[[SplittingPlan], T], series: Callable[[SeriesPlan], T]) -> T:
-        """The result of the first function, the case of a splitting."""
+        """Return the result of ``splitting``, the function for this class of plans."""
         return splitting(self)
 
     def schedule(self) -> Schedule:
@@ -167,9 +167,9 @@ LatticePlan = SplittingPlan | SeriesPlan
 
 
 def plan_sweeps(cell: Cell, spec: Spec) -> LatticePlan:
-    """Return the parts and the method; the series where the spec asks for it, or H does not split.
+    """Return the plan of a step: a splitting, or the series if the spec asks for it or H does not split.
 
-    Raises `SpecError` where neither is possible, and for features that lattices do not have.
+    Raises `SpecError` if neither is possible, and for features that lattices do not have.
     """
     _expect_supported(cell, spec)
     cell_monitor.expect_applicable(cell, spec)
@@ -203,7 +203,7 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     if coloured and noise:
         message = "scheme splitting: noise is not offered where parts are those of one colour of a graph"
         raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "scheme: series applies to it")])
-    if cell.time:  # the flows of colours follow each other in the order of the parts
+    if cell.time:  # the flows of the colours run in the order of the parts
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
     plan = SplittingPlan(parts, _with_seams(choice, parts.colouring), noise, since)
     return replace(plan, negative=cell_monitor.negative_part(cell, plan.flows, spec)) if monitored else plan
@@ -236,7 +236,7 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
 
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
-    """Yield the flows of the terms of a part that begin on seams, one for each set of seams."""
+    """Yield flows of the terms of a part that begin on seams, one flow for each set of seams."""
     colours = {colour for _, summand_colours in flow.summands for colour in summand_colours}
     if colours and colours.isdisjoint(colouring.on_seams()):
         return
@@ -277,9 +277,9 @@ def _coloured(cell: Cell, search: type[PartSearch], spec: Spec) -> tuple[CellSpl
 def _seamed(
     cell: Cell, colouring: Colouring, search: type[PartSearch], spec: Spec
 ) -> tuple[CellSplitting, tuple[CellFlow, ...]] | None:
-    """Return the parts of H and of the forces with boundary seams, which fit every size.
+    """Return the parts of H and of the forces with boundary seams, which allow every size.
 
-    None where some run is too small, ends are open, or sites near seams have no elementary flow.
+    Returns None if some run is too small, ends are open, or sites near seams have no elementary flow.
     """
     seamed = colouring.with_seams(cell)
     small = any(
@@ -296,10 +296,9 @@ def _seamed(
 
 
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
-    """Return the parts that can be V.
+    """Return the parts that can be the V of a Nyström method.
 
-    If H depends on the time, T + e takes the place of T: T must not depend on the time, and V must commute with
-    ∂V/∂t.
+    If H depends on the time, T + e takes the place of T: T must not depend on the time, and V must commute with ∂V/∂t.
     """
     return [k for k in cell_kicks(cell, parts) if not (cell.time and is_dated(parts.flows[1 - k.part], cell.time))]
 
@@ -394,9 +393,9 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
 
 
 def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
-    """Return the schedule of a method for a number of colours that is known at run time only; see `Sweeps`.
+    """Return the schedule of a method for a number of colours that is known only at run time; see `Sweeps`.
 
-    If H is ``dated`` (depends on the time), the advance of the time takes the place of a last flow.
+    ``dated`` says that H depends on the time. The advance of the time is then the last flow.
     """
     assert isinstance(method, Alternation)
     backwards = {(1, 2): (3, 2)}
@@ -445,7 +444,7 @@ def _sweep(
 
 
 def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coefficients, *, late: bool) -> Sweep:
-    """Return the derivative of a sweep, whose time varies too if flows may be ``late``."""
+    """Return the tangent kernel of a sweep. If flows may be ``late``, their duration varies too."""
     increments = list(motion.increments.values())
     slopes = along(cell, increments)
     slopes = staged(cell_monitor.delayed(increments, slopes) if late else slopes, coefficients)
@@ -460,7 +459,7 @@ def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coeffici
 def _gather(
     cell: Cell, sums: Sequence[BondSum], name: str, purpose: str, coefficients: Coefficients | None = None
 ) -> Gather | None:
-    """Return sums over bonds or pairs as kernels; all have the same symbols."""
+    """Return the kernels of sums over bonds or pairs, or None without sums; all sums have the same symbols."""
     if not sums:
         return None
     ends = []
@@ -521,7 +520,7 @@ def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites
 
 
 def _ends(cell: Cell, kernels: Sequence[Kernel]) -> dict[str, tuple[str, str]]:
-    """Return the symbols that kernels of pairs read, each with its field and the end of the pair."""
+    """Return the field and the end of the pair for each symbol that kernels of pairs read."""
     places = [p for kernel in kernels for p in cell.places(*kernel.roots).items()]
     return {name: (f, str(offset[0])) for name, (f, offset) in places}
 
@@ -537,15 +536,15 @@ def _lattice_fact(cell: Cell, colouring: Colouring) -> str:
 
 
 def _acting_facts(cell: Cell, plan: LatticePlan) -> Iterator[str]:
-    """Yield the lines of the header on forces and noise."""
+    """Yield the lines about forces and noise in the header of generated files."""
     yield from forced_lines(bool(cell.forces), pushed_casimirs(cell), plan.acting(cell.forces))
     yield from noise_lines(tuple(cell.noise), weak=plan.weak_order)
 
 
 def _operations(step: Sweeps) -> dict[str, int]:
-    """Return the numbers of operations of a step at one site."""
+    """Return the numbers of operations of a step at one site, by operation."""
     times = Counter(part for part, _ in step.schedule.flows)
-    if step.by_colour:  # for each colour but the first and the last
+    if step.by_colour:  # repeated for each colour except the first and the last
         times = Counter(dict.fromkeys(range(len(step.parts)), 2 * step.schedule.stages))
     totals: Counter[str] = Counter()
     for part, sweeps in enumerate(step.parts):

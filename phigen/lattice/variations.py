@@ -10,10 +10,9 @@ from phigen.symbolic.symbols import GATHERED, INITIAL, VARIATION, Symbol, kind_o
 
 
 def along(cell: Cell, values: Sequence[Expression]) -> list[Expression]:
-    """Return the derivatives of values along variations.
+    """Return the directional derivatives of values, with symbols for the direction.
 
-    The variations are those of the fields that the values read (`variation`), and of the sums over bonds or pairs
-    (`varied_sum`).
+    The symbols are `variation` of the fields that the values read, and `varied_sum` of the sums over bonds or pairs.
     """
     slots: dict[str, Symbol] = {n: variation(n) for n, (f, _) in cell.places(*values).items() if f in cell.fields}
     slots |= {n: varied_sum(n) for n in symbols_of(*values) if isinstance(n, Symbol) and n.kind == GATHERED}
@@ -34,7 +33,7 @@ def varied_sum(name: Symbol) -> Symbol:
 
 
 def with_variations(cell: Cell, values: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return the terms of a bond or a pair in sums, with the terms in the variations of these sums."""
+    """Return the terms of a bond or a pair in sums, followed by the terms in the variations of these sums."""
     names = [n for n in values if isinstance(n, Symbol) and kind_of(n) == GATHERED]
     assert len(names) == len(values)
     return {**values, **dict(zip(map(varied_sum, names), along(cell, list(values.values())), strict=True))}

@@ -12,14 +12,14 @@ from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.neighbours import Offset, steps
 from phigen.symbolic.readable import SHOWN, readable
 
-#: Formula: its left side as text and as markup, and its right side.
+#: Formula of a cell: its left side as text, its left side as markup, and its right side.
 Named = tuple[str, str, Expression]
 
 KINDS = {"sites": "", "sum": "Σ ", "product": "Π "}
 
 
 def described(cell: Cell) -> str:
-    """Return a description of the relation between sites."""
+    """Return a description in words of the relation between sites."""
     if cell.relation == GRID:
         axes = ", ".join(f"{a} ({b})" for a, b in zip(cell.axes, cell.boundary, strict=True))
         return f"grid with the axes {axes}" if len(cell.axes) > 1 else f"chain along {axes}"
@@ -27,7 +27,10 @@ def described(cell: Cell) -> str:
 
 
 def brackets(cell: Cell) -> list[tuple[str, Expression]]:
-    """Return the non-zero brackets, {a, b} or {b, a}: first those of fields of one site, then with neighbours."""
+    """Return the nonzero brackets with their left sides as text, one of {a, b} and {b, a}.
+
+    Brackets of fields of one site come first, then brackets with neighbours.
+    """
     entries: list[tuple[str, Expression]] = []
     printed_pairs: set[tuple[str, str]] = set()
     for (f, second_field), value in (*cell.bracket.items(), *cell.bond_bracket.items()):
@@ -45,7 +48,11 @@ def _mirrored(cell: Cell, f: str, second_field: str) -> tuple[str, str]:
 
 
 def sections(cell: Cell, max_terms: int | None = SHOWN) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Yield titles with lines (left, right) of text."""
+    """Return the sections of a description of the cell: titles, each with lines of text as pairs (left side, right
+    side).
+
+    ``max_terms`` bounds the terms shown of an expression.
+    """
     contents = [
         ("Poisson tensor of a site" if cell.is_local else "Poisson tensor", brackets(cell)),
         ("Hamiltonian, the sum of", _densities(cell)),
@@ -79,7 +86,10 @@ def _densities(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def rates(cell: Cell) -> list[tuple[str, Expression]]:
-    """Return the vector field at a site of a grid; for bonds, the contribution of each bond to the gradient of H."""
+    """Return the right sides of the equations of motion at a site of a grid, with their left sides as text.
+
+    For graphs and pairs, return the derivatives of the densities of a site and of a bond.
+    """
     if cell.relation == GRID:
         return [(f"d{f}/dt", e) for f, e in vector_field(cell).items()]
     site_rates = [(f"∂h/∂{f}", e) for f, e in forces(cell).items() if not e.is_zero]
@@ -128,7 +138,7 @@ def _equations(cell: Cell, formulas: Sequence[tuple[str, Expression]]) -> list[E
 
 
 def _indexed(cell: Cell, e: Expression) -> Expression:
-    """Return the expression with explicit indices, also for the site itself."""
+    """Return an expression in which every symbol has explicit indices, also the symbols of the site itself."""
     indexed = {name: symbol(_site(cell, *site)) for name, site in cell.places(e).items()}
     return substitute([e], indexed)[0]
 

@@ -17,7 +17,7 @@ def method(compilation: CompiledGauss) -> str:
 
 
 def equations() -> list[tuple[str, str]]:
-    """Return the equations of a step, as pairs of two sides."""
+    """Return the equations of a step, as pairs (left side, right side)."""
     return [
         ("Z_i", "z + Σ_j μ_ij L_j"),
         ("L_j", "h b_j f(Z_j)"),
@@ -27,7 +27,7 @@ def equations() -> list[tuple[str, str]]:
 
 
 def lines(compilation: CompiledGauss) -> list[str]:
-    """Return lines that describe the unknowns, one line for each part, and the step."""
+    """Return lines of text on the unknowns, one line for each part of the state, and on the step."""
     listed_lines, names = [], compilation.system.coordinates
     for part in compilation.gauss.parts:
         unknowns = ", ".join(names[i] for i in part.indices)
@@ -52,7 +52,7 @@ def lines(compilation: CompiledGauss) -> list[str]:
 
 
 def described(compilation: CompiledGauss) -> dict[str, object]:
-    """Return the method as plain data."""
+    """Return the description of the method as plain data, for JSON."""
     return {
         "scheme": "gauss",
         "structure": compilation.structure,

@@ -13,7 +13,7 @@ from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.readable import readable
 from phigen.symbolic.symbols import Symbol, plain
 
-#: Letters of a matrix and of its exponential minus 1; numbers follow if there are several.
+#: Letters for a matrix A and for E = exp(hA) − 1. A number follows if there are several matrices.
 RATES, EXPONENTIAL = "A", "E"
 
 
@@ -25,9 +25,9 @@ def method(compilation: CompiledSplitting) -> str:
 
 
 def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
-    """Return the images, after the time ``h:``, of the coordinates that a flow changes.
+    """Return the images of the coordinates that a flow changes, after the time h.
 
-    Entries of matrix exponentials have the names of `matrices`.
+    The keys are the coordinates. Entries of matrix exponentials have the names of `matrices`.
     """
     entries: dict[str, Expression] = {}
     for number, matrix in matrices(compilation):
@@ -41,7 +41,7 @@ def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
 
 
 def matrices(compilation: CompiledSplitting) -> list[tuple[str, MatrixExponential]]:
-    """Return the distinct matrix exponentials of all flows with numbers; the number of a single one is empty."""
+    """Return the distinct matrix exponentials of all flows, each with its number as text; "" if there is only one."""
     distinct = list(dict.fromkeys(e for flow in compilation.splitting.flows for e in flow.exponentials))
     return [(str(k) if len(distinct) > 1 else "", e) for k, e in enumerate(distinct, 1)]
 
@@ -85,15 +85,17 @@ def formulas(compilation: CompiledSplitting, max_terms: int | None) -> list[tupl
 
 
 def schedule(step: Step) -> list[tuple[int, float]]:
-    """Return the flows of a splitting in order, as pairs of a part and a fraction of the step; empty for others."""
+    """Return the flows of a splitting in order, as pairs of a part and a fraction of the step; no pairs for other
+    steps."""
     schedule = step.flow_schedule
     return [(part, schedule.times[row]) for part, row in schedule.flows] if schedule else []
 
 
 def described(compilation: CompiledSplitting) -> dict[str, object]:
-    """Return as plain data the parts, and the flows of a step as pairs of a part, from 1, and a step fraction.
+    """Return the parts of H and the flows of a step as plain data, for JSON.
 
-    ``generators`` are the matrices A of exponentials E = exp(hA) − 1, row by row.
+    A flow is a pair of the number of its part, from 1, and the fraction of the step. ``generators`` are the matrices A
+    of exponentials E = exp(hA) − 1, row by row.
     """
     parts = []
     for flow in compilation.splitting.flows:

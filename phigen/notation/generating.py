@@ -1,4 +1,4 @@
-"""Generating function of a compilation: the reason for its order, and S_1 … S_k as formulas."""
+"""The generating function of a compilation as formulas: S_1 … S_k, and the reason for the order of the method."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.modified import corrections, expect_modified, powers
 from phigen.symbolic.readable import Formula, of_polynomial
 
-#: Limit for showing the leading term of the modified Hamiltonian, which needs one more coefficient of the series.
+#: Largest order for which the leading term of the modified Hamiltonian is shown: it needs one more S_i.
 _MODIFIED_UP_TO = 6
 
 
@@ -30,10 +30,10 @@ def method(compilation: CompiledSeries) -> str:
 
 @dataclass(frozen=True)
 class Generating:
-    """Non-zero S_i with their indices, and −S_{p+1}, the leading term of the modified Hamiltonian.
+    """The nonzero S_i with their indices, and −S_{p+1}, the leading term of the modified Hamiltonian.
 
-    The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series. S_i from
-    ``beyond`` on have too many terms to be written out; the code has them with common subexpressions.
+    The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series. The S_i
+    with i ≥ ``beyond`` have too many terms to be written out; the generated code has them with common subexpressions.
     """
 
     listed: list[tuple[int, Formula]]
@@ -42,12 +42,12 @@ class Generating:
 
     @property
     def missing(self) -> str:
-        """The remark on terms that are not listed."""
+        """Sentence on the S_i from ``beyond`` on, which are not listed."""
         return f"from S_{self.beyond} on there are too many terms to be written out; the code shares their parts"
 
 
 def series_formulas(compilation: CompiledSeries, max_terms: int | None) -> Generating:
-    """Return the generating function of a series if it can be written out, with ``max_terms`` terms of each S_i."""
+    """Return the generating function of a series as formulas, with at most ``max_terms`` terms shown of each S_i."""
     plan = compilation.stage
     pushed = compilation.system.forces or compilation.system.noise
     has_modified = not pushed and plan is compilation.order and plan.order <= _MODIFIED_UP_TO
@@ -66,10 +66,10 @@ def series_formulas(compilation: CompiledSeries, max_terms: int | None) -> Gener
 
 
 def modified_formulas(compilation: Compilation, count: int, max_terms: int | None) -> list[tuple[int, Formula]]:
-    """Return pairs (j, H_j) of the first ``count`` terms h^j H_j of the modified Hamiltonian H̃ = H + h^p H_p + …
+    """Return the first ``count`` terms of the modified Hamiltonian H̃ = H + h^p H_p + …, as pairs (j, H_j).
 
-    A count of 0 selects the leading term if it is cheap. A larger count raises `SpecError` for a splitting, a
-    composition and an approximate bi-realisation.
+    A count of 0 returns the leading term if it is cheap to compute. Raises `SpecError` for a count above 0 if the
+    method is a splitting or a composition, or has an approximate bi-realisation.
     """
     if not count:
         leading = series_formulas(compilation.by_series(), max_terms).leading if compilation.has_series else None

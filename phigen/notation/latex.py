@@ -19,12 +19,12 @@ Equation = tuple[str, Sequence[str]]
 
 _PLUS, _EQUALS, _TIMES = "<mo>+</mo>", "<mo>=</mo>", "<mo>&#x2062;</mo>"
 _DOTS = f"{_PLUS}<mo>…</mo>"
-#: The function φ of the exponential bi-realisation, and β of a symmetric pair.
+#: The function φ of the exponential bi-realisation, and β for a bi-realisation with β(x, p) = α(x, −p).
 _PHI = "  \\varphi(s) &= \\frac{1}{s} \\left( 1 - \\frac{\\sqrt{s}}{2} \\cot \\frac{\\sqrt{s}}{2} \\right)"
 _BETA = "  \\beta(x, p) &= \\alpha(x, -p)"
 #: Width of an equals sign and of the space between columns of a matrix, in em.
 _RELATION, _COLUMN = 1.4, 1.2
-#: Largest number of columns of a matrix in amsmath.
+#: Largest number of columns of a matrix in amsmath; wider tensors are shown as brackets.
 _COLUMNS = 10
 
 
@@ -36,11 +36,12 @@ _COLLOCATION = r"""\begin{align*}
 
 
 def document(compilation: Compilation, modified: int = 0, most: int | None = SHOWN) -> str:
-    """Return equations for π, H, Casimirs, α, β, S_1 … S_k, or the parts and flows of a splitting, and H̃.
+    """Return LaTeX equations for π, H and Casimirs, then for the method, and for H̃.
 
-    Lines are broken to fit the text of an article. ``most`` bounds the terms shown of S_i and H̃, None shows all.
-    ``modified`` is the number of corrections; with 0, the leading one is shown if it is cheap. Raises
-    `SpecError` for a method without corrections if some are requested.
+    The method is α, β and S_1 … S_k, or the parts and flows of a splitting. Lines are broken to fit the text of an
+    article. ``most`` bounds the terms shown of each S_i and of H̃; None shows all. ``modified`` is the number of
+    corrections in H̃; with 0, the leading correction is shown if it is cheap to compute. Raises `SpecError` if
+    corrections are requested for a method without a modified Hamiltonian.
     """
     blocks = system_blocks(compilation.system)
     blocks += compilation.by_kind(
@@ -84,7 +85,7 @@ def _flows(compilation: CompiledSplitting) -> list[str]:
 
 
 def _flow(compilation: CompiledSplitting, k: int) -> str:
-    """Return a part of H, and the images after the time h of the coordinates that its flow changes."""
+    """Return the equations for a part of H and for the images of the coordinates under its flow, after the time h."""
     flow = compilation.splitting.flows[k - 1]
     new_values = flows.images(compilation, flow)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
@@ -94,13 +95,16 @@ def _flow(compilation: CompiledSplitting, k: int) -> str:
 
 
 def _exponential(number: str, matrix: MatrixExponential) -> str:
-    """Return a matrix exponential minus 1, and the non-zero entries of its matrix."""
+    """Return the equations for a matrix exponential minus 1 and for the nonzero entries of its matrix."""
     entries = flows.rates(number, matrix)
     return aligned([mathml.exponential(number), *_equations([mathml.name(s) for s in entries], list(entries.values()))])
 
 
 def _maps(compilation: CompiledSeries) -> Iterator[str]:
-    """Return α and β, and φ if they contain it; for a path, the first terms of the series of α and β."""
+    """Yield the equations for α and β, and for φ if they contain φ.
+
+    For a bi-realisation by paths, the first terms of the series of α and β are shown.
+    """
     realisation, names = compilation.realisation, compilation.system.coordinates
     continuation = [_DOTS] if realisation.path else []
     letters = {"α": realisation.alpha} if realisation.symmetric else {"α": realisation.alpha, "β": realisation.beta}
@@ -114,7 +118,7 @@ def _maps(compilation: CompiledSeries) -> Iterator[str]:
 
 
 def _gauged(compilation: CompiledSeries) -> str:
-    """Return the Hamiltonian of the series if Casimirs are subtracted; it precedes the formula of S_1."""
+    """Return the markup ``H − λ C =``, which precedes the formula of S_1; "" if no Casimirs are subtracted from H."""
     gauge = compilation.gauge
     factors = [mathml.name(s) for s in gauge.multiples] + [mathml.grouped(value) for value in gauge.fixed.values()]
     parts = zip(factors, (*gauge.free, *gauge.fixed), strict=True)
@@ -138,14 +142,17 @@ def _assigned(names: Sequence[str], expressions: Sequence[Expression]) -> list[E
 def _equations(
     left: Sequence[str], expressions: Sequence[Expression], continuation: Sequence[str] = ()
 ) -> list[Equation]:
-    """Return equations for expressions, followed by equations for named common subexpressions."""
+    """Return the equations for expressions, then those that define their named common subexpressions."""
     formulas = named_parts.readable(expressions)
     equations = [(name, [*mathml.pieces(form), *continuation]) for name, form in zip(left, formulas.forms, strict=True)]
     return [*equations, *((mathml.name(name), mathml.pieces(e)) for name, e in formulas.parts)]
 
 
 def _pieces(formula: Formula) -> list[str]:
-    """Return a polynomial after its divisor; if terms are left out, the number of all terms follows."""
+    """Return a polynomial in parts between which a line may break, with its divisor in front.
+
+    If terms are hidden, the last part is the number of all terms.
+    """
     first, *remaining = mathml.pieces(replace(formula, divisor=1))
     all_terms = [first, *remaining]
     if formula.divisor != 1:

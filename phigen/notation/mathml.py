@@ -1,8 +1,8 @@
-"""Formulas as MathML Core, which browsers show without additional scripts or fonts.
+"""Formulas as MathML Core, which browsers display without additional scripts or fonts.
 
 An expression becomes a sum of terms. A term is a coefficient with factors above and below a fraction line. Signs and
-quotients therefore look as on paper, whatever the structure of the expression tree. Markup is exactly one element
-unless stated otherwise, and all text in it is escaped.
+quotients therefore look as on paper, whatever the structure of the expression tree. Each function that returns markup
+returns exactly one element unless its docstring says otherwise. All text in markup is escaped.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.readable import Formula
 from phigen.symbolic.symbols import GAUGE, PART, Symbol
 
-#: Number of characters of markup above which a part of a formula is left out; shared parts of this length have names.
+#: Number of characters of markup above which a part of a formula is left out; shared subexpressions above it get names.
 LONGEST = 60_000
 
-#: Largest number of terms of a polynomial that is reordered to begin without a minus.
+#: Largest number of terms of a polynomial that is reordered so that it does not begin with a minus.
 FEW = 4
 
 #: Number of characters of an exponent above which a power of e is written as exp(…).
@@ -36,20 +36,21 @@ _GREEK = {
     "upsilon": "υ", "phi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω", "Gamma": "Γ", "Delta": "Δ", "Theta": "Θ",
     "Lambda": "Λ", "Xi": "Ξ", "Pi": "Π", "Sigma": "Σ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
 }  # fmt: skip
-#: Letters of internal symbols such as ``p:x1``, written before the index.
+#: Letters for internal symbols such as ``lambda:1``; the text after the colon becomes the index.
 _OWN = {GAUGE: "λ", PART: "σ"}
 
-_TIMES, _APPLY = "<mo>&#x2062;</mo>", "<mo>&#x2061;</mo>"  # both operators are invisible
+# invisible multiplication, and invisible function application
+_TIMES, _APPLY = "<mo>&#x2062;</mo>", "<mo>&#x2061;</mo>"
 _DOT, _DOTS = "<mo>·</mo>", "<mo>…</mo>"
 
 
 @dataclass(frozen=True)
 class Factor:
-    """Factor of a term: ``base`` with ``index`` and exponents, followed by ``tail``, such as the argument of a
-    function.
+    """Factor of a term: a ``base`` with ``index`` and exponents, and a ``tail`` such as the argument of a function.
 
-    ``terms`` are those of a sum in parentheses. ``word`` marks a name of several letters, which needs space around it;
-    ``raised`` marks a power, which needs parentheses before a further exponent; ``key`` sorts names and their powers.
+    ``terms`` are the terms of a base that is a sum in parentheses. ``word`` marks a name of several letters, which
+    needs space around it; ``raised`` marks a power, which needs parentheses before a further exponent. Factors are
+    sorted by ``key``.
     """
 
     base: str
@@ -81,7 +82,7 @@ class Factor:
 
 @dataclass(frozen=True)
 class FractionTerm:
-    """Term of a sum: coefficient · above / below."""
+    """Term of a sum: ``coefficient`` times the product of ``above``, divided by the product of ``below``."""
 
     coefficient: Fraction
     above: tuple[Factor, ...] = ()
@@ -94,7 +95,7 @@ class FractionTerm:
         top, bottom = (c, Fraction(1)) if _is_decimal(c) else (Fraction(c.numerator), Fraction(c.denominator))
         above = _product(top, self.above)
         if len(self.above) == 1 and self.above[0].terms and "<mfrac" in above and not self.below and bottom != 1:
-            return _row(number(top / bottom) + _TIMES + self.above[0].markup)  # avoid a fraction in a fraction
+            return _row(number(top / bottom) + _TIMES + self.above[0].markup)  # avoids a fraction in a fraction
         return f"<mfrac>{above}{_product(bottom, self.below)}</mfrac>" if self.below or bottom != 1 else above
 
 
@@ -161,7 +162,7 @@ def dotted(identifier: str) -> str:
 
 
 def number(value: Fraction) -> str:
-    """Return the markup of a number ≥ 0; decimals of many digits are not converted to fractions."""
+    """Return the markup of a number ≥ 0. Decimals of many digits are not written as fractions."""
     if value.denominator == 1:
         return f"<mn>{value.numerator}</mn>"
     if not _is_decimal(value):
@@ -172,7 +173,7 @@ def number(value: Fraction) -> str:
 
 
 def grouped(e: Expression) -> str:
-    """Return an expression as a factor: in parentheses if it is a sum or negative."""
+    """Return the markup of an expression as a factor: in parentheses if it is a sum or negative."""
     terms = terms_of(e)
     return summed(terms) if len(terms) == 1 and terms[0].coefficient > 0 else _parentheses(summed(terms))
 
@@ -184,12 +185,13 @@ def matrix(rows: Sequence[Sequence[Expression]]) -> str:
 
 
 def indexed(letter: str, index: str) -> str:
-    """Return a letter with a name as its index: α_{x_1}."""
+    """Return the markup of a letter with a name as its index: α_{x_1}."""
     return f"<msub><mi>{escape(letter)}</mi>{name(index)}</msub>"
 
 
 def component(letter: str, k: int, c: str) -> str:
-    """Return a letter with an index, and for a vector field with a coordinate: H_2, F_3^{x}."""
+    """Return the markup of a component: H_2 or, for a component of a vector field, F_3^{x} with the coordinate
+    ``c``."""
     if not c:
         return f"<msub><mi>{escape(letter)}</mi><mn>{k}</mn></msub>"
     return f"<msubsup><mi>{escape(letter)}</mi><mn>{k}</mn>{name(c)}</msubsup>"
@@ -235,7 +237,7 @@ def _called(function: str, args: Sequence[Sum]) -> Sum:
 def _power(base: Sum, exponent: Fraction) -> Sum:
     if exponent < 0:
         below = _single(_power(base, -exponent))
-        if below.coefficient == 0:  # in the form of the spec
+        if below.coefficient == 0:  # 1/0 is displayed as in the spec
             return _one(Factor("<mfrac><mn>1</mn><mn>0</mn></mfrac>"))
         return (FractionTerm(1 / below.coefficient, below.below, below.above),)
     if exponent == 1 or not base:
@@ -259,7 +261,7 @@ def _times(*factors: Sum) -> Sum:
 
 
 def _collected(factors: Sequence[Factor]) -> tuple[Factor, ...]:
-    """Combine equal factors into a power, except where this gives a power of a power."""
+    """Return the factors with equal ones combined into a power, except if this gives a power of a power."""
     counts = Counter(factors)
     powers = {f: f.power(f"<mn>{n}</mn>") for f, n in counts.items() if n > 1 and not f.raised}
     return tuple(powers.get(f, f) for f, n in counts.items() for _ in range(1 if f in powers else n))
@@ -273,7 +275,7 @@ def _single(terms: Sum) -> FractionTerm:
 
 
 def _base(terms: Sum) -> Factor:
-    """Return the base of a power, in parentheses if necessary."""
+    """Return an expression as the base of a power, in parentheses if necessary."""
     if len(terms) == 1 and not terms[0].below:
         c, above = terms[0].coefficient, terms[0].above
         if len(above) == 1 and c == 1:
@@ -288,7 +290,8 @@ def _enclosed(terms: Sum) -> Factor:
 
 
 def _sorted(terms: Sum) -> Sum:
-    """Sort monomials by their names, then other terms in the given order; numbers are added up."""
+    """Return the terms with monomials first, sorted by their names; other terms keep their order. Numbers are added
+    up."""
     sums: dict[tuple[tuple[Factor, ...], tuple[Factor, ...]], Fraction] = {}
     for t in terms:
         sums[t.above, t.below] = sums.get((t.above, t.below), Fraction(0)) + t.coefficient
@@ -301,7 +304,7 @@ def _sorted(terms: Sum) -> Sum:
 
 
 def _positive_first(terms: list[FractionTerm]) -> Sum:
-    """Move the first positive term to the front: b − a rather than −a + b."""
+    """Return the terms with the first positive one in front: b − a rather than −a + b."""
     position = next((i for i, t in enumerate(terms) if t.coefficient > 0), 0)
     return (*terms[position : position + 1], *terms[:position], *terms[position + 1 :])
 
@@ -325,7 +328,7 @@ def _one(factor: Factor) -> Sum:
 
 
 def exponential(number: str) -> tuple[str, list[str]]:
-    """Return the two sides of E = exp(hA) − 1, with the number of the matrix."""
+    """Return both sides of the equation E = exp(hA) − 1, with the number of the matrix as index."""
     left, rates = (f"<mi>{letter}{number}</mi>" for letter in "EA")
     return left, [f"<msup><mi>e</mi><mrow><mi>h</mi>{_TIMES}{rates}</mrow></msup>", "<mo>−</mo><mn>1</mn>"]
 
@@ -367,7 +370,11 @@ def _product(coefficient: Fraction, factors: Sequence[Factor]) -> str:
 
 
 def _pieces(terms: Sum) -> list[str]:
-    """Return the terms; for a factor times a sum in parentheses, the factor and the terms of the sum."""
+    """Return the terms of a sum as markup, each with its sign.
+
+    If the sum is one term with a factor in parentheses, the parts are the terms inside; the parentheses and the other
+    factors belong to the first and last part.
+    """
     inner = next((f for f in terms[0].above if len(f.terms) > 3), None) if len(terms) == 1 else None
     if inner is None:
         return [summed(terms[:1]), *(f'<mo form="infix">{_sign(t)}</mo>{t.magnitude}' for t in terms[1:])]
@@ -385,7 +392,7 @@ def _sign(term: FractionTerm) -> str:
 
 
 def _is_decimal(value: Fraction) -> bool:
-    """Return whether the value is a decimal of many digits: 0.6667 is hard to read as 6667/10000."""
+    """Whether the value comes from a decimal of many digits: 0.6667 is easier to read than 6667/10000."""
     cofactor = value.denominator
     for prime in (2, 5):
         while cofactor % prime == 0:

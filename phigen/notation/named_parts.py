@@ -14,13 +14,13 @@ from phigen.symbolic.symbols import MOMENTUM, PART, Symbol, kind_of, plain
 #: Least number of leaves of a named subexpression, and least number of leaves that a name must save.
 SMALL, WORTH = 3, 4
 
-#: Names are used if they shorten the formulas to this fraction of their length.
+#: Names are used if the formulas with names have at most this fraction of the original length.
 WORTH_NAMES = 0.75
 
 #: Expressions with at most this number of leaves get no names for common subexpressions.
 SHORT = 40
 
-#: Name of a common subexpression in a text.
+#: Pattern of a name of a common subexpression in a text.
 _SHARED = re.compile(r"σ_\d+\b")
 
 
@@ -28,8 +28,8 @@ _SHARED = re.compile(r"σ_\d+\b")
 class Readable:
     """Formulas with named common subexpressions.
 
-    ``forms`` are the formulas in the symbols ``part:1``, ``part:2``, …, which ``parts`` defines. ``size`` is the total
-    number of names and numbers.
+    ``forms`` are the formulas in the symbols ``part:1``, ``part:2``, …, which ``parts`` defines. ``size`` is the number
+    of names and numbers in all formulas and definitions.
     """
 
     parts: tuple[tuple[str, Expression], ...]
@@ -38,7 +38,8 @@ class Readable:
 
 
 def readable(expressions: Sequence[Expression]) -> Readable:
-    """Return the shortest form of expressions: expanded, unchanged, or with names for common subexpressions."""
+    """Return the shortest form of expressions among three: expanded, unchanged, with names for common
+    subexpressions."""
     unnamed_form, named_form = _partly_named(expressions), _all_named(expressions)
     return (
         named_form if unnamed_form.size > SHORT and named_form.size < WORTH_NAMES * unnamed_form.size else unnamed_form
@@ -67,9 +68,10 @@ def _partly_named(expressions: Sequence[Expression]) -> Readable:
 
 
 def texts(named_expressions: Mapping[str, Expression], max_terms: int | None) -> list[tuple[str, str]]:
-    """Return expressions as pairs of a name and a text of at most ``max_terms`` terms, unchanged or expanded.
+    """Return expressions as pairs of a name and a text, unchanged or expanded, whichever is shorter.
 
-    Names σ_1, σ_2, … for common subexpressions are used if they shorten the texts; their definitions are at the end.
+    A text has at most ``max_terms`` terms. Names σ_1, σ_2, … for common subexpressions are used if they shorten the
+    texts; their definitions come last.
     """
     expressions = [*named_expressions.values()]
     plainly = as_text(expressions, max_terms)
@@ -94,7 +96,7 @@ def vanishing(subexpressions: Sequence[tuple[str, Expression]]) -> list[str]:
 
 
 def _met(name_texts: Sequence[tuple[str, str]], count: int) -> list[tuple[str, str]]:
-    """Return the first ``count`` texts, followed by the renumbered subexpressions on which they depend."""
+    """Return the first ``count`` texts and the subexpressions that they contain, renumbered from 1."""
     met = {name for _, text in name_texts[:count] for name in _SHARED.findall(text)}
     for name, text in reversed(name_texts[count:]):
         if name in met:
@@ -121,7 +123,7 @@ def leaves(form: Formula | Expression) -> int:
 
 
 def with_names(roots: Sequence[Expression]) -> tuple[tuple[tuple[str, Expression], ...], list[Expression]]:
-    """Return names for long common subexpressions, and the roots in terms of these names."""
+    """Return definitions of names for long common subexpressions, and the ``roots`` in terms of these names."""
     uses: dict[int, int] = {}
     order = topological(roots)
     for e in order:

@@ -1,4 +1,4 @@
-"""Print Casimirs of log-canonical structures, ½ Σ u_i log x_i², as log|Π x_i^u_i|."""
+"""Casimirs of log-canonical structures as powers: ½ Σ u_i log x_i² is printed as log|Π x_i^u_i|."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def as_powers(casimir: Expression) -> str | None:
     return f"log|{'*'.join(factors)}|"
 
 
-#: Coefficients of log x² by the name of x; the constant has the key None.
+#: Coefficients of log x² by the name of x; the key None has the constant. None stands for any other expression.
 _Sum = dict[str | None, Expression] | None
 
 

@@ -21,9 +21,10 @@ from phigen.symbolic.symbols import STEP, momentum
 class SympyFormulas:
     """Formulas of a method in sympy.
 
-    ``hamiltonian`` is the discretised function: H minus λ C for each Casimir C of the gauge, with λ in ``gauge``. α and
-    β are n expressions in the coordinates of ``system`` and in ``covector``. ``degree`` is their degree if they are
-    truncated series in the covector, else None. ``series`` has S_1 … S_k with S_h = Σ h^i S_i.
+    ``hamiltonian`` is the Hamiltonian that is discretised: H minus λ C for each Casimir C of the gauge, with the
+    multipliers λ in ``gauge``. α and β are n expressions in the coordinates of ``system`` and in ``covector``.
+    ``degree`` is their degree in the covector if they are truncated series, else None. ``series`` has S_1 … S_k, where
+    S_h = Σ h^i S_i.
     """
 
     system: SympySystem
@@ -37,7 +38,7 @@ class SympyFormulas:
 
 
 class Dictionary:
-    """Symbols of a compilation in sympy, with the translation of its expressions."""
+    """Symbols of a compilation in sympy, and the translation of its expressions."""
 
     def __init__(self, compilation: Compilation) -> None:
         system, gauge = compilation.system, compilation.gauge
@@ -58,14 +59,14 @@ class Dictionary:
         }
 
     def expression(self, e: Expression, special: Callable[[int, Any], Any] = closed_function) -> Any:
-        """Return the expression in sympy; ``special`` is an argument of `to_sympy`."""
+        """Return an expression in sympy; ``special`` translates φ, as in `to_sympy`."""
         return to_sympy(e, self._symbols, special)
 
 
 def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyFormulas:
-    """Return the formulas of a compilation, with S_1 … S_terms, by default those of the method.
+    """Return the formulas of a compilation, with S_1 … S_terms; ``terms`` is that of the method by default.
 
-    Raises `SpecError` for a splitting, `LimitError` if the terms are too many to be written out.
+    Raises `SpecError` for a splitting, `LimitError` if the S_i have too many terms to be written out.
     """
     if not compilation.has_series:
         raise SpecError(
@@ -98,7 +99,7 @@ def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyF
 def _ends_of_paths(
     compilation: CompiledSeries, dictionary: Dictionary, degree: int
 ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """Return α and β = α(x, −p) up to a degree in p; terms of higher degree do not belong to the series."""
+    """Return the series of α and of β(x, p) = α(x, −p) up to ``degree`` in p, for a bi-realisation by paths."""
     formal = formal_alpha(compilation.discretised, compilation.realisation, degree + 1)
     parts = closed_form([dictionary.expression(e) for e in formal], dictionary.covector)(degree)
 

@@ -1,7 +1,7 @@
 """Formulas in LaTeX, broken into lines: the markup of `phigen.notation.mathml`, with an estimate of its width.
 
-Widths are upper estimates in em for the fonts of TeX. A line breaks before an outer plus or minus, if this leaves no
-large gap; else before one inside parentheses; and between factors only if no other break fits.
+Widths are upper estimates in em for the fonts of TeX. A line breaks before an outer plus or minus sign if this leaves
+no large gap, else before one inside parentheses. It breaks between factors only if no other break fits.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from xml.etree.ElementTree import Element
 
 #: Width of a line in em: slightly less than that of the text of an article at 10, 11 and 12 points.
 LINE = 31.0
-#: Indentation of continued lines, and its width.
+#: Indentation of continued lines in LaTeX, and its width in em.
 INDENT, INDENTED = "\\quad ", 1.0
-#: Fraction by which a line may be shorter to avoid a break one level of parentheses deeper.
+#: Fraction of a line that may stay empty to avoid a break one level of parentheses deeper.
 _SHORTER = 0.35
-#: Number of levels by which a break between factors counts as deeper.
+#: Number of levels that is added to the level of a break between factors.
 _FACTORS = 4
 #: Fraction of a line above which a fraction, root or exponent is written inline, so that it can be broken.
 _WIDE = 0.6
@@ -43,7 +43,8 @@ _TALL = ("mfrac", "msqrt", "mroot", "mtable")
 
 @dataclass(frozen=True)
 class Atom:
-    """Unbreakable part of a formula; ``level`` is that of the break before it, None if no break is possible there."""
+    """Unbreakable part of a formula. ``level`` is the nesting depth of the possible break before it, None if there
+    is none."""
 
     text: str
     width: float
@@ -61,7 +62,8 @@ def width(*markup: str) -> float:
 
 
 def lines(markup: Sequence[str], room: float) -> list[str]:
-    """Return elements side by side as lines of LaTeX of the given width; `INDENTED` indents all but the first."""
+    """Return elements side by side as lines of LaTeX of at most the width ``room`` in em; `INDENTED` is the
+    indentation of all lines but the first."""
     elements = _elements(markup)
     unbroken = _atoms(elements, whole=True)
     if _width(unbroken) <= room:
@@ -76,7 +78,10 @@ def lines(markup: Sequence[str], room: float) -> list[str]:
 
 
 def _end(atoms: Sequence[Atom], begin: int, room: float) -> int:
-    """Return the end of the line that begins at an atom: the best break within the width, else the first after."""
+    """Return the index after the last atom of the line that begins at ``begin``.
+
+    This is the best break within the width or, if there is none, the first break after it.
+    """
     width_used, best, least = 0.0, len(atoms), float("inf")
     for position in range(begin, len(atoms)):
         level = atoms[position].level
@@ -184,7 +189,7 @@ def _of_element(element: Element, depth: int, *, called: bool, whole: bool) -> l
 
 
 def _one(elements: Sequence[Element]) -> Atom:
-    """Return elements as a part that stays on one line."""
+    """Return elements as one atom, which is never broken."""
     atoms = _atoms(elements, whole=True)
     return Atom(_joined(atoms), _width(atoms))
 
@@ -205,7 +210,7 @@ def _identifier(name: str, *, called: bool) -> Atom:
 
 
 def _scripts(kind: str, parts: Sequence[Element], depth: int, *, called: bool, whole: bool) -> list[Atom]:
-    """Return a base with an index or an exponent; a sum in parentheses and exp of a long sum may be broken."""
+    """Return a base with an index or an exponent as atoms; a sum in parentheses and exp of a long sum may be broken."""
     base, *scripts = parts
     script_atoms = [_one([s]) for s in scripts]
     if not whole and kind == "msup" and base.text == "e" and script_atoms[0].width > 0.75 * _WIDE * LINE:
@@ -231,13 +236,13 @@ def _fraction(parts: Sequence[Element], depth: int, *, whole: bool) -> list[Atom
 
 
 def _enclosed(elements: Sequence[Element], depth: int) -> list[Atom]:
-    """Return elements in parentheses."""
+    """Return elements in parentheses as atoms."""
     tall = any(part.tag in _TALL for e in elements for part in e.iter())
     left, right = (_parenthesis(sign, tall=tall, whole=False) for sign in "()")
     return [left, *_atoms(elements, depth + 1, whole=False), right]
 
 
 def _factor(elements: Sequence[Element], depth: int) -> list[Atom]:
-    """Return elements as a factor, with parentheses around a sum."""
+    """Return elements as the atoms of a factor, with parentheses around a sum."""
     atoms = _atoms(elements, depth, whole=False)
     return _enclosed(elements, depth) if any(a.level == depth for a in atoms) else atoms

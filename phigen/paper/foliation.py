@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SYSTEMS = ("rigid_body_paper", "lotka_volterra", "poisson_not_hamiltonian")
-#: Values of the Casimirs.
+#: Values of the Casimirs whose leaves are drawn.
 SPHERES, PARABOLOIDS, PLANES = (0.1, 0.4, 1.0), (0.25, 1.5), (-2.0, 0.0, 2.0)
 
 
@@ -61,7 +61,7 @@ def _draw(systems: list[System]) -> Figure:
 
 
 def _draw_spheres(axes: Any, system: System) -> None:
-    """Draw nets of spheres, without the front octants, so that the inner spheres are visible."""
+    """Draw spheres as nets of lines, without the front octants, so that the inner spheres are visible."""
     casimir, names = system.casimirs["C"], system.coordinates
     box, gap = np.array([[-1.0] * 3, [1.0] * 3]), np.full((1, 3), np.nan)
     for level, colour in zip(SPHERES, SERIES, strict=False):
@@ -74,7 +74,7 @@ def _draw_spheres(axes: Any, system: System) -> None:
 
 
 def _draw_paraboloids(axes: Any, system: System) -> None:
-    """Draw x2 = x1 x3/C in the positive octant."""
+    """Draw the leaves x2 = x1 x3/C in the positive octant."""
     for level, colour in zip(PARABOLOIDS, SERIES, strict=False):
         first, share = np.meshgrid(np.linspace(0.02, 1, 8), np.linspace(0.02, 1, 8))
         # The surface ends at x2 = 1.

@@ -22,13 +22,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, START = "poisson_not_hamiltonian", (1.0, 1.0, 2.0)
-#: Exponent k of the map; step of the paper; a larger step, whose effect is visible after a few turns.
+#: K is the exponent k of the map, PAPER_STEP the step of the paper. STEP is a larger one, whose effect is visible after
+#: TURNS turns.
 K, PAPER_STEP, STEP, TURNS = 2, 1e-4, 0.05, 3
 PERIOD, ELSEWHERE = 2 * math.pi, (1.0, 2.0, 4.0)
 
 
 def printed_map(state: Floats, h: float) -> Floats:
-    """Return the image of states (…, 3) under the map of the paper: flow and dilation across leaves by exp(h^k)."""
+    """Return the images of states (…, 3) under the map of the paper: the flow, and a dilation by exp(h^k) across
+    leaves."""
     x, y, z = np.moveaxis(state, -1, 0)
     u, v, w = x - y + z, x + y - z, -x + y + z
     angle, stretched = h * (u**2 + v**2) / 4, w * np.exp(h**K)
@@ -54,7 +56,7 @@ def _rows(state: Floats, h: float, steps: int, stride: int) -> Floats:
 
 
 def leaf_change_plate() -> Plate:
-    """Return the figure of the two maps in space and of the leaf label along them."""
+    """Return the figure with both maps in space and with the value of the Casimir along them."""
     compilation, solver = compiled(SPEC, 4)
     steps = round(TURNS * PERIOD / STEP)
     trajectory = solver.integrate(START, STEP, steps)

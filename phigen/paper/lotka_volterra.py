@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "lotka_volterra", "blow_up"
-#: Labels: the method of the paper, its variant with one changed option, and classical methods.
+#: Labels of the curves, with orders of phigen's methods and names of classical methods. PHI is the method of the paper.
 OWN = {"phigen, order 2": 2, "phigen, order 8": 8}
 CLASSICAL = {"RK2": "rk2", "RK4": "rk4"}
 PHI, RK2, RK4 = "phigen, order 2", "RK2", "RK4"
@@ -36,7 +36,7 @@ TIME, COARSE, END = 0.254, 1e-3, 0.262
 
 @dataclass(frozen=True)
 class Approach:
-    """Trajectories by label, up to just before the singularity, and the exact states (rows, DIM)."""
+    """Trajectories of all methods up to just before the singularity, by label, and the ``exact`` states (rows, DIM)."""
 
     compilation: Compilation
     solver: Solver
@@ -46,14 +46,14 @@ class Approach:
     exact: Floats
 
     def errors(self, label: str) -> Floats:
-        """Return the errors (rows,) of the solution, relative to its largest coordinate."""
+        """Return the errors (rows,) of a solution, relative to its largest coordinate."""
         distance = np.max(np.abs(self.trajectories[label].x - self.exact), axis=1)
         errors: Floats = distance / np.max(np.abs(self.exact), axis=1)
         return errors
 
 
 def approach() -> Approach:
-    """Return the run of the spec by all methods."""
+    """Return the trajectories of the run of the spec by all methods."""
     trajectories = {}
     for label, order in reversed(OWN.items()):
         compilation, solver = compiled(SPEC, order)

@@ -1,4 +1,4 @@
-"""Redrawn figure of the paper, with measured numbers for comparison with those of the paper."""
+"""Record of a redrawn figure of the paper, with measured numbers to compare with those of the paper."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Plate:
-    """Figure with its title and its findings."""
+    """Figure with its title and its findings, the measured numbers."""
 
     title: str
     figure: Figure
@@ -38,9 +38,10 @@ class Plate:
 
 
 def compiled(name: str, order: int, birealisation: str | None = None) -> tuple[Compilation, Solver]:
-    """Return a system of the corpus and its C solver of this order, with the named bi-realisation or the default.
+    """Return a system of the corpus, compiled at this order, and its C solver.
 
-    Raises `ToolchainError` without a C compiler: the runs of the paper are long.
+    ``birealisation`` names the kind, by default that of the spec. Raises `ToolchainError` without a C compiler: NumPy
+    would take too long for the runs of the paper.
     """
     source = spec.load(resources.bundled_specs() / f"{name}.yaml")
     if birealisation:
@@ -50,7 +51,7 @@ def compiled(name: str, order: int, birealisation: str | None = None) -> tuple[C
 
 
 def trajectory_of(solver: Solver, t: Floats, x: Floats, h: float, parameters: Mapping[str, float]) -> Trajectory:
-    """Return states (rows, DIM) of another method at times (rows,) as a trajectory with energy and Casimirs."""
+    """Return states (rows, DIM) of a classical method at times (rows,) as a trajectory with energy and Casimirs."""
     backend, names = solver.backend, solver.interface
     energy, values = backend.hamiltonian(x, parameters), backend.casimirs(x, parameters)
     casimirs = {name: values[:, i] for i, name in enumerate(names.casimirs)}
@@ -58,6 +59,6 @@ def trajectory_of(solver: Solver, t: Floats, x: Floats, h: float, parameters: Ma
 
 
 def relative(values: Floats) -> Floats:
-    """Return errors relative to the first value."""
+    """Return |v − v₀|/|v₀| for values v and the first value v₀."""
     errors: Floats = np.abs(values / values[0] - 1)
     return errors

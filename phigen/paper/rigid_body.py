@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "rigid_body_paper", "paper"
-#: Numbers of steps of the long run and of its first part, for separate findings; rows of each run.
+#: Number of steps of the long run, number of steps after which early findings are taken, and rows of each run.
 LONG, EARLY, ROWS = 10**8, 10**6, 20_000
-#: PHI-2 of the paper is the Cayley realisation at order 2.
+#: Labels. The method PHI-2 of the paper is the Cayley bi-realisation at order 2.
 PHI, RK4, BETTER = "phigen, order 2, Cayley", "RK4", "phigen, order 4"
-#: Step size of the section, with visible drift of RK4, and its duration.
+#: Step size of the Poincaré section, at which RK4 drifts visibly, and its number of steps.
 COARSE, SECTION_STEPS = 0.004, 75_000
-#: Number of further steps after which RK4 is at rest, and number of drawn crossings.
+#: Number of further steps after which RK4 has stopped moving, and number of drawn crossings.
 _REST, _DOTS = 10**6, 500
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """Solvers, and the numbers of the run of the spec."""
+    """Solvers of the rigid body, with initial state, step size and parameters of the run of the spec."""
 
     compilation: Compilation
     solver: Solver
@@ -48,7 +48,7 @@ class Bodies:
 
 
 def bodies() -> Bodies:
-    """Return PHI-2 of the paper and phigen's choice at order 4."""
+    """Return the solvers: PHI-2 of the paper, and order 4 with the bi-realisation that phigen chooses."""
     compilation, solver = compiled(SPEC, 2, "cayley")
     run = compilation.spec.runs[RUN]
     parameters = compilation.spec.parameters_of(run)
@@ -62,7 +62,7 @@ def _runge_kutta(body: Bodies, h: float, steps: int, stride: int) -> Trajectory:
 
 
 def errors_plate(steps: int = LONG) -> Plate:
-    """Return the figure of the errors of energy and Casimir over a number of steps of the paper's size."""
+    """Return the figure of the errors of energy and Casimir over a number of steps of the size used in the paper."""
     body = bodies()
     stride = max(1, steps // ROWS)
     methods = {
@@ -126,7 +126,7 @@ def _draw_errors(methods: dict[str, Trajectory], zoom: Trajectory) -> Figure:
 
 
 def section_plate() -> Plate:
-    """Return the figure of a trajectory with its section, and of the sections of both methods."""
+    """Return the figure of a trajectory with its Poincaré section, and of the sections of both methods."""
     body = bodies()
 
     def height(states: Floats) -> Floats:

@@ -17,7 +17,7 @@ from phigen.symbolic.arrays import Floats
 class ClassicalCourse:
     """Run of a classical method that is continued step by step, with the interface of `phigen.runtime.session.Course`.
 
-    The compiled ``runner`` reads its initial state from the array ``place``; ``x`` is the state after ``steps`` steps.
+    The compiled ``runner`` reads its initial state from the array ``place``. ``x`` is the state after ``steps`` steps.
     """
 
     runner: race.Runner
@@ -26,11 +26,11 @@ class ClassicalCourse:
     steps: int = 0
 
     def state(self) -> Floats:
-        """See `Course`."""
+        """The current state (DIM,), as in `Course`."""
         return self.x.copy()
 
     def advance(self, h: float, steps: int) -> None:
-        """See `Course`."""
+        """Advance by a number of steps of size ``h``, as in `Course`."""
         self.place[:] = self.x
         end = self.runner(h, steps, 1)
         if end is None:
@@ -39,11 +39,11 @@ class ClassicalCourse:
         self.steps += steps
 
     def branch(self) -> ClassicalCourse:
-        """See `Course`."""
+        """Return an independent run that starts at the current state, as in `Course`."""
         return ClassicalCourse(self.runner, self.place, self.x, self.steps)
 
 
 def started(method: str, compilation: Compilation, x0: Floats, parameters: Mapping[str, float]) -> ClassicalCourse:
-    """Return the run of a method at its initial state x0 (DIM,). Raises `ToolchainError`."""
+    """Return a run of a method that starts at x0 (DIM,). Raises `ToolchainError` without a C compiler."""
     state = np.array(x0, dtype=np.float64)
     return ClassicalCourse(race.compiled(compilation, [method], state, parameters).runners[method], state, state.copy())

@@ -1,1 +1,1 @@
-"""Proofs about one spec, and compilation on condition of these proofs."""
+"""Proofs about one spec: its system, its method, and a second derivation of the method."""

@@ -1,9 +1,9 @@
 """Statements on attitudes: a step conserves the momentum in the other frame, and rotates with the velocity ∇H.
 
 If x is the momentum in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, and the momentum in space is constant. If x is the
-momentum in space, g₁ = τ g₀, and the momentum in the body is constant. If τ conserves the momentum, so does the product
-of τ and a rotation that fixes x. So a second statement is about the rate of rotation. For h → 0 the rate must be ∇H,
-where H includes the Casimirs that the gauge subtracted.
+momentum in space, g₁ = τ g₀, and the momentum in the body is constant. The product of τ and a rotation that fixes x
+conserves the momentum as well, so a second statement is needed, on the rate of rotation: for h → 0 it must be ∇H, where
+H includes the Casimirs that the gauge subtracted.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 Vector = Sequence[Expression]
 
-#: The attitude before a step: any quaternion.
+#: The attitude before a step: symbols for the four components of a quaternion.
 BEFORE = tuple(symbol(Symbol("attitude", i)) for i in range(4))
 
 
 def check(compilation: Compilation) -> Iterator[Statement]:
-    """The statements about the attitude of a method."""
+    """Yield the statements about the attitude of a method."""
     attitude = compilation.program.attitude
     if attitude is not None:
         yield from compilation.by_kind(
@@ -65,7 +65,7 @@ def check(compilation: Compilation) -> Iterator[Statement]:
 
 
 def _series_statements(attitude: Attitude, compilation: CompiledSeries) -> Iterator[Statement]:
-    """Statements on the element of an implicit or explicit step, and on its gradient."""
+    """Yield the statements on the group element of an implicit or explicit step, and on the gradient of S_1."""
     system, group, chart = compilation.system, attitude.group, compilation.realisation
     # The p of the coordinates contains the covector force, the p of the group element does not.
     pushed = system.forces is not None and any(not z.is_zero for z in system.forces.covector)
@@ -88,7 +88,7 @@ def _series_statements(attitude: Attitude, compilation: CompiledSeries) -> Itera
 
 
 def _first_term(compilation: CompiledSeries) -> Expression:
-    """S_1, unexpanded where it has too many terms."""
+    """Return S_1 as an expression. It is not expanded if it has too many terms."""
     try:
         first = compilation.series.polynomial(1)
     except OverflowError:
@@ -97,7 +97,7 @@ def _first_term(compilation: CompiledSeries) -> Expression:
 
 
 def _gauss_statements(attitude: Attitude, compilation: CompiledGauss) -> Iterator[Statement]:
-    """Statement on the rate of the element of a Gauss step at its start."""
+    """Yield the statement on the rate of the group element of a Gauss step at its start."""
     system, group = compilation.system, attitude.group
     pace = compilation.gauge.pace(system)
     points = stage_map(compilation.discretised, compilation.gauss, pace)
@@ -114,9 +114,10 @@ def _gauss_statements(attitude: Attitude, compilation: CompiledGauss) -> Iterato
 
 
 def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: Expression | None = None) -> Statement:
-    """∇S_1, ``slope``, plus the terms restored for Casimirs equals ∇H, in the components of the rotation.
+    """Return the statement that ∇S_1 (``slope``) plus the terms restored for Casimirs equals ∇H, in rotation
+    components.
 
-    With a ``monitor`` g they are g∇H where K = 0.
+    With a ``monitor`` g, the sum equals g∇H where K = 0.
     """
     group, velocity = attitude.group, list(gradient(system.hamiltonian, system.coordinates))
     if monitor:
@@ -132,7 +133,10 @@ def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: E
 
 
 def path_statement(system: System, group: Group) -> Statement:
-    """Along ṁ = π(m)p with ġ = g·p, or p·g, momenta in the other frame are constant; α, β are ends of such a path."""
+    """Return the statement that momenta in the other frame are constant along ṁ = π(m)p with ġ = g·p or p·g.
+
+    α and β are the ends of such a path.
+    """
     m, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
     slope = hamiltonian_vector_field(system.poisson, p)
     r, t = [p[i] for i in group.rotation], [p[i] for i in group.translation]
@@ -153,7 +157,8 @@ def path_statement(system: System, group: Group) -> Statement:
 
 
 def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) -> Iterator[Statement]:
-    """Statements on the parts: the gradient of each is constant along its flow; their sum with Casimirs is H."""
+    """Yield the statements on the parts of a splitting: the gradient of each is constant along its flow; they sum to
+    H with Casimirs."""
     system, splitting, group = compilation.system, compilation.splitting, attitude.group
     elements = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
     order = "exp(t∇H_{k}) g₀" if group.spatial else "g₀ exp(t∇H_{k})"
@@ -189,7 +194,8 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
 
 
 def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]:
-    """Yield the rates of free rigid bodies along the other terms, which come first."""
+    """Yield the rates of the coordinates of free rigid bodies along the terms that precede the bodies; all must be
+    0."""
     for factor in turning.factors if turning.bodies else ():
         rates = hamiltonian_vector_field(system.poisson, gradient(factor, system.coordinates))
         rate_of = dict(zip(system.coordinates, rates, strict=True))
@@ -197,7 +203,8 @@ def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]
 
 
 def _weights(turning: Turning, group: Group) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of α_i = w_k − w_j for the weights of H, with the sign of the bracket."""
+    """Yield the residuals of α_i = ±(w_k − w_j), where w are the second derivatives of H and α the factors of the
+    rotations."""
     for body in turning.bodies:
         w = [derivative(derivative(body.hamiltonian, c), c) for c in body.coordinates]
         for a, (j, k) in zip(body.factors, CYCLIC, strict=True):
@@ -205,7 +212,10 @@ def _weights(turning: Turning, group: Group) -> Iterator[tuple[str, Expression]]
 
 
 def exponential_statement(system: System, group: Group, turning: Turning, name: str) -> Statement:
-    """dE/dt = (1 + E)P for each factor, with P the matrix of its gradient, and E = 0 at t = 0."""
+    """Return the statement that each factor 1 + E of the group element solves dE/dt = (1 + E)P with E = 0 at t = 0.
+
+    P is the matrix of the gradient of the term of H that belongs to the factor.
+    """
     residuals = []
     for factor, factor_element in zip(turning.factors, factor_elements(system, group, turning), strict=True):
         rate = group.generator(gradient(factor, system.coordinates))
@@ -216,7 +226,8 @@ def exponential_statement(system: System, group: Group, turning: Turning, name: 
 
 
 def _matrix_statements(system: System, chart: BiRealisation, attitude: Attitude) -> Iterator[Statement]:
-    """The matrices represent the bracket; the element is the exponential, or the Cayley transform, of p."""
+    """Yield two statements: the matrices represent the bracket; the element is the exponential, or the Cayley
+    transform, of p."""
     algebra = system.lie_algebra
     assert algebra is not None
     yield representation_statement(system, algebra, attitude.group)
@@ -227,7 +238,10 @@ def _matrix_statements(system: System, chart: BiRealisation, attitude: Attitude)
 
 
 def representation_statement(system: System, algebra: LieAlgebra, group: Group) -> Statement:
-    """[E_i, E_j] = ± Σ c_ij^k E_k: + where elements are multiplied from the left, for {x_i, x_j} = Σ c_ij^k x_k."""
+    """Return the statement [E_i, E_j] = ± Σ c_ij^k E_k, for {x_i, x_j} = Σ c_ij^k x_k.
+
+    The sign is + if the group element is multiplied from the left.
+    """
     n, size = range(algebra.dimension), range(group.rows)
     residuals = []
     for i, j in combinations(n, 2):
@@ -243,9 +257,10 @@ def representation_statement(system: System, algebra: LieAlgebra, group: Group) 
 
 
 def ends_statement(system: System, beta: Vector) -> Statement:
-    """β(x, p) is the end of the path ṁ = π(m)p of mean x, for a β that is linear in x.
+    """Return the statement that β(x, p) is the end of the path ṁ = π(m)p of mean x, for a β that is linear in x.
 
-    That is b(M)x for Mx = π(x)p, b(z) = z/(1 − e^{−z}), the only solution of z b' = b + z b − b² with b(0) = 1.
+    With Mx = π(x)p, the end is b(M)x, b(z) = z/(1 − e^{−z}). b is the only solution of z b' = b + z b − b² with b(0) =
+    1.
     """
     names, p = system.coordinates, covector_symbols(system.coordinates)
     twice = substitute(beta, dict(zip(names, beta, strict=True)))
@@ -257,7 +272,10 @@ def ends_statement(system: System, beta: Vector) -> Statement:
 
 
 def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: Vector, beta: Vector) -> Statement:
-    """Ad*_g₁ β = Ad*_g₀ α for the Cayley transform τ of P, on all elements of the form (1 ± P/2) E_i (1 ∓ P/2)."""
+    """Return the statement Ad*_g₁ β = Ad*_g₀ α for the Cayley transform τ of P.
+
+    It is decided on all elements of the form (1 ± P/2) E_i (1 ∓ P/2).
+    """
     p, n = covector_symbols(system.coordinates), range(algebra.dimension)
     sign = 1 if group.spatial else -1
     matrices = tuple(
@@ -270,7 +288,8 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
         half = [total(sign * c * p[a] / 2 for a in n for m, c in algebra.bracket(a, i).items() if m == k) for k in n]
         square = [total(c * p[a] * p[b] / 4 for (j, a, b, m), c in terms.items() if (j, m) == (i, k)) for k in n]
         momenta = (beta, alpha) if group.spatial else (alpha, beta)
-        # ⟨β, (1 + P/2) E_i (1 − P/2)⟩ = ⟨α, (1 − P/2) E_i (1 + P/2)⟩, where x are in space; else with −P.
+        # ⟨β, (1 + P/2) E_i (1 − P/2)⟩ = ⟨α, (1 − P/2) E_i (1 + P/2)⟩ if x is the momentum in space; otherwise P has the
+        # other sign.
         first_equation = [total((h - q) * x for h, q, x in zip(half, square, momenta[0], strict=True)), momenta[0][i]]
         less = [total((-h - q) * x for h, q, x in zip(half, square, momenta[1], strict=True)), momenta[1][i]]
         residuals.append((f"E_{i + 1}", total(first_equation) - total(less)))
@@ -316,7 +335,8 @@ def element_statements(
 def _residuals(
     group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector
 ) -> Iterator[tuple[str, Expression]]:
-    """Momenta after less those before, times |τ|², and |g₀|² for those of se(3)."""
+    """Yield the residuals of the momentum: after the step minus before it, times |τ|², and for se(3) also times
+    |g₀|²."""
     square = dot(turn, turn)
     product_after = product(turn, BEFORE) if group.spatial else product(BEFORE, turn)
     first, last = (_conjugate(q) if group.spatial else list(q) for q in (BEFORE, product_after))
@@ -332,7 +352,7 @@ def _residuals(
 
 
 def _screwed(group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector) -> list[Expression]:
-    """The residual of the angular momentum of se(3) for g₀ = 1, where the product is the element itself."""
+    """Return the residuals of the angular momentum of se(3) for g₀ = 1, where the attitude after the step is τ."""
     square = dot(turn, turn)
     (momentum_before, _), (momentum_after, force) = (
         ([x[i] for i in group.rotation], [x[i] for i in group.translation]) for x in (start, end)
@@ -351,7 +371,10 @@ def _screwed(group: Group, turn: Vector, shift: Vector, start: Vector, end: Vect
 
 
 def _with_phi(expressions: Sequence[Expression], value: Callable[[Expression], Expression]) -> list[Expression]:
-    """The expressions with another value of φ, and φ′ by the differential equation: no other property of φ is used."""
+    """Return the expressions with each φ(s) replaced by ``value``, and φ′ by its differential equation.
+
+    The proofs use no other property of φ.
+    """
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op not in SPECIAL:
@@ -363,17 +386,17 @@ def _with_phi(expressions: Sequence[Expression], value: Callable[[Expression], E
 
 
 def _any(s: Expression) -> Expression:
-    """φ as a free symbol, without any of its properties."""
+    """Return a free symbol for φ(s), about which nothing is assumed."""
     return symbol(Symbol("phi"))
 
 
 def _quarter(s: Expression) -> Expression:
-    """φ(s/4) by c = 1 − φ(s/4)s/4, with φ(s/4) a free symbol."""
+    """Return φ(s/4) in terms of c = 1 − φ(s/4)s/4, with φ(s/4) as a free symbol."""
     return (ONE - symbol(Symbol("cosine"))) / s
 
 
 def _doubled(s: Expression) -> Expression:
-    """φ(s) from φ(s/4): with c = 1 − φ(s/4)s/4 = w cot w for w = √s/4, 2w cot 2w = (c² − w²)/c."""
+    """Return φ(s) in terms of φ(s/4): c = 1 − φ(s/4)s/4 = w cot w for w = √s/4, and 2w cot 2w = (c² − w²)/c."""
     c = symbol(Symbol("cosine"))
     return (ONE - (c**2 - s / 16) / c) / s
 

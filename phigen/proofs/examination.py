@@ -1,4 +1,4 @@
-"""All proofs about one spec, in groups; the refuted statements with their places in the spec."""
+"""All proofs about one spec, in groups, and the refuted statements with their places in the spec."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from phigen.proofs.statements import (
 from phigen.spec.model import LieAlgebraForm, Spec
 from phigen.symbolic.verdict import REFUTED, Statement
 
-#: Groups of statements that depend on π: if π is not a Poisson tensor, they are not examined.
+#: Groups of statements that are not examined if π is not a Poisson tensor, since they depend on it.
 UNEXAMINED = "Casimirs, invariants, the method"
 
-#: The keys of a spec to which a group of statements refers.
+#: Keys of a spec that a group of statements refers to.
 _PLACES = {METHOD: ("birealisation",), MONITOR: ("monitor",), SPLITTING: ("scheme",), ATTITUDE: ("reconstruct",)}
 _PLACES |= {DAMPING: ("damping",), GAUSS: ("scheme",)}
 
 
 @dataclass(frozen=True)
 class Examination:
-    """The statements proved or refuted about a spec.
+    """The statements about a spec, with their verdicts.
 
-    ``compilation`` is None if there is none; ``obstacle`` then has the reason. An obstacle is not a refutation: no
-    bi-realisation of the catalogue may apply to a perfectly good Poisson tensor. ``unexamined`` names the groups
-    that were skipped since they depend on a refuted statement; it is empty if everything was examined.
+    ``compilation`` is None if the spec does not compile; ``obstacle`` is then the reason. An obstacle is not a
+    refutation: no bi-realisation of the catalogue may apply to a correct Poisson tensor. ``unexamined`` names the
+    groups that were skipped since they depend on a refuted statement; it is empty if everything was examined.
     """
 
     spec: Spec
@@ -52,15 +52,15 @@ class Examination:
 
     @property
     def refuted(self) -> list[Statement]:
-        """The statements that are false."""
+        """The refuted statements."""
         return refuted(self.groups)
 
     @property
     def mistakes(self) -> list[tuple[str, Statement]]:
-        """The false statements with their groups, without those that may follow from an earlier false one.
+        """The refuted statements with their groups, without those that may follow from an earlier one.
 
         Casimirs and invariants are independent of each other. The axioms of a bi-realisation, and the flows of a
-        splitting, are about the same few formulas: the first failure shows the error.
+        splitting, concern the same few formulas, so only the first refuted statement of the group is listed.
         """
         mistakes = []
         for group, statements in self.groups.items():
@@ -70,12 +70,12 @@ class Examination:
 
 
 def refuted(groups: Groups) -> list[Statement]:
-    """The statements that are false."""
+    """Return the refuted statements of all groups."""
     return [s for group in groups.values() for s in group if s.verdict == REFUTED]
 
 
 def refutation(examination: Examination) -> str:
-    """The refuted statements for a message, each with its place in the spec."""
+    """Return the text of a message on the refuted statements, each with its place in the spec."""
     unexamined_note = (
         f"not examined, because they depend on it: {examination.unexamined}" if examination.unexamined else ""
     )
@@ -90,9 +90,10 @@ def refutation(examination: Examination) -> str:
 
 
 def hint_of(spec: Spec, group: str) -> str:
-    """The usual cause of a false statement of a group, or nothing.
+    """Return a hint at the usual cause of a refuted statement of a group, or "".
 
-    For Casimirs: the order of the coordinates differs from that of the basis of the named algebra.
+    For Casimirs, the cause may be that the order of the coordinates differs from that of the basis of the named
+    algebra.
     """
     form = spec.poisson
     if group == DAMPING:
@@ -105,7 +106,8 @@ def hint_of(spec: Spec, group: str) -> str:
 
 
 def doubts(examination: Examination) -> list[Diagnostic]:
-    """Warnings of expressions that seem to be undefined everywhere, or at the start of a run, with their places."""
+    """Return warnings about expressions that seem to be undefined everywhere or at the start of a run, with their
+    places."""
     messages = [
         examination.spec.diagnostic(_place(examination.spec, DEFINEDNESS, s), str(s))
         for s in examination.groups.get(DEFINEDNESS, ())
@@ -114,7 +116,7 @@ def doubts(examination: Examination) -> list[Diagnostic]:
 
 
 def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:
-    """The path of keys to the subject of a statement."""
+    """Return the path of keys in the spec to the subject of a statement."""
     key_paths: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
     key_paths |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
     key_paths |= {"H is defined": ("hamiltonian",), "the density of a pair is symmetric": ("hamiltonian", "pairs")}
@@ -125,7 +127,7 @@ def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:
 
 
 def located(error: SpecError, spec: Spec) -> SpecError:
-    """The error with the line of the spec that each diagnostic is about."""
+    """Return the error with a line of the spec for each diagnostic."""
     lines = spec.source.split("\n")
 
     def shown(d: Diagnostic) -> Diagnostic:

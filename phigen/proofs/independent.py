@@ -1,4 +1,4 @@
-"""The second derivation (`phigen.series.reference`) compared with the compiler's, term by term."""
+"""Comparison of the second derivation, `phigen.series.reference`, with that of the compiler, term by term."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ from phigen.series.reference_paths import source_of_paths
 from phigen.symbolic.expression import Expression, symbol
 from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, refutation, sample_point
 
-#: Seconds allowed for the second derivation of one spec by default.
+#: Default time limit for the second derivation of one spec, in seconds.
 SECONDS = 60.0
 
-#: Digits of values at points, and how many of them must agree.
+#: Number of digits of values at points, and number of digits that must agree.
 DIGITS, AGREEING = 120, 60
 _ATTEMPTS = 64
 _LONGEST = 160
 
-#: The comparisons after the S_i.
+#: Names of the comparisons that follow those of the S_i.
 GRADIENT, MAPS = "∇S_h", "α and β"
 
-#: A pair that should be equal, with its name.
+#: A name, and two sympy expressions that should be equal.
 Pair = tuple[str, Any, Any]
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Whether both derivations agree on S_``term`` or, if that is None, on ∇S_h or on α and β.
+    """Result of a comparison of both derivations: of S_``term`` or, if ``term`` is None, of ∇S_h or of α and β.
 
-    ``sympy`` and ``compiler`` are the seconds that they took for S_1 … S_term; of terms derived before, only
-    the seconds of sympy are known.
+    ``sympy`` and ``compiler`` are the seconds that the derivations took up to this S_i. For terms that the compiler had
+    derived before, its seconds are not known.
     """
 
     statement: Statement
@@ -59,7 +59,7 @@ class Agreement:
 
     @property
     def timed(self) -> Statement:
-        """The statement with the seconds."""
+        """The statement, with the seconds in its detail."""
         seconds = f"in {self.sympy:.2f} s"
         if self.compiler is not None:
             terms = "" if self.term == 1 else f"S_1 … S_{self.term} "
@@ -68,14 +68,14 @@ class Agreement:
 
 
 class OutOfTimeError(BaseException):
-    """The time limit is reached. Not an `Exception`, so that no handler in between catches it."""
+    """The time limit is reached. This is not an `Exception`, so that no handler for exceptions catches it."""
 
 
 def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Agreement]:
-    """Yield comparisons of S_1 … S_terms, by default all of the method, then of ∇S_h, α and β.
+    """Yield comparisons of S_1 … S_terms, by default all S_i of the method, then of ∇S_h, α and β.
 
-    ∇S_h of the program is compared if it needs no further S_i. If steps follow paths, α and β enter through the S_i
-    only. Raises `LimitError` when the ``seconds`` are used up, or when a polynomial has too many terms.
+    The ∇S_h of the program is compared only if no further S_i is needed for it. If steps follow paths, α and β are
+    compared only through the S_i. Raises `LimitError` after ``seconds``, or if a polynomial has too many terms.
     """
     terms = terms or compilation.stage.terms
     derivation: _Derivation | None = None
@@ -91,7 +91,7 @@ def compare(compilation: CompiledSeries, terms: int | None = None, seconds: floa
 
 
 def _steps(compilation: CompiledSeries, terms: int) -> list[str]:
-    """The steps of the comparison, by name."""
+    """Return the names of the comparisons, in order."""
     steps = [f"S_{i}" for i in range(1, terms + 1)]
     if compilation.scheme.terms <= terms:
         steps.append(GRADIENT)
@@ -108,10 +108,10 @@ def _limit(compilation: CompiledSeries, step: str, reached: int, reason: str) ->
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raises `OutOfTimeError` if the context takes longer; without effect outside the main thread, which alone
-    receives signals.
+    """Return a context that raises `OutOfTimeError` after a number of seconds.
 
-    Python drops an exception in a destructor or the callback of a weak reference, so it is raised again every second.
+    It has no effect outside the main thread, which alone receives signals. Python drops an exception that is raised in
+    a destructor or in the callback of a weak reference, so the exception is raised again every second.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -133,7 +133,7 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 
 class _Derivation:
-    """Both derivations of one compilation, as far as they have been computed."""
+    """Both derivations of the S_i of one compilation, as far as they have been computed."""
 
     def __init__(self, compilation: CompiledSeries, terms: int) -> None:
         self._compilation, self._terms = compilation, terms
@@ -155,7 +155,7 @@ class _Derivation:
         return closed_form(self._maps(maps), self._dictionary.covector)
 
     def _maps(self, maps: Sequence[Expression]) -> list[Any]:
-        """α or β of the compiler, with φ expanded at 0."""
+        """Return α or β of the compiler in sympy, with φ expanded at 0."""
 
         def expanded(order: int, s: Any) -> Any:
             least = min(sum(mu) for mu in closed_form([s], self._dictionary.covector)(self._degree)[0])
@@ -165,17 +165,17 @@ class _Derivation:
 
     @property
     def _degree(self) -> int:
-        """The degree in p up to which the maps are compared: that needed for S_1 … S_terms, at least 2."""
+        """The degree in p up to which α and β are compared: the degree that S_1 … S_terms need, at least 2."""
         degree, chart = max(self._terms - 1, 2), self._compilation.realisation
         return degree if chart.exact or chart.degree is None else min(degree, chart.degree)
 
     @property
     def reached(self) -> int:
-        """The number of S_i derived so far."""
+        """The number of S_i that have been derived."""
         return len(self._found)
 
     def compared(self, step: str) -> Agreement:
-        """The comparison of the next S_i, or of the gradient or the maps."""
+        """Return the comparison named ``step``: of the next S_i, of the gradient, or of the maps."""
         if step == GRADIENT:
             return self._gradient()
         if step == MAPS:
@@ -198,7 +198,7 @@ class _Derivation:
         return Agreement(statement, i, self._taken, end - middle)
 
     def _gradient(self) -> Agreement:
-        """∇S_h of one stage, with coefficients replaced by their expressions."""
+        """Return the comparison of ∇S_h of one stage, with coefficients replaced by their expressions."""
         scheme, h = self._compilation.scheme, self._dictionary.step
         start = time.perf_counter()
         slope = scheme.generating.coefficients.written_out(scheme.generating.slope)
@@ -213,7 +213,7 @@ class _Derivation:
         return Agreement(statement, None, time.perf_counter() - start)
 
     def _pushes(self) -> dict[Any, Any]:
-        """Terms of p besides ∇S_h, by coordinate: hζ of forces, ΔW σ∇g of noise."""
+        """Return the terms of p besides ∇S_h, by coordinate: hζ of forces, ΔW σ∇g of noise."""
         system, dictionary = self._compilation.system, self._dictionary
         pushes = dict.fromkeys(dictionary.coordinates, sympy.Integer(0))
         for c, zeta in zip(dictionary.coordinates, system.forces.covector if system.forces else (), strict=False):
@@ -230,7 +230,7 @@ class _Derivation:
         return chart.kind == exponential.KIND or flat
 
     def _at_origin(self) -> list[Pair]:
-        """α(x, 0) and β(x, 0) minus x, which the coefficients of higher degree do not contain."""
+        """Return the pairs for α(x, 0) = x and β(x, 0) = x, which coefficients of positive degree do not contain."""
         chart, origin = self._compilation.realisation, dict.fromkeys(self._dictionary.covector, 0)
         return [
             (f"{name}_{x} at p = 0", e.subs(origin), x)
@@ -260,10 +260,10 @@ class _Derivation:
 
 
 def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: str) -> Statement:
-    """Whether both of each pair are equal, as functions of their symbols.
+    """Return the statement that both expressions of each pair are equal, as functions of their symbols.
 
-    Equality is proved if the difference is 0 as a polynomial in functions, by the relations of `Functions`.
-    Otherwise values at points, in `DIGITS` digits, refute it or agree.
+    Equality is proved if the difference is 0 as a polynomial in functions, by the relations of `Functions`. Otherwise
+    the values at points are compared in `DIGITS` digits: they refute equality, or the statement is checked.
     """
     fewest, open_pairs = POINTS, 0
     for label, theirs, mine in pairs:
@@ -287,7 +287,8 @@ def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: 
 
 
 def _differing_point(pair: Sequence[Any], positive: Collection[str]) -> str | int:
-    """A point where both differ, with their values; otherwise the number of points where they agree."""
+    """Return a point where both expressions differ, with their values, as text; else the number of points where they
+    agree."""
     symbols = sorted(set().union(*(e.free_symbols for e in pair)), key=str)
     values = sympy.lambdify(symbols, list(pair), modules=[{Sign.__name__: mpmath.sign}, "mpmath"], cse=True)
     agreeing = 0

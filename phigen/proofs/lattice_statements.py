@@ -14,7 +14,7 @@ from phigen.symbolic.verdict import REFUTED, Statement
 
 
 def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
-    """The statements of `tensor` and `integrals` for a lattice of any size."""
+    """Return the statements on π, Casimirs and invariants of a lattice of any size, by group."""
     groups = {"Poisson tensor": proofs.tensor(cell)}
     if any(s.verdict == REFUTED for s in groups["Poisson tensor"]):
         return groups
@@ -29,7 +29,11 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
 
 
 def sweeps(compilation: CompiledLattice) -> dict[str, tuple[Statement, ...]]:
-    """The parts of H of a lattice and their flows, or its bi-realisation and the equation of a stage."""
+    """Return the statements on the method of a lattice, by group.
+
+    A splitting has statements on the parts of H and their flows, a series on its bi-realisation and the equation of a
+    stage.
+    """
     cell, plan = compilation.cell, compilation.sweeps
     group = f"{METHOD} ({plan.kind})" if plan.is_implicit else SPLITTING
 

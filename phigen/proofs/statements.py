@@ -1,4 +1,4 @@
-"""Statements on a system and on its method, in groups: proved, refuted, or checked."""
+"""Statements on a system and on its method, by group, each proved, refuted or checked."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from phigen.splitting.statements import check as check_splitting
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_elements
 
-#: Statements by the part of the mathematics they belong to, in the order of the pipeline.
+#: Statements by group, a part of the mathematics, in the order of the pipeline.
 Groups = Mapping[str, tuple[Statement, ...]]
 
 PREFIX = "bi-realisation: "
@@ -33,7 +33,8 @@ GAUSS = "Gauss collocation"
 
 
 def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """Statements on expressions that are undefined everywhere, or where a run starts; none if all are defined."""
+    """Return the statements on expressions that are undefined everywhere or at the start of a run; none if all are
+    defined."""
     starts = _starts(system, spec)
     undefined = tuple(undefined_parts(system, starts)) or tuple(
         undefined_starts(system, dict(zip(spec.runs, starts, strict=True)))
@@ -42,7 +43,7 @@ def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
 
 
 def _starts(system: System, spec: Spec) -> list[dict[str, float]]:
-    """Coordinates, parameters and times where runs start."""
+    """Return the coordinates, parameters and times at the starts of all runs, by name."""
     starts = []
     for run in spec.runs.values():
         initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
@@ -51,7 +52,7 @@ def _starts(system: System, spec: Spec) -> list[dict[str, float]]:
 
 
 def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """g of dt = g dτ is positive; no statement without a monitor."""
+    """Return the statement that the factor g of dt = g dτ is positive; no statement without a monitor."""
     if spec.monitor is None or isinstance(spec.monitor, str):
         return {}
     positive = [p.name for p in spec.parameters if p.positive]  # a factor that may be 0 is not positive
@@ -59,7 +60,10 @@ def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
 
 
 def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tuple[Statement, ...]]:
-    """λ of the damping is not negative; no statement without damping, or if its sign is unknown."""
+    """Return the statement that the damping coefficient λ is not negative, decided at ``starts``.
+
+    There is no statement without damping, or if its sign is unknown.
+    """
     rate = spec.forces.damping
     if rate is None:
         return {}
@@ -69,17 +73,17 @@ def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tupl
 
 
 def damping_of(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """`damping` where runs start, or with the defaults of the parameters if it depends on these only."""
+    """Return `damping` at the starts of runs or, if λ depends on parameters only, with their defaults."""
     return damping(spec, _starts(system, spec) or _defaults(spec))
 
 
 def damping_of_lattice(spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """`damping` of a lattice, with the parameters that are one number."""
+    """Return `damping` of a lattice, with those parameters that are one number."""
     return damping(spec, _defaults(spec, *spec.runs.values()))
 
 
 def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
-    """The parameters of runs, or their defaults, if the damping depends on nothing else."""
+    """Return the parameters of runs, or the defaults, if the damping depends on parameters only; else nothing."""
     numbers = {p.name for p in spec.parameters if p.at == "all"}
     rate = spec.forces.damping
     if rate is None or not set(symbols_of(rate)) <= numbers:
@@ -89,13 +93,13 @@ def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
 
 
 def tensor(system: System) -> dict[str, tuple[Statement, ...]]:
-    """π is skew and satisfies the Jacobi identity; the latter is examined for a skew π only."""
+    """Return the statements that π is skew and satisfies the Jacobi identity; the second one only if π is skew."""
     skew = checks.skew_symmetry(system)
     return {"Poisson tensor": (skew,) if skew.verdict == REFUTED else (skew, jacobi_identity(system))}
 
 
 def integrals(system: System) -> dict[str, tuple[Statement, ...]]:
-    """Statements on the Casimirs, the rank of π, changes by forces, and the declared invariants."""
+    """Return the statements on the Casimirs, the rank of π, the changes by forces, and the declared invariants."""
     casimirs = (*checks.casimir_statements(system), checks.rank_statement(system))
     invariants = tuple(checks.invariant_statements(system))
     forces = tuple(checks.force_statements(system))
@@ -113,7 +117,10 @@ def _attitude(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
 
 
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
-    """The flows of a splitting; or the axioms of the bi-realisation and the Hamilton–Jacobi equation."""
+    """Return the statements on a method, by group.
+
+    They are on the flows of a splitting, or on the axioms of the bi-realisation and the Hamilton–Jacobi equation.
+    """
     return compilation.by_kind(_method_by_series, _method_by_splitting, _method_by_gauss) | _attitude(compilation)
 
 
@@ -136,7 +143,8 @@ def _method_by_series(compilation: CompiledSeries) -> dict[str, tuple[Statement,
 
 
 def series_statements(compilation: CompiledSeries) -> Iterator[Statement]:
-    """S_1 … S_k solve the Hamilton–Jacobi equation; S_i of even index vanish if the order relies on it."""
+    """Yield the statements on S_1 … S_k: they solve the Hamilton–Jacobi equation, and those of even index vanish if
+    the order relies on it."""
     system, realisation, plan = compilation.discretised, compilation.realisation, compilation.stage
     terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 implies the order k + 1
     equation = "∂_t S_t = H(α(x, ∇S_t))" if not system.time else "∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t"
@@ -159,6 +167,6 @@ def series_statements(compilation: CompiledSeries) -> Iterator[Statement]:
 
 
 def sum_of_terms(terms: int) -> str:
-    """``t S_1 + … + t^5 S_5``."""
+    """Return the text ``t S_1 + … + t^5 S_5`` for 5 terms."""
     summands = ["t S_1", *(f"t^{i} S_{i}" for i in range(2, terms + 1))]
     return " + ".join(summands if terms < 4 else [summands[0], "…", summands[-1]])

@@ -1,4 +1,7 @@
-"""The choice of a kind by the shape of π. Exact closed forms come first; following paths, which always works, last."""
+"""The kind ``auto``: choice of a bi-realisation by the shape of π.
+
+Exact closed forms come first. The last choice is following paths, which is possible for every π.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +18,14 @@ from phigen.spec.model import BirealisationChoice, PullbackForm
 
 KIND = "auto"
 
-#: |π∇S_3| and |π∇S_5| with the Cayley transform over the same with the exponential, medians over random quadratic H
-#: (and tops): 26 and 710 on so(3)*, 8 and 49 on se(3)*, 15 and 330 on so(4)*; 0.9 to 2 on sl(2)* and gl(2)*.
+#: Medians of |π∇S_3| and |π∇S_5| with the Cayley transform, divided by those with the exponential. They are over random
+#: quadratic H (and tops): 26 and 710 on so(3)*, 8 and 49 on se(3)*, 15 and 330 on so(4)*; 0.9 to 2 on sl(2)* and
+#: gl(2)*.
 _BETTER = "preferred to the Cayley transform, whose error constants are 8 to 26 times larger on so(3), so(4) and se(3)"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation that fits the shape of π; its ``explanation`` names the kind and the reason."""
+    """Return the bi-realisation that fits the shape of π; its ``explanation`` names the kind and the reason."""
     match system.shape:
         case Constant() | Canonical():
             realisation = constant.build(system, choice)
@@ -35,7 +39,11 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Exponential in closed form, else block by block, else Cayley, else the exponential by following paths."""
+    """Return a bi-realisation of a linear or affine π.
+
+    Candidates, in order: the exponential in closed form, block by block, the Cayley transform, the exponential along
+    paths.
+    """
     candidate = exponential.closed_form(system)
     if candidate is not None:
         return replace(candidate, explanation=f"{candidate.explanation}; {_BETTER}")
@@ -53,7 +61,11 @@ def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _general(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Constant in other coordinates, or a closed form in those of the spec or for each block; else Karasev."""
+    """Return a bi-realisation of a π that is not linear.
+
+    Candidates, in order: constant π in other coordinates, a closed form in the coordinates of the spec or for each
+    block, and Karasev's construction.
+    """
     for kind in (_gauged, _pulled_back, _by_blocks):
         candidate = _applicable(kind, system, choice)
         if candidate is not None:

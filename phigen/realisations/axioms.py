@@ -23,18 +23,19 @@ from phigen.symbolic.expression import ZERO, Expression, call, fold, number, reb
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import Statement, decide_elements, decide_zero
 
-#: The names of the statements.
+#: Names of the statements on brackets.
 ALPHA, BETA, MIXED = "{α_i, α_j} = π_ij∘α", "{β_i, β_j} = −π_ij∘β", "{α_i, β_j} = 0"
 
-#: Two indices, and the expression that should be 0.
+#: Two indices (i, j), and the polynomial that is 0 if the axiom holds for them.
 Residual = tuple[int, int, Poly]
 
 
 def check(system: System, realisation: BiRealisation) -> list[Statement]:
-    """Statements on the unit, the three families of brackets, and the simplified forms used by the solver.
+    """Return the statements on the unit, on the three families of brackets, and on the simplified forms that the solver
+    uses.
 
-    Of a pull-back the brackets are proved in the other coordinates. Of a truncation (``exact`` False), and of the
-    formal series of a path, the brackets are stated, and proved, up to its degree less one.
+    For a pull-back, the brackets are proved in the other coordinates. For a truncation (``exact`` is false) and for the
+    formal series of a path, they are stated and proved up to the degree of the series minus one.
     """
     if realisation.inner is not None and is_composed(system, realisation):
         return [_unit(system, realisation), *_inner(realisation.inner), _simplified_forms(system, realisation)]
@@ -47,7 +48,8 @@ def check(system: System, realisation: BiRealisation) -> list[Statement]:
 
 
 def _inner(inner: tuple[System, BiRealisation]) -> list[Statement]:
-    """The brackets of the inner structure of a pull-back, with its coordinates in the statement."""
+    """Return the statements on the brackets of the inner structure of a pull-back, with the names of its
+    coordinates."""
     place = f"in the coordinates {', '.join(inner[0].coordinates)}"
     return [replace(s, detail=f"{s.detail}, {place}" if s.detail else place) for s in check(*inner)[1:4]]
 
@@ -72,7 +74,7 @@ def _simplified_forms(system: System, realisation: BiRealisation) -> Statement:
 
 
 def _in_exponentials(e: Expression) -> Expression:
-    """Hyperbolic functions written with exp, whose relations the ring knows."""
+    """Return the expression with hyperbolic functions written in terms of exp, whose relations the ring knows."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         if node.op in ("sinh", "cosh"):

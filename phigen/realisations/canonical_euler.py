@@ -1,6 +1,6 @@
-"""Canonical π, one-sided: α = (q, p + a), β = (q + b, p), or the adjoint. With k = 1 this is symplectic Euler.
+"""Bi-realisation of a canonical π that is not symmetric: α = (q, p + a), β = (q + b, p), or its adjoint.
 
-(a, b) is the covector at (q, p). For separable H the step is explicit.
+(a, b) is the covector at (q, p). With k = 1 the step is symplectic Euler; it is explicit for separable H.
 """
 
 from __future__ import annotations
@@ -15,10 +15,12 @@ KIND = "canonical-euler"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation of a canonical π; ``choice.side`` q or p names the part that α leaves alone.
+    """Return the bi-realisation of a canonical π. ``choice.side``, q or p, names the coordinates that α does not
+    change.
 
-    q: α = (q, p + a), β = (q + b, p); p: α = (q − b, p), β = (q, p − a). Not symmetric, so that order k takes
-    S_1 … S_k. Coordinates that are Casimirs stay. Raises `SpecError` unless π is canonical in pairs.
+    With q: α = (q, p + a), β = (q + b, p). With p: α = (q − b, p), β = (q, p − a). It is not symmetric, so order k
+    needs S_1 … S_k. Coordinates that are Casimirs are not changed. Raises `SpecError` unless the coordinates form
+    canonical pairs.
     """
     shape = system.shape
     if not isinstance(shape, Canonical):

@@ -1,4 +1,7 @@
-"""The kinds of bi-realisations, by name. To add a kind, add a file with KIND and build, and name it here."""
+"""The kinds of bi-realisations, by name.
+
+A new kind is a file with KIND and build, imported and listed here.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,10 @@ from phigen.spec.model import BirealisationChoice
 
 
 def _of_parts(build: Callable[[System, BirealisationChoice, Builder], BiRealisation]) -> Builder:
-    """The builder of the inner kind of a composed kind: ``choice.of``, by default auto."""
+    """Return the builder of a composed kind, from a function that also receives the builder of the inner kind.
+
+    The inner kind is ``choice.of``, by default auto.
+    """
 
     def built(system: System, choice: BirealisationChoice) -> BiRealisation:
         return build(system, replace(choice, kind=choice.of, of="auto"), builder(choice.of))
@@ -53,7 +59,7 @@ BUILDERS: dict[str, Builder] = {
 
 
 def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:
-    """The bi-realisation requested by a spec (default: ``auto``).
+    """Return the bi-realisation requested by a spec (default: ``auto``).
 
     It is not proved here: pass it to `phigen.realisations.axioms.check`. Raises `SpecError`, located at the spec's
     ``birealisation`` or ``poisson``, for unknown kinds and for kinds that do not apply to the system.
@@ -69,7 +75,7 @@ def realise(system: System, choice: BirealisationChoice | None = None) -> BiReal
 
 
 def builder(kind: str) -> Builder:
-    """The builder of a kind; raises `SpecError` for those that do not exist."""
+    """Return the builder of a kind. Raises `SpecError` for an unknown kind."""
     build = BUILDERS.get(kind)
     if build is not None:
         return build

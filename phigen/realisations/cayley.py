@@ -1,11 +1,13 @@
-"""Linear π, the dual of a Lie algebra: the Cayley transform τ(P) = (1 − P/2)⁻¹(1 + P/2), P = Σ p_i E_i.
+"""Bi-realisation of a linear π, the dual of a Lie algebra, by the Cayley transform.
 
-In a faithful matrix representation with E_i, α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)⟩, that is
+The transform is τ(P) = (1 − P/2)⁻¹(1 + P/2) for P = Σ p_i E_i. In a faithful matrix representation with matrices E_i,
+α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)⟩, that is
 
-    α_i = x_i − ½(πp)_i − ¼⟨x, coordinates of P E_i P⟩,    β(x, p) = α(x, −p),    β − α = πp.
+α_i = x_i − ½(πp)_i − ¼⟨x, coordinates of P E_i P⟩,    β(x, p) = α(x, −p),    β − α = πp.
 
-This needs P E_i P in the algebra for all P, i.e. E_a E_i E_b + E_b E_i E_a ∈ g for all a, i, b: true for so(n),
-sp(2n), gl(n), sl(2), su(2), se(n), aff(n), heisenberg(n), and not for sl(3). The paper (example so(n)) prints 4 for 2.
+This requires P E_i P to be in the algebra for all P, or E_a E_i E_b + E_b E_i E_a ∈ g for all a, i, b. It holds for
+so(n), sp(2n), gl(n), sl(2), su(2), se(n), aff(n) and heisenberg(n), and not for sl(3). The paper (example so(n)) prints
+4 instead of 2.
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ Trilinear = dict[tuple[int, int, int, int], Expression]
 
 @dataclass(frozen=True)
 class _Escape:
-    """A product that is not in the algebra."""
+    """A product E_a E_i E_b + E_b E_i E_a that is not in the algebra, by its indices."""
 
     i: int
     a: int
@@ -46,10 +48,10 @@ class _Escape:
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The Cayley bi-realisation of a linear or affine π; symmetric.
+    """Return the Cayley bi-realisation of a linear or affine π, which is symmetric.
 
-    Raises `SpecError` if π is neither, or no known faithful representation is closed under P E_i P; the
-    message names, for each representation tried, the element that leaves the algebra.
+    Raises `SpecError` if π is neither linear nor affine, or no known faithful representation is closed under P E_i P.
+    For each representation tried, the message names the element that is not in the algebra.
     """
     dual = dual_of(system)
     if dual is None:
@@ -76,14 +78,14 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         beta,
         tuple(displacement),
         increment,
-        True,  # β is α with −p
+        True,  # symmetric: β(x, p) = α(x, −p)
         explanation=f"π is {'linear' if size == n else 'affine'}: Cayley transform, {explanation}; symmetric",
         reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n), with 2 for 4",
     )
 
 
 def closed_representation(algebra: LieAlgebra) -> Representation | None:
-    """The representation of the whole algebra that `closed_product` uses; None without one for all parts."""
+    """Return the representation of the whole algebra that `closed_product` uses, or None."""
     declared = [algebra.representation] if algebra.representation else []
     if not declared and len(indecomposable_parts(algebra)) > 1:
         return None
@@ -91,15 +93,15 @@ def closed_representation(algebra: LieAlgebra) -> Representation | None:
 
 
 def trilinear(algebra: LieAlgebra, representation: Representation) -> Trilinear | None:
-    """The trilinear form of P E_i P in a representation; None if it leaves the algebra."""
+    """Return the trilinear form of P E_i P in a representation, or None if P E_i P is not in the algebra."""
     form = _product(algebra, representation)
     return None if isinstance(form, _Escape) else form
 
 
 def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """Horner form, with a coefficient that all terms have up to sign in front.
+    """Return a sum of monomials in Horner form; a coefficient that all terms share up to sign is factored out.
 
-    For so(3) this leaves p_i (p·x), and the p·x of all components is one node.
+    For so(3) this yields p_i (p·x), and the p·x of all components is one node of the expression graph.
     """
     common = next(iter(terms.values()), ONE)
     if any(c is not common and c is not -common for c in terms.values()):
@@ -108,9 +110,9 @@ def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) 
 
 
 def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
-    """The trilinear form of P E_i P in the first closed representation, and which one that is.
+    """Return the trilinear form of P E_i P in the first closed representation, and a description of the representation.
 
-    Raises `SpecError` naming what was tried.
+    Raises `SpecError` with the representations that were tried.
     """
     failures: dict[str, str] = {}
     if algebra.representation is not None:
@@ -143,7 +145,7 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
 
 
 def _expect_poisson(algebra: LieAlgebra) -> None:
-    """Refuse a linear π that violates the Jacobi identity, for which no representation can exist."""
+    """Raise `SpecError` for a linear π that violates the Jacobi identity, for which no representation exists."""
     failing = failing_jacobi(algebra)
     if failing is not None:
         triple, component, residual = failing
@@ -161,14 +163,14 @@ def _refusal(algebra: LieAlgebra, representation: Representation, escape: _Escap
 
 
 def _product(algebra: LieAlgebra, representation: Representation) -> Trilinear | _Escape:
-    """The trilinear form of P E_i P, or the first product that is not in the algebra."""
+    """Return the trilinear form of P E_i P, or the first product that is not in the algebra."""
     field = Field(v for m in representation.matrices for v in m.values())
     matrices: list[Sparse] = [
         {position: field.convert(v) for position, v in m.items()} for m in representation.matrices
     ]
     span = Span(field, matrices)
     rows = [_by_row(m) for m in matrices]
-    beginning: dict[int, list[int]] = {}  # row → the matrices that have entries in it
+    beginning: dict[int, list[int]] = {}  # row → indices of the matrices that have entries in this row
     for b, row in enumerate(rows):
         for r in row:
             beginning.setdefault(r, []).append(b)

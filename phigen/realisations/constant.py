@@ -14,7 +14,8 @@ KIND = "constant"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation of a constant π, symmetric and global; raises `SpecError` for any other π."""
+    """Return the bi-realisation of a constant π, symmetric and defined for all (x, p). Raises `SpecError` for any
+    other π."""
     if not isinstance(system.shape, Constant | Canonical):
         raise refuse(f"birealisation {KIND} needs a constant π; this one is {system.shape}", "try auto")
     increment = hamiltonian_vector_field(system.shape.matrix, covector_symbols(system.coordinates))

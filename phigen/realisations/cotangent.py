@@ -24,9 +24,9 @@ GradedForm = dict[int, TwoForm]
 
 
 class Cotangent:
-    """The ring of functions on T*U that holds some expressions, closed under all derivatives in x and p.
+    """The ring of functions on T*U that contains some expressions and is closed under all derivatives in x and p.
 
-    ``size`` is n; variable a < n is x_a, variable n + i is p_i. Parameters are symbols of the ring.
+    ``size`` is n. Variable a < n is x_a, variable n + i is p_i. Parameters are symbols of the ring.
     """
 
     def __init__(self, coordinates: Sequence[str], expressions: Sequence[Expression]) -> None:
@@ -39,13 +39,13 @@ class Cotangent:
     # -- functions --------------------------------------------------------------------------------
 
     def along(self, field: Components, f: Poly) -> Poly:
-        """L_Y f = Σ Y_a ∂_a f."""
+        """Return the derivative of f along a field Y: L_Y f = Σ Y_a ∂_a f."""
         return self.tower.combine(
             y * d for y, name in zip(field, self.names, strict=True) if y != 0 and (d := self.derivative(f, name)) != 0
         )
 
     def derivative(self, f: Poly, name: str) -> Poly:
-        """∂f/∂z for a variable's name."""
+        """Return ∂f/∂z for the variable z called ``name``."""
         return self.tower.derivative(f, name)
 
     def scaled(self, f: Poly, factor: Fraction) -> Poly:
@@ -55,11 +55,11 @@ class Cotangent:
     # -- forms ------------------------------------------------------------------------------------
 
     def canonical(self) -> TwoForm:
-        """ω = Σ dx_i ∧ dp_i."""
+        """Return the canonical form ω = Σ dx_i ∧ dp_i."""
         return {(i, self.size + i): self.tower.constant(1) for i in range(self.size)}
 
     def contract(self, field: Components, form: TwoForm) -> Components:
-        """ι_Y Σ w_ab dz_a ∧ dz_b = Σ w_ab (Y_a dz_b − Y_b dz_a)."""
+        """Return the contraction ι_Y Σ w_ab dz_a ∧ dz_b = Σ w_ab (Y_a dz_b − Y_b dz_a)."""
         result = [self.tower.zero] * len(self.names)
         for (a, b), w in form.items():
             result[b] = result[b] + w * field[a]
@@ -79,7 +79,7 @@ class Cotangent:
         return {key: w for key, w in result.items() if w != 0}
 
     def lie(self, field: Components, form: TwoForm) -> TwoForm:
-        """L_Y of a closed form, d ι_Y."""
+        """Return the Lie derivative L_Y of a closed form, d ι_Y."""
         return self.exterior(self.contract(field, form))
 
     def vanishes(self, form: TwoForm) -> bool:
@@ -96,9 +96,9 @@ class Cotangent:
         return {key: w for key, w in result.items() if w != 0}
 
     def euler(self) -> Components:
-        """E = Σ p_i ∂_{p_i}."""
+        """Return the Euler field E = Σ p_i ∂_{p_i}."""
         return [self.tower.zero] * self.size + self.variables[self.size :]
 
     def dual(self, form: Components) -> Components:
-        """The field Y with ι_Y ω = λ: its x part is λ_p, its p part −λ_x."""
+        """Return the field Y with ι_Y ω = λ for a 1-form λ: the x part of Y is λ_p, its p part is −λ_x."""
         return [*form[self.size :], *(-f for f in form[: self.size])]

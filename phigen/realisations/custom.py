@@ -1,4 +1,4 @@
-"""The user's own α and β; the axioms are checked as for every other kind."""
+"""The kind ``custom``: α and β from the spec; the axioms are checked as for every other kind."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ KIND = "custom"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation with ``choice.alpha`` and ``choice.beta``; raises `SpecError` for wrong sizes or symbols."""
+    """Return the bi-realisation of ``choice.alpha`` and ``choice.beta``. Raises `SpecError` for wrong sizes or
+    symbols."""
     known_symbols = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
     for name, maps in (("alpha", choice.alpha), ("beta", choice.beta)):
         if len(maps) != system.dimension:

@@ -31,7 +31,7 @@ from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import sample_point
 
-#: Most terms of one component of M^k x in p and x for which a closed form is tried.
+#: Largest number of terms of a component of M^k x, in p and x, for which a closed form is tried.
 MOST_TERMS = 20_000
 
 Vector = list[Expression]
@@ -39,17 +39,19 @@ Vector = list[Expression]
 
 @dataclass(frozen=True)
 class EvenPart:
-    """``values``: Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x; ``forms``: which closed form holds on which part."""
+    """The even part of b(M_p)x: ``values`` are Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x; ``forms`` describes the closed form
+    of each part."""
 
     values: tuple[Expression, ...]
     forms: tuple[str, ...]
 
 
 def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expression]) -> EvenPart | None:
-    """The closed form for a point x of the dual and p in the algebra; None if none of the three applies.
+    """Return the even part in closed form, for x in the dual and p in the algebra; None if no formula of this module
+    applies.
 
-    Each summand of a direct sum has its own. x and p may be any expressions, e.g. constants in the components of
-    a central extension.
+    Each summand of a direct sum has its own closed form. x and p may be any expressions; for instance, constants in the
+    components of a central extension.
     """
     values: Vector = [ZERO] * algebra.dimension
     forms: list[str] = []
@@ -65,9 +67,9 @@ def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expressi
 
 
 def _parts(algebra: LieAlgebra) -> list[list[int]]:
-    """Ideals spanned by basis elements whose sum is the algebra and which commute with each other.
+    """Return ideals spanned by basis elements, by index, whose sum is the algebra and which commute with each other.
 
-    They may share central elements (the last of a central extension), on which M_p x vanishes.
+    Ideals may share central elements (the last one of a central extension), on which M_p x vanishes.
     """
     touching = {m for ij in algebra.constants for m in ij}
     inner = {ij: {k: c for k, c in row.items() if k in touching} for ij, row in sorted(algebra.constants.items())}
@@ -77,14 +79,15 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
 
 
 def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
-    """The closed form on an ideal spanned by basis elements: as a whole, or by summands in another basis."""
+    """Return the closed form on an ideal spanned by basis elements: of the whole ideal, or of its summands in
+    another basis."""
     closed = _closed(ideal, x, p)
     if closed is not None:
         return closed
     projections = ideal_projections(ideal)
     if len(projections) < 2:
         return None
-    # M_p = Σ M_{e_a p}, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
+    # M_p = Σ M_{e_a p} for the projections e_a onto the summands, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
     summands = [_closed(ideal, x, applied(e, p, ZERO)) for e in projections]
     closed_summands = [s for s in summands if s is not None]
     if len(closed_summands) < len(summands):
@@ -94,7 +97,7 @@ def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
 
 
 def matrix_of(algebra: LieAlgebra, p: Sequence[Expression]) -> list[Vector]:
-    """M_p, (M_p)_ik = Σ_j c_ij^k p_j."""
+    """Return the matrix M_p with (M_p)_ik = Σ_j c_ij^k p_j."""
     n = range(algebra.dimension)
     terms: list[list[list[Expression]]] = [[[] for _ in n] for _ in n]
     for i in n:
@@ -105,7 +108,7 @@ def matrix_of(algebra: LieAlgebra, p: Sequence[Expression]) -> list[Vector]:
 
 
 def times(matrix: Sequence[Sequence[Expression]], vector: Sequence[Expression]) -> Vector:
-    """The product, zero entries skipped."""
+    """Return the product of a matrix and a vector, without zero terms."""
     return [total(m * v for m, v in zip(row, vector, strict=True) if not (m.is_zero or v.is_zero)) for row in matrix]
 
 
@@ -124,7 +127,7 @@ def _closed(algebra: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
 
 
 def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
-    """The s for which 0 and −s can be the only eigenvalues of M²; None if there is none."""
+    """Return the s for which 0 and −s can be the only eigenvalues of M², or None."""
     n = range(len(matrix))
     if not _may_have_root(matrix):
         return None
@@ -140,7 +143,10 @@ def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
 
 
 def _may_have_root(matrix: Sequence[Vector]) -> bool:
-    """Whether (tr M²)² is a multiple of tr M⁴ by 1, …, n at a point: symbolic squares of large matrices take long."""
+    """Whether (tr M²)² is a multiple of tr M⁴ by 1, …, n at a numeric point.
+
+    This test comes first, since symbolic squares of large matrices take long.
+    """
     flat, n = [e for row in matrix for e in row], len(matrix)
     try:
         values = evaluate_exactly(flat, sample_point(symbols_of(*flat), (), 0))
@@ -182,7 +188,7 @@ def _semisimple(tower: Tower, matrix: Sequence[Vector], x: Vector, root: Poly) -
 
 
 def _vanish(tower: Tower, vector: Sequence[Expression]) -> bool:
-    with suppress(DomainError):  # At a point first: the expansion of an element ≠ 0 may be too large.
+    with suppress(DomainError):  # The test at a point comes first: the expansion of a nonzero element may be too large.
         if any(evaluate_exactly(vector, sample_point(symbols_of(*vector), (), 0))):
             return False
     return all(tower.is_zero(v) for v in tower.convert_all(vector))

@@ -1,13 +1,13 @@
-"""Linear and affine π, from the structure constants alone: the exponential, τ = exp.
+"""Bi-realisation of a linear or affine π by the exponential, computed from the structure constants.
 
 With M_p x = π(x)p and b(z) = z/(1 − e^{−z}) = 1 + z/2 + z²/12 − …
 
-    α = b(−M_p)x,    β = b(M_p)x,    β − α = π(x)p,    β(x, p) = α(x, −p).
+α = b(−M_p)x,    β = b(M_p)x,    β − α = π(x)p,    β(x, p) = α(x, −p).
 
-No matrix representation is needed. It is Karasev's construction for linear π, exact for linear H (S_t = tH), and
-its error constants are 10 to 1000 times smaller than those of the Cayley transform. Affine π, a Lie algebra with
-a cocycle, is the hyperplane z = 1 in the dual of the central extension. b is written in closed form where
-`phigen.realisations.even_part` finds one; else the solver follows the path ṁ = π(m)p numerically.
+No matrix representation is needed. This is Karasev's construction for linear π. It is exact for linear H (S_t = tH),
+and its error constants are 10 to 1000 times smaller than those of the Cayley transform. An affine π, given by a Lie
+algebra with a cocycle, is treated as the hyperplane z = 1 in the dual of the central extension. b is written in closed
+form where `phigen.realisations.even_part` has a formula; otherwise the solver follows the path ṁ = π(m)p numerically.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ REFERENCE = f"{PAPER}, the proposition on Lie–Poisson structures, with τ = ex
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The exponential bi-realisation of a linear or affine π; symmetric.
+    """Return the exponential bi-realisation of a linear or affine π, which is symmetric.
 
     Raises `SpecError` for other π.
     """
@@ -42,7 +42,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def closed_form(system: System) -> BiRealisation | None:
-    """The exponential in closed form; None if π is neither linear nor affine, or no closed form was found."""
+    """Return the exponential in closed form, or None if π is neither linear nor affine or has no known closed form."""
     dual = dual_of(system)
     even = even_part(dual.algebra, dual.x, dual.p) if dual else None
     if even is None:
@@ -74,7 +74,7 @@ def _assembled(system: System, even: EvenPart) -> BiRealisation:
 
 
 def followed(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The exponential without a closed form: the path ṁ = π(m)p, a linear differential equation, is followed."""
+    """Return the exponential without a closed form: the solver follows the path ṁ = π(m)p, which is linear in m."""
     from phigen.realisations import karasev
 
     path = karasev.build(system, choice)

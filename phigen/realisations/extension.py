@@ -13,10 +13,10 @@ from phigen.symbolic.expression import ONE, ZERO, Expression, symbol
 
 @dataclass(frozen=True)
 class Dual:
-    """A point x of the dual and an element p of a Lie algebra.
+    """A point x of the dual and an element p of a Lie algebra, as expressions.
 
-    For an affine π the algebra is the central extension, its last components x_z = 1 and p_z = 0: x_z is a Casimir,
-    so the hyperplane is a Poisson submanifold, and as long as the maps do not depend on p_z they restrict to it.
+    For an affine π the algebra is the central extension, and the last components are x_z = 1 and p_z = 0. x_z is a
+    Casimir, so the hyperplane x_z = 1 is a Poisson submanifold. Maps that do not depend on p_z restrict to it.
     """
 
     algebra: LieAlgebra
@@ -25,7 +25,8 @@ class Dual:
 
 
 def dual_of(system: System) -> Dual | None:
-    """Coordinates and covector in the formulas for Lie–Poisson structures; None for other π."""
+    """Return the coordinates and the covector of a linear or affine π as elements of the dual and the algebra; None
+    for other π."""
     x, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
     match system.shape:
         case LiePoisson(algebra):

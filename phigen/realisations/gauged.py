@@ -1,13 +1,14 @@
-"""π_ij = g_i(x_i) A_ij g_j(x_j): constant π, pulled back along x_i = flow of the vector field g_i.
+"""Bi-realisation of π_ij = g_i(x_i) A_ij g_j(x_j): constant π in coordinates in which the fields g_i are constant.
 
-In y_i = ∫ dx_i/g_i(x_i) the tensor is A and the covector g_i(x_i)p_i, so that with u_i = Σ_j A_ij g_j(x_j)p_j
+In y_i = ∫ dx_i/g_i(x_i) the tensor is A and the covector g_i(x_i)p_i. With u_i = Σ_j A_ij g_j(x_j)p_j,
 
-    α_i = x_i moved along ẋ = g_i(x) for the time −½u_i,    β_i for the time ½u_i.
+α_i = the flow of ẋ = g_i(x) from x_i for the time −½u_i,    β_i = the same flow for the time ½u_i.
 
 The flow is elementary, and written without cancellation, for these g:
 
-- ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w, w² = b²/4 − ac; tan where that is negative, and
-  T = t/(1 − sφ(s)), s = −4w²t², φ as in `phigen.symbolic.special`, where parameters decide the sign
+- ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w and w² = b²/4 − ac;
+with tan if w² is negative; if parameters decide the sign, T = t/(1 − sφ(s)), s = −4w²t², φ as in
+`phigen.symbolic.special`
 - bx + c: x + g(x)(e^{bt} − 1)/b, which is the log-canonical realisation for c = 0
 - c e^{kx}: x − log(1 − kt g(x))/k
 - c x^r: x(1 + (1 − r)t g(x)/x)^{1/(1−r)}
@@ -34,7 +35,7 @@ _HALF = number(Fraction(1, 2))
 
 @dataclass(frozen=True)
 class _Motion:
-    """α − x, β − x, and β − α without cancellation, of one coordinate."""
+    """α − x, β − x and β − α of one coordinate, each without cancellation."""
 
     early: Expression
     late: Expression
@@ -42,9 +43,9 @@ class _Motion:
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation of π_ij = g_i A_ij g_j, symmetric.
+    """Return the bi-realisation of π_ij = g_i A_ij g_j, which is symmetric.
 
-    Raises `SpecError` if π is not of this form, or the flow of a g_i is none of those above.
+    Raises `SpecError` if π is not of this form, or the flow of a g_i is none of those listed above.
     """
     separation = separated(system.coordinates, system.poisson)
     if separation is None:
@@ -80,7 +81,10 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _motion(c: str, g: Expression, u: Expression, positive: Collection[str]) -> _Motion | None:
-    """The motion along g for the times −½u and ½u."""
+    """Return the differences of α and β for a coordinate ``c``: the flow of g for the times −½u and ½u.
+
+    None if the flow is not elementary.
+    """
     if u.is_zero:
         return _Motion(ZERO, ZERO, ZERO)
     terms = coordinate_terms([c], [g])
@@ -149,7 +153,7 @@ def _monomial(x: Expression, g: Expression, u: Expression, degree: Fraction) -> 
 
 
 def _constant(e: Expression, c: str) -> Expression | None:
-    """The same expression without the symbol of the coordinate; None if it depends on the coordinate."""
+    """Return an equal expression without the coordinate ``c``, or None if the expression depends on it."""
     simple = _simplified(e)
     return None if c in symbols_of(simple) else simple
 

@@ -1,12 +1,12 @@
-"""Linear π by a map τ of the user from the algebra to the group, near the exponential.
+"""Bi-realisation of a linear π by a map τ of the user from the algebra to the group, close to the exponential.
 
-With matrices E_i, P = Σ p_i E_i and dτ(p)·E_j = ∂τ/∂p_j, let (∂τ/∂p_j) τ⁻¹ = Σ_k R_kj E_k and
-τ⁻¹ ∂τ/∂p_j = Σ_k L_kj E_k, the right and left trivialised derivatives. Then
+With matrices E_i, P = Σ p_i E_i and dτ(p)·E_j = ∂τ/∂p_j, the right and left trivialised derivatives R and L of τ are
+defined by (∂τ/∂p_j) τ⁻¹ = Σ_k R_kj E_k and τ⁻¹ ∂τ/∂p_j = Σ_k L_kj E_k. Then
 
-    β = R^{−T} x,    α = L^{−T} x
+β = R^{−T} x,    α = L^{−T} x.
 
-that is, column i of R⁻¹ solves Σ_j (∂τ/∂p_j) (R⁻¹)_ji = E_i τ, and of L⁻¹ the same with τ E_i. The bi-realisation is
-symmetric if and only if τ(−p) = τ(p)⁻¹. For τ = (1 − P/2)⁻¹(1 + P/2) this is the kind cayley.
+Column i of R⁻¹ solves Σ_j (∂τ/∂p_j) (R⁻¹)_ji = E_i τ; for L⁻¹ the right side is τ E_i. The bi-realisation is symmetric
+if and only if τ(−p) = τ(p)⁻¹. For τ = (1 − P/2)⁻¹(1 + P/2) this is the kind cayley.
 """
 
 from __future__ import annotations
@@ -38,10 +38,11 @@ KIND = "group-map"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation of a linear π by ``choice.tau``, a function of the symbol `MATRIX` or a matrix in ``p:NAME``.
+    """Return the bi-realisation of a linear π by ``choice.tau``: a function of the symbol `MATRIX`, or a matrix in
+    ``p:NAME``.
 
-    Raises `SpecError` if π is not linear, no faithful matrices are known, τ(0) ≠ 1, dτ(0) ≠ id, or the derivative
-    of τ leaves the algebra.
+    Raises `SpecError` if π is not linear, no faithful matrices are known, τ(0) ≠ 1, dτ(0) ≠ id, or the derivative of τ
+    is not in the algebra.
     """
     if not isinstance(system.shape, LiePoisson):
         raise refuse(f"birealisation {KIND} needs a linear π, the dual of a Lie algebra; this π is {system.shape}")
@@ -90,7 +91,7 @@ def _dense(representation: Representation) -> list[Matrix]:
 
 
 def _matrix(system: System, representation: Representation, tau: Expression | Sequence[Sequence[Expression]]) -> Matrix:
-    """The entries of τ in the components of p."""
+    """Return τ as a matrix of expressions in the components of p."""
     size = representation.size
     if not isinstance(tau, Expression):
         if len(tau) != size or any(len(row) != size for row in tau):
@@ -106,7 +107,7 @@ def _matrix(system: System, representation: Representation, tau: Expression | Se
 
 
 def _expect_tangent(system: System, representation: Representation, tau: Matrix) -> None:
-    """τ(0) = 1 and ∂τ/∂p_j = E_j at 0."""
+    """Raise `SpecError` unless τ(0) = 1 and ∂τ/∂p_j = E_j at p = 0."""
     size, zero = representation.size, dict.fromkeys(covector_names(system.coordinates), ZERO)
     try:
         at_zero = [substitute(row, zero) for row in tau]
@@ -129,7 +130,8 @@ def _expect_equal(a: Matrix, b: Matrix, message: str, system: System) -> None:
 
 
 class _Trivialised:
-    """R⁻¹ and L⁻¹, by elimination in the field of rational functions of p and of the functions that occur."""
+    """Solver for R⁻¹ and L⁻¹, by elimination in the field of rational functions of p and of the functions that occur
+    in τ."""
 
     def __init__(self, system: System, representation: Representation, tau: Matrix) -> None:
         self._names = system.coordinates
@@ -141,7 +143,10 @@ class _Trivialised:
         self._columns = [[self._field.convert(e) for row in m for e in row] for m in slopes]
 
     def solved(self, *, left: bool) -> list[list[Expression]]:
-        """Row j, column i: the coefficient of ∂τ/∂p_j in E_i τ (``left``) or τ E_i."""
+        """Return R⁻¹ if ``left``, else L⁻¹.
+
+        Row j, column i is the coefficient of ∂τ/∂p_j in E_i τ or in τ E_i.
+        """
         n = len(self._basis)
         sides = []
         for E in self._basis:
@@ -152,7 +157,8 @@ class _Trivialised:
         return [[self._field.expression(v) for v in row[n:]] for row in reduced]
 
     def _eliminated(self, rows: list[list[Scalar]], n: int) -> list[list[Scalar]]:
-        """The first n columns made the identity; refused if equations contradict each other."""
+        """Return rows after elimination of the first n columns. Raises `SpecError` if the equations are
+        contradictory."""
         reduced: list[list[Scalar]] = []
         for k in range(n):
             pivot = next((r for r in rows if r[k] != 0), None)

@@ -1,12 +1,12 @@
-"""Any smooth π: Karasev's construction, followed numerically.
+"""Bi-realisation of any smooth π: Karasev's construction, followed numerically.
 
-Let m(t), 0 ≤ t ≤ 1, solve ṁ = π(m)p with p constant. Then α is the start, β the end and x the mean ∫₀¹ m dt of
-one and the same path. A step of the solver is: find p with p = ∇S_h(mean of the path that starts at x under
-p); the new state is the end of that path. The path is the flow of the linear Hamiltonian p·x, so it stays on
-the leaf whatever p is, and following it to round-off makes the step a Poisson map to round-off.
+Let m(t), 0 ≤ t ≤ 1, solve ṁ = π(m)p with p constant. Then α is the start of this path, β its end, and x its mean ∫₀¹ m
+dt. A step of the solver solves p = ∇S_h(mean of the path that starts at x under p) for p; the new state is the end of
+that path. The path is the flow of the linear Hamiltonian p·x, so for every p it stays on the symplectic leaf. If the
+path is exact to round-off, so is the step as a Poisson map.
 
-The S_i come from the formal side: mean_j = D^j x/(j+1)!, D = Σ (πp)_a ∂_a, inverted for α to the degree in p that
-S_1 … S_k need, k − 1. For linear π this is the exponential bi-realisation.
+The S_i are computed from formal series: mean_j = D^j x/(j+1)!, D = Σ (πp)_a ∂_a, is inverted for α up to the degree k −
+1 in p that S_1 … S_k need. For linear π this is the exponential bi-realisation.
 """
 
 from __future__ import annotations
@@ -21,12 +21,15 @@ from phigen.symbolic.expression import ZERO, Expression, derivatives, number, su
 
 KIND = "karasev"
 
-#: Degree in p of the formal series that `BiRealisation.alpha` holds: enough for S_1 … S_3, order 4.
+#: Degree in p of the formal series `BiRealisation.alpha`: sufficient for S_1 … S_3, order 4.
 DEGREE = 2
 
 
 def build(system: System, choice: BirealisationChoice, *, degree: int = DEGREE) -> BiRealisation:
-    """The bi-realisation of any π; ``alpha`` is exact up to ``degree`` in p, and symmetric by the reversal of paths."""
+    """Return the bi-realisation of any π. It is symmetric, since the reversed path exchanges α and β.
+
+    ``alpha`` is exact up to ``degree`` in p.
+    """
     alpha = series(system, degree)
     mirrored = substitute(alpha, {s.value: -s for s in covector_symbols(system.coordinates)})
     x = [symbol(c) for c in system.coordinates]
@@ -47,9 +50,10 @@ def build(system: System, choice: BirealisationChoice, *, degree: int = DEGREE) 
 
 
 def series(system: System, degree: int) -> list[Expression]:
-    """α(x, p) to a degree in p, from mean(α, p) = x: α = x − Σ_{j=1}^{degree} (D^j x)(α)/(j+1)!, by substitution.
+    """Return α(x, p) up to a degree in p, from mean(α, p) = x.
 
-    Terms of higher degree produced by the substitution are not those of the series, and must not be used.
+    α = x − Σ_{j=1}^{degree} (D^j x)(α)/(j+1)! is solved by repeated substitution. The result also contains some terms
+    of higher degree, which are not those of the series and must not be used.
     """
     coordinates = system.coordinates
     x: list[Expression] = [symbol(c) for c in coordinates]
@@ -57,9 +61,9 @@ def series(system: System, degree: int) -> list[Expression]:
     powers = [list(flow)]
     for _ in range(degree - 1):
         powers.append(_derivatives_along_flow(powers[-1], coordinates, flow))
-    approximations = [x]  # approximations[d] is α up to degree d
+    approximations = [x]  # approximations[d] is α up to degree d in p
     for order in range(1, degree + 1):
-        # D^j x is itself of degree j in p, so there α is needed up to degree order − j only.
+        # D^j x has degree j in p, so α is needed only up to degree order − j there.
         shifts = [
             substitute(powers[j - 1], dict(zip(coordinates, approximations[order - j], strict=True)))
             for j in range(1, order + 1)
@@ -76,7 +80,7 @@ def series(system: System, degree: int) -> list[Expression]:
 def _derivatives_along_flow(
     functions: list[Expression], coordinates: tuple[str, ...], flow: tuple[Expression, ...]
 ) -> list[Expression]:
-    """D f for each function: the derivative along the flow."""
+    """Return the derivative D f along the flow for each function f."""
     columns = [derivatives(functions, c) for c in coordinates]
     return [
         total(column[i] * f for column, f in zip(columns, flow, strict=True) if not (column[i] is ZERO or f is ZERO))

@@ -1,6 +1,7 @@
-"""Log-canonical π, {x_i, x_j} = a_ij x_i x_j: α_j = x_j exp(½u_j), β_j = x_j exp(−½u_j), u_j = Σ_i a_ij x_i p_i.
+"""Bi-realisation of a log-canonical π, {x_i, x_j} = a_ij x_i x_j.
 
-The paper prints α with the opposite sign in the exponent; its own Lotka–Volterra scheme has the sign used here.
+α_j = x_j exp(½u_j), β_j = x_j exp(−½u_j), u_j = Σ_i a_ij x_i p_i. The paper prints α with the opposite sign in the
+exponent; the Lotka–Volterra scheme of the paper has the sign used here.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ KIND = "log-canonical"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation of a log-canonical π, symmetric and global; raises `SpecError` for any other π.
+    """Return the bi-realisation of a log-canonical π, symmetric and defined for all (x, p). Raises `SpecError` for any
+    other π.
 
     The increment is −2 x_j sinh(½u_j), written without cancellation at small u_j.
     """
@@ -31,7 +33,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         half * total(row[j] * w for row, w in zip(a, products, strict=True) if not row[j].is_zero)
         for j in range(len(x))
     ]
-    # With t = exp(u/2) − 1 everything that the solver needs is rational: 2 sinh(u/2) = t (1 + 1/(1 + t)).
+    # With t = exp(u/2) − 1 all formulas of the solver are rational: 2 sinh(u/2) = t (1 + 1/(1 + t)).
     growth = [call("expm1", u) for u in exponents]
     alpha = tuple(xj * call("exp", u) for xj, u in zip(x, exponents, strict=True))
     beta = tuple(xj * call("exp", -u) for xj, u in zip(x, exponents, strict=True))

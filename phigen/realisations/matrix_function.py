@@ -19,15 +19,15 @@ def identity(size: int) -> Matrix:
 
 
 def multiplied(a: Matrix, b: Matrix) -> Matrix:
-    """The product of two matrices, zero entries skipped."""
+    """Return the product of two matrices, without terms that are 0."""
     columns = list(zip(*b, strict=True))
     return [[total(u * v for u, v in zip(row, column, strict=True)) for column in columns] for row in a]
 
 
 class MatrixFunction(Arithmetic[Matrix]):
-    """Values of expressions at a matrix P; numbers and parameters stand for multiples of the identity.
+    """Evaluation of expressions at a matrix P; numbers and parameters stand for multiples of the identity.
 
-    All values are functions of P, hence commute, so that a quotient needs no side.
+    All values are functions of P and therefore commute, so left and right quotients are equal.
     """
 
     def __init__(self, argument: Matrix, name: str) -> None:
@@ -35,12 +35,12 @@ class MatrixFunction(Arithmetic[Matrix]):
         self._argument, self._size, self._name = argument, len(argument), name
 
     def visit(self, node: Expression, args: list[Matrix]) -> Matrix:
-        """The value of a node; raises `SpecError` for functions that are not rational in P."""
+        """Return the value of a node. Raises `SpecError` for functions that are not rational in P."""
         if node.op == "symbol" and node.value == self._name:
             return self._argument
         if all(self._is_scalar(a) for a in args) and node.op not in ("add", "sub", "neg", "mul"):
             return self._scaled(rebuild(node, [a[0][0] for a in args]))
-        match node.op:  # lists have no arithmetic
+        match node.op:  # matrices are lists, which have no operators
             case "add":
                 return _entrywise(add, args[0], args[1])
             case "sub":
@@ -56,7 +56,7 @@ class MatrixFunction(Arithmetic[Matrix]):
         return self._power(base, int(exponent)) if exponent.denominator == 1 else self.function("pow", [base])
 
     def function(self, name: str, args: list[Matrix]) -> Matrix:
-        """`SpecError`: no function of a matrix is rational."""
+        """Raise `SpecError`: elementary functions of a matrix are not rational."""
         raise refuse(
             f"birealisation group-map: tau uses {name} of a matrix; it must be a rational function of P",
             "kind: exponential is τ = exp(P); other functions are given entry by entry",

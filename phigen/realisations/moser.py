@@ -1,12 +1,12 @@
-"""Moser's trick by recursion in the weight: a map ψ, the identity to first order on p = 0, with ψ*Ω = ω.
+"""Moser's trick by recursion in the weight: a map ψ with ψ*Ω = ω that is the identity to first order on p = 0.
 
-Ω = ω + Ω₃ + Ω₅ + … is closed, Ω_w of weight w in (p, dp) (`phigen.realisations.cotangent`). The lowest remainder
-Ω_w has the primitive λ = ι_E Ω_w / w, since L_E Ω_w = w Ω_w = d ι_E Ω_w. With ι_Y ω = −λ,
+Ω = ω + Ω₃ + Ω₅ + … is closed, Ω_w of weight w in (p, dp) (`phigen.realisations.cotangent`). The term Ω_w of lowest
+weight has the primitive λ = ι_E Ω_w / w, since L_E Ω_w = w Ω_w = d ι_E Ω_w. With ι_Y ω = −λ,
 
-    exp(Y)*Ω = Ω + L_Y Ω + ½ L_Y² Ω + … = ω + (terms of weight above w),
+exp(Y)*Ω = Ω + L_Y Ω + ½ L_Y² Ω + … = ω + (terms of weight above w).
 
-and so on: ψ = exp(Y_2) ∘ exp(Y_4) ∘ …, Y_{w−1} raising weights by w − 1. Moser's trick itself integrates a
-time-dependent field; the recursion reaches the same normal form with one homogeneous field for each weight.
+Repetition yields ψ = exp(Y_2) ∘ exp(Y_4) ∘ …, where Y_{w−1} raises weights by w − 1. Moser's trick itself integrates a
+time-dependent field. The recursion reaches the same normal form with one homogeneous field for each weight.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ class Step:
 
 
 def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
-    """The factors of ψ in the order in which functions are pulled back, correct up to weight ``top`` of ψ*Ω = ω.
+    """Return the factors of ψ in the order in which functions are pulled back, such that ψ*Ω = ω up to the weight
+    ``top``.
 
-    ``forms`` are the parts of Ω by weight, ω at weight 1, odd weights only. Parts that vanish give no factor.
+    ``forms`` are the parts of Ω by weight: ω at weight 1, and parts of odd weight. Parts that vanish give no factor.
     """
     steps = []
     for weight in range(3, top + 1, 2):
@@ -44,7 +45,7 @@ def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
 
 
 def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> GradedForm:
-    """exp(Y)*Ω up to a weight."""
+    """Return exp(Y)*Ω up to the weight ``top``."""
     result: GradedForm = {}
     for weight, form in forms.items():
         term = form
@@ -59,7 +60,7 @@ def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> G
 
 
 def pulled_back(space: Cotangent, f: GradedFunction, steps: Sequence[Step], top: int) -> GradedFunction:
-    """ψ*f up to a weight; exp(Y) acts on functions as the Lie series of Y."""
+    """Return ψ*f up to the weight ``top``. Each exp(Y) acts on functions by the Lie series of Y."""
     for step in steps:
         result: GradedFunction = {}
         for weight, part in f.items():

@@ -1,4 +1,4 @@
-"""Block-diagonal π: the bi-realisations of the blocks side by side."""
+"""Bi-realisation of a block-diagonal π: the product of those of its blocks."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ KIND = "product"
 
 
 def build(system: System, choice: BirealisationChoice, build_part: Builder) -> BiRealisation:
-    """The product over the blocks of π of the bi-realisations that ``build_part`` makes.
+    """Return the product of the bi-realisations that ``build_part`` makes of the blocks of π.
 
-    Raises `SpecError` if π has one block only, if a block does not allow the kind, or if the solver of a block
-    would have to follow paths: that is done for the whole system or not at all.
+    Raises `SpecError` if π has only one block, or the kind does not apply to a block. Also raises it if the solver of
+    one block would have to follow paths, which is possible only for the whole system.
     """
     parts = grouped(system)
     if len(parts) < 2:
@@ -30,7 +30,7 @@ def build(system: System, choice: BirealisationChoice, build_part: Builder) -> B
 
 
 def grouped(system: System) -> list[System]:
-    """The systems of the blocks, those with constant π as one."""
+    """Return the systems of the blocks of π; all blocks with constant π form one system."""
     single = [block_of(system, indices) for indices in blocks(system.coordinates, system.poisson)]
     constant = [b for b in single if isinstance(b.shape, Constant | Canonical)]
     if len(constant) < 2:
@@ -43,7 +43,7 @@ def grouped(system: System) -> list[System]:
 def assembled(
     system: System, parts: Sequence[System], build_part: Builder, choice: BirealisationChoice
 ) -> BiRealisation:
-    """The product of the bi-realisations that ``build_part`` makes of the parts."""
+    """Return the product of the bi-realisations that ``build_part`` makes of ``parts``, for the whole system."""
     realisations = [build_part(part, choice) for part in parts]
     for part, realisation in zip(parts, realisations, strict=True):
         if realisation.path:

@@ -1,4 +1,4 @@
-"""The protocol of bi-realisations: the record that every kind delivers, and the type of its builder."""
+"""The protocol of bi-realisations: the record that every kind returns, and the type of its builder."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ class BiRealisation:
     All tuples have one expression for each coordinate, in the symbols NAME (x), ``momentum(NAME)`` (its covector) and
     the parameters. With {x_i, p_j} = δ_ij: {α_i, α_j} = π_ij∘α, {β_i, β_j} = −π_ij∘β, {α_i, β_j} = 0.
 
-    - ``displacement``: α − x, simplified, so that nothing of size x cancels in it
+    - ``displacement``: α − x, simplified so that no terms of the size of x cancel
     - ``increment``: β − α, simplified in the same way
     - ``symmetric``: whether β(x, p) = α(x, −p), proved
-    - ``exact``: False for a truncation, whose solver is Poisson only up to its order
-    - ``degree``: of a truncation: α and β are right up to this degree in p, their brackets up to one less
-    - ``path``: the solver follows the path ṁ = π(m)p itself (Karasev's construction); ``alpha`` and ``beta``
-      are then the formal series, truncated, from which the S_i are computed, and never evaluated
-    - ``inner``: of a pull-back: the structure in the other coordinates and its bi-realisation, on which proofs are done
-    - ``explanation``: what it is and why it was chosen, for the user; ``reference``: where it comes from
+    - ``exact``: false for a truncation, whose steps are Poisson maps only up to the order
+    - ``degree``: for a truncation, the degree in p up to which α and β are correct; brackets are up to one degree less
+    - ``path``: whether the solver follows the path ṁ = π(m)p (Karasev's construction); then ``alpha`` and ``beta`` are
+    truncated formal series, from which the S_i are computed, and are never evaluated
+    - ``inner``: for a pull-back, the system in the other coordinates and its bi-realisation, on which proofs are made
+    - ``explanation``: the name and the reason of the choice, for the user; ``reference``: the source of the formulas
     """
 
     kind: str
@@ -52,38 +52,38 @@ class BiRealisation:
 
     @property
     def covector(self) -> tuple[str, ...]:
-        """Names of the symbols p, in the order of the coordinates."""
+        """The names of the symbols p, in the order of the coordinates."""
         return covector_names(self.coordinates)
 
     @property
     def label(self) -> str:
-        """The kind as shown to users, marked if it is approximate."""
+        """The kind as displayed to users; approximate ones are marked."""
         if self.exact:
             return self.kind
         return f"{self.kind} (approximate" + (")" if self.degree is None else f", Poisson up to degree {self.degree})")
 
 
-#: A kind of the catalogue: makes the bi-realisation of a system, or raises `SpecError` if it does not apply.
+#: Function that makes the bi-realisation of a system, or raises `SpecError` if the kind does not apply.
 Builder = Callable[[System, BirealisationChoice], BiRealisation]
 
 
 def covector_names(coordinates: Sequence[str]) -> tuple[str, ...]:
-    """The names of the covector's symbols."""
+    """Return the names of the symbols of the covector p, in the order of the coordinates."""
     return tuple(momentum(c) for c in coordinates)
 
 
 def covector_symbols(coordinates: Sequence[str]) -> list[Expression]:
-    """The symbols of the components of the covector p."""
+    """Return the symbols of the covector p as expressions."""
     return [symbol(name) for name in covector_names(coordinates)]
 
 
 def reversed_covector(expressions: Sequence[Expression], coordinates: Sequence[str]) -> list[Expression]:
-    """The expressions with p replaced by −p."""
+    """Return the expressions with p replaced by −p."""
     return substitute(expressions, {name: -symbol(name) for name in covector_names(coordinates)})
 
 
 def is_symmetric(alpha: Sequence[Expression], beta: Sequence[Expression], coordinates: Sequence[str]) -> bool:
-    """Whether β(x, p) = α(x, −p) is proved; the paper's integrators are then of even order."""
+    """Whether β(x, p) = α(x, −p) is proved; methods with a symmetric bi-realisation have even order."""
     mirrored = reversed_covector(alpha, coordinates)
     pairs = [(a, b) for a, b in zip(mirrored, beta, strict=True) if a is not b]
     roots = [e for pair in pairs for e in pair]
@@ -93,7 +93,7 @@ def is_symmetric(alpha: Sequence[Expression], beta: Sequence[Expression], coordi
 
 
 def simplified_differences(left: Sequence[Expression], right: Sequence[Expression]) -> tuple[Expression, ...]:
-    """left − right, through the ring where that leaves fewer operations."""
+    """Return left − right, simplified by the polynomial ring if that needs fewer operations."""
     roots = [a - b for a, b in zip(left, right, strict=True)]
     tower = Tower(symbols_of(*roots), roots)
     images = [tower.expression(element) for element in tower.convert_all(roots)]
@@ -105,5 +105,5 @@ def _operations(e: Expression) -> int:
 
 
 def refuse(message: str, hint: str = "") -> SpecError:
-    """The error of a builder that does not apply; the caller adds the place in the spec."""
+    """Return the error of a builder that does not apply; the caller adds the place in the spec."""
     return SpecError([Diagnostic(message, hint=hint)])

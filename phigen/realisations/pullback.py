@@ -1,6 +1,7 @@
-"""A structure in other coordinates y = ψ(x): α = ψ⁻¹ ∘ α_y ∘ T*ψ⁻¹.
+"""Bi-realisation of a π that is simpler in other coordinates y = ψ(x).
 
-With q_a = Σ_i p_i ∂x_i/∂y_a, the covector in the coordinates y, α(x, p) = ψ⁻¹(α_y(ψ(x), q)), and β likewise.
+With q_a = Σ_i p_i ∂x_i/∂y_a, the covector in the coordinates y, α(x, p) = ψ⁻¹(α_y(ψ(x), q)), and likewise for β. In
+short, α = ψ⁻¹ ∘ α_y ∘ T*ψ⁻¹.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ KIND = "pullback"
 
 
 def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> BiRealisation:
-    """The bi-realisation of the inner structure, made by ``build_inner``, in the spec's coordinates.
+    """Return the bi-realisation that ``build_inner`` makes of the inner structure, in the coordinates of the spec.
 
-    Raises `SpecError` unless the form of π is a pull-back, and if the solver of the inner structure would have
-    to follow paths.
+    Raises `SpecError` unless π is given as a pull-back, and if the solver of the inner structure would have to follow
+    paths.
     """
     form = system.form
     if not isinstance(form, PullbackForm):
@@ -57,9 +58,9 @@ def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> 
 
 
 def is_composed(system: System, realisation: BiRealisation) -> bool:
-    """Whether α and β are the maps of ``realisation.inner`` in the coordinates of ψ, whose inverse ψ⁻¹ was proved.
+    """Whether α and β are the maps of ``realisation.inner`` in the coordinates of ψ, and the inverse ψ⁻¹ is proved.
 
-    In that case the axioms follow from the axioms of the inner realisation, since T*ψ is symplectic.
+    Then the axioms follow from those of the inner realisation, since T*ψ is symplectic.
     """
     if realisation.inner is None or not isinstance(system.form, PullbackForm):
         return False
@@ -74,7 +75,7 @@ def is_composed(system: System, realisation: BiRealisation) -> bool:
 def moved(
     system: System, form: PullbackForm, change: Coordinates, maps: Sequence[Expression]
 ) -> tuple[Expression, ...]:
-    """ψ⁻¹ ∘ map ∘ T*ψ⁻¹."""
+    """Return ψ⁻¹ ∘ map ∘ T*ψ⁻¹ for a map in the coordinates y."""
     p = covector_symbols(system.coordinates)
     covector = [total(pi * row[a] for pi, row in zip(p, change.jacobian, strict=True)) for a in range(len(p))]
     substitution = dict(zip(form.coordinates, change.forward, strict=True))

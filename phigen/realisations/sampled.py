@@ -1,7 +1,7 @@
-"""The axioms of a large bi-realisation, checked in exact arithmetic at points, since a proof would expand too many
-terms.
+"""Check of the axioms of a large bi-realisation in exact arithmetic at points.
 
-At a point the brackets of all pairs together are products of two matrices of numbers, the derivatives in x and in p.
+A proof would expand too many terms. At a point the brackets of all pairs are products of two matrices of numbers, the
+derivatives in x and those in p.
 """
 
 from __future__ import annotations
@@ -21,24 +21,25 @@ from phigen.symbolic.numeric import DomainError, evaluate_exactly, is_rational
 from phigen.symbolic.tower import rational
 from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement, sample_point
 
-#: The number of points, and the largest number of attempts to find them.
+#: Number of points, and largest number of attempts to find them.
 POINTS, ATTEMPTS = 3, 16
 
 Point = Mapping[str, Fraction]
 
 
 def is_large(system: System, realisation: BiRealisation) -> bool:
-    """Whether the brackets of α and β are to be checked at points; never if they are not rational."""
+    """Whether the brackets of α and β are checked at points: they are rational, and a proof would be too long."""
     maps = [*realisation.alpha, *realisation.beta]
     if not is_rational(*maps, *(e for row in system.poisson for e in row)):
         return False
-    # Estimate: each term of α_i is multiplied by the derivatives of α_j along one of n pairs (x_k, p_k), for all i, j.
+    # Estimated number of products: for all i and j, each term of α_i is multiplied by the derivatives of α_j with
+    # respect to n pairs (x_k, p_k).
     sizes = sum(len(topological([e])) for e in realisation.alpha)
     return 2 * sizes**2 // system.dimension > limits.PROOF_PRODUCTS
 
 
 def brackets_at_points(system: System, realisation: BiRealisation, titles: Sequence[str]) -> Iterator[Statement]:
-    """The statements on {α_i, α_j}, {β_i, β_j} and {α_i, β_j}, with their titles."""
+    """Yield the statements on {α_i, α_j}, {β_i, β_j} and {α_i, β_j}, named by ``titles``."""
     maps = realisation.alpha, realisation.beta
     variables = [*system.coordinates, *covector_names(system.coordinates)]
     slopes: tuple[list[list[Expression]], ...] = ([], [])
@@ -80,7 +81,8 @@ def _failures(
     slopes: tuple[list[list[Expression]], ...],
     point: Point,
 ) -> list[str]:
-    """For each of the three families a pair whose bracket is wrong at the point, as text; empty if there is none."""
+    """Return, for each of αα, ββ and αβ, a pair whose bracket is wrong at the point, as text; "" if all brackets are
+    right."""
     n, names = system.dimension, system.coordinates
     values = iter(evaluate_exactly([e for one_map in slopes for row in one_map for e in row], point))
     (a_x, a_p), (b_x, b_p) = (_halves([[next(values) for _ in range(2 * n)] for _ in names]) for _ in maps)
@@ -100,13 +102,13 @@ def _failures(
 
 
 def _halves(rows: list[list[Fraction]]) -> tuple[Any, Any]:
-    """The derivatives in x, and those in p."""
+    """Return the derivatives in x and those in p as two matrices."""
     n = len(rows)
     return _matrix([row[:n] for row in rows]), _matrix([row[n:] for row in rows])
 
 
 def _tensor(system: System, maps: Sequence[Expression], point: Point) -> Any:
-    """π at the image of the point."""
+    """Return the matrix π at the image of the point under ``maps``."""
     image = dict(zip(system.coordinates, evaluate_exactly(maps, point), strict=True))
     values = iter(evaluate_exactly([e for row in system.poisson for e in row], {**point, **image}))
     return _matrix([[next(values) for _ in row] for row in system.poisson])

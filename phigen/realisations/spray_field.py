@@ -1,7 +1,7 @@
 """A Poisson spray as a vector field on T*U: construction from a spec, checks, and its Lie series.
 
-X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j = Σ f_jkl(x) p_k p_l: it lifts πp and is homogeneous of weight 1
-(paper, section "Poisson Spray and Moser's trick"; its example sums over i < j for all i, j).
+X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j = Σ f_jkl(x) p_k p_l: X lifts πp and is homogeneous of weight 1
+(paper, section "Poisson Spray and Moser's trick"; the paper's example sums over i < j where all i, j are meant).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly
 
-#: Most terms of one polynomial of a series.
+#: Largest number of terms of one polynomial of a series.
 MOST_TERMS = 20_000
 
 
 @dataclass(frozen=True)
 class Spray:
-    """The field X on T*U, components for x then p, in the ring that holds it; ``name`` says which spray it is."""
+    """The field X on T*U, with the components for x first, then those for p, and its ring; ``name`` names the spray."""
 
     space: Cotangent
     field: Components
@@ -39,7 +39,8 @@ class Spray:
 
 
 def make_spray(system: System, name_or_forces: str | Sequence[Expression]) -> Spray:
-    """The spray requested by a spec, see `build`; raises `SpecError` if it is not a spray."""
+    """Return the spray requested by a spec, as in `phigen.realisations.spray.build`. Raises `SpecError` if it is not
+    a spray."""
     name, forces = _covector_part(system, name_or_forces)
     velocity = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
     space = Cotangent(system.coordinates, [*velocity, *forces])
@@ -80,7 +81,10 @@ def _checked(system: System, forces: Sequence[Expression]) -> Sequence[Expressio
 
 
 def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]) -> None:
-    """A smooth function that is homogeneous of degree 2 is a quadratic form, so the ring decides."""
+    """Raise `SpecError` unless the forces are quadratic forms in p.
+
+    The ring decides it: a smooth function that is homogeneous of degree 2 is a quadratic form.
+    """
     space, n = spray.space, system.dimension
     tower = space.tower
     non_polynomial = [
@@ -98,7 +102,7 @@ def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]
 
 
 def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS) -> list[Poly]:
-    """L_Xᵏ f / k! for k = 0 … length; LimitError beyond ``most_terms`` terms."""
+    """Return L_Xᵏ f / k! for k = 0 … length. Raises `LimitError` beyond ``most_terms`` terms."""
     result = [f]
     for k in range(1, length + 1):
         result.append(spray.space.scaled(spray.apply(result[-1]), Fraction(1, k)))
@@ -110,7 +114,8 @@ def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS)
 
 
 def centred_form(spray: Spray, top: int) -> GradedForm:
-    """The parts of Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to a weight: L_Xᵏ ω / ((k+1)! 2ᵏ) at weight k + 1, k even."""
+    """Return the parts of Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to the weight ``top``: L_Xᵏ ω / ((k+1)! 2ᵏ) at weight k + 1, k
+    even."""
     space, form = spray.space, spray.space.canonical()
     result = {1: form}
     for k in range(1, top):

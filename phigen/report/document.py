@@ -1,4 +1,4 @@
-"""Page of a spec, composed of its sections."""
+"""Page of a spec: the sections in order."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SOURCE = 100_000
 
 
 def document(material: Material) -> str:
-    """Return the HTML of the page. Apart from measured times it depends only on the arguments."""
+    """Return the HTML of the page. Measured times are its only content that does not depend on the arguments."""
     spec = material.compilation.spec
     solvers = script(material.live) if material.live and material.live.solvers else ""
     return page.page(
@@ -33,7 +33,7 @@ def document(material: Material) -> str:
 
 
 def lead(compilation: Compilation) -> Markup:
-    """Return the beginning of the page."""
+    """Return the introduction of the page."""
     spec = compilation.spec
     return page.block(
         "lead",
@@ -98,7 +98,7 @@ def _run(material: Material) -> Iterator[Markup]:
 
 
 def _values(values: Mapping[str, float]) -> Markup:
-    """Return names with their values: ``x_1 = 0.5, x_2 = 1``."""
+    """Return names with their values as one line, such as ``x_1 = 0.5, x_2 = 1``."""
     equations = (
         Markup("{} = {}").format(Markup(math(name(n))), f"{v:.9g}".replace("-", "−")) for n, v in values.items()
     )

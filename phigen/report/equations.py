@@ -13,20 +13,23 @@ from phigen.scheme.lowering import operation_counts
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import SHOWN, Formula
 
-#: Sizes of a group of formulas, in names and numbers, above which the group is folded or left out.
+#: Numbers of names and numbers in a group of formulas above which the group is folded, or left out.
 FOLDED, LEFT_OUT = 160, 4_000
 #: Largest number of terms of a polynomial that can be unfolded.
 MOST_TERMS = 150
 
 
 def equation(left: str, form: Formula | Expression, sign: str = "=") -> list[str]:
-    """Return the parts of one equation, between which lines may break."""
+    """Return an equation as pieces of MathML, between which lines may break."""
     first, *remaining = mathml.pieces(form)
     return [mathml.math(f"{left}<mo>{sign}</mo>{first}"), *map(mathml.math, remaining)]
 
 
 def group(left: Sequence[str], expressions: Sequence[Expression], subject: str, sign: str = "=") -> Markup:
-    """Return equations for ``subject``, with names for common subexpressions."""
+    """Return equations with these left sides; common subexpressions get names.
+
+    ``subject`` is the title of the group, for long groups, which are folded or left out.
+    """
     formulas = named_parts.readable(expressions)
     if formulas.size > LEFT_OUT:
         counts = ", ".join(f"{n} {kind}" for kind, n in operation_counts(list(expressions)).items() if n)

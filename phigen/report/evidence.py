@@ -19,7 +19,7 @@ from phigen.study.summary import Drift, Summary
 from phigen.study.verification import Check, Verification
 from phigen.symbolic.verdict import PROVED, REFUTED, UNDECIDED, Statement
 
-#: One tile of the summary: class, value, label, note.
+#: Tile of the summary: CSS class, value, label, note.
 Tile = tuple[str, str, str, str]
 
 _GOOD, _BAD, _UNSURE = "good", "bad", "unsure"
@@ -27,7 +27,7 @@ _MARKS = {_GOOD: "✓ ", _BAD: "✗ ", _UNSURE: "~ "}
 
 
 def brief_section(material: Material) -> Markup:
-    """Return the summary of the page in a few numbers."""
+    """Return the summary of the page: a few numbers as tiles."""
     tiles = [_proofs_tile(material.examination.statements)]
     if material.verification:
         tiles += _measured_tiles(material.verification)
@@ -87,7 +87,7 @@ def _meaning(m: Meaning) -> str:
 
 
 def summary_table(summaries: Sequence[Summary]) -> Markup:
-    """Return a table of the largest errors of a run, one column for each method."""
+    """Return a table of the largest errors of runs, with one column for each method."""
     first = summaries[0]
     rows = [("energy H", [_drift(s.energy) for s in summaries])]
     for kind, noun in (("casimirs", "Casimir"), ("invariants", "invariant")):

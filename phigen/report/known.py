@@ -1,4 +1,4 @@
-"""Formulas of the theory, the same for all systems, as pieces of MathML."""
+"""Formulas of the theory, which do not depend on the system, as pieces of MathML."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _HALF_ROOT = f"<mfrac><msqrt>{_s}</msqrt><mn>2</mn></mfrac>"
 #: The equations of motion.
 MOTION = [math(f'<mover accent="true">{_x}<mo>˙</mo></mover>{_o("=")}{_of(_i("π"), _x)}<mi>∇</mi>{_of(_i("H"), _x)}')]
 
-#: One step from x_n to x_{n+1}: by α and β, and by a path.
+#: One step from x_n to x_{n+1}: by α and β, and for bi-realisations by paths.
 STEP = [
     [math(f"{_of(_i('α'), _y, _SLOPE)}{_o('=')}{_x_n}"), " solved for ", math(_y) + ", "],
     [math(f"{_x_next}{_o('=')}{_of(_i('β'), _y, _SLOPE)}")],

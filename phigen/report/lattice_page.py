@@ -28,11 +28,11 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass(frozen=True)
 class LatticeMaterial:
-    """Material of the page of a lattice; without a run there is neither a trajectory nor a verification.
+    """Content of the page of a lattice. Without a run, trajectory and verification are None.
 
-    ``errors`` (frames,) are the errors of conserved quantities, by name; ``energies`` (frames, *sizes) are the
-    energies of the sites. ``failure`` is the reason for an incomplete run. ``live`` is the live panel, ``spectrum``
-    contains Lyapunov exponents.
+    ``errors`` (frames,) are the errors of conserved quantities, by name; ``energies`` (frames, *sizes) are the energies
+    of the sites. ``failure`` is the reason for an incomplete run. ``live`` is the live panel, ``spectrum`` contains
+    Lyapunov exponents.
     """
 
     examination: Examination

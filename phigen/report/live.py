@@ -22,10 +22,10 @@ from phigen.targets.js.emitter import emit
 from phigen.targets.js.printing import LANGUAGE
 from phigen.targets.names import Scope
 
-#: Orders offered in addition to that of the page; largest total number of characters of all solvers.
+#: Orders offered in addition to that of the page, and largest total number of characters of all solvers.
 ORDERS, MOST = (2, 4), 200_000
-#: Largest number of unfolded sliders of a group; largest number of coordinates with sliders; largest factors by which
-#: sliders change step, speed and parameters.
+#: FEW is the largest number of sliders of a group that is shown unfolded, COORDINATES the largest number of coordinates
+#: with sliders. The others are the largest factors by which sliders change step, speed and parameters.
 FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
 
@@ -43,7 +43,7 @@ _PRIVATE = Extras(without=frozenset({"ensemble"}))
 
 @dataclass(frozen=True)
 class Live:
-    """JavaScript solvers of a panel by order, its run and parameters; or the reason ``why_not``."""
+    """Solvers of a panel in JavaScript by order, with the run and its parameters; or the reason ``why_not``."""
 
     solvers: Mapping[int, str]
     run: Run | None = None
@@ -54,7 +54,7 @@ class Live:
 
 @dataclass(frozen=True)
 class Slider:
-    """Slider: the setting of the panel that it changes, and the distance of its ends from the default value."""
+    """Slider of the panel: the setting that it changes, and the distance of its ends from the default value."""
 
     label: Markup | str
     kind: str
@@ -72,7 +72,7 @@ def gathered(
     parameters: Mapping[str, float],
     orders: Sequence[int] = ORDERS,
 ) -> Live:
-    """Return the panel for a run: JavaScript solvers of the order of the page and of ``orders``."""
+    """Return the panel for a run, with solvers in JavaScript for the order of the page and for ``orders``."""
     if compilation.system.noise:
         return Live({}, why_not=NOISE)
     by_order, why_not = solvers(compilation, scheme, orders)
@@ -82,10 +82,10 @@ def gathered(
 def solvers(
     compilation: Compilation, scheme: str | None, orders: Sequence[int], spec: Spec | None = None
 ) -> tuple[dict[int, str], str]:
-    """Return JavaScript by order, for the order of the page and for ``orders``, or the reason why there is none.
+    """Return the solvers in JavaScript, by order, for the order of the page and for ``orders``, and "".
 
-    ``spec`` replaces the spec of the compilation, from which it
-    differs only by observables.
+    If there are none, return no solvers and the reason. ``spec`` replaces the spec of the compilation; it may differ by
+    observables only.
     """
     page_order, is_own = compilation.order.order, spec is None
     spec = replace(spec or compilation.spec, reconstruct="", extras=_PRIVATE)
@@ -115,7 +115,10 @@ def emits(compilation: Compilation) -> bool:
 
 
 def enclosed(module: str) -> str:
-    """Return a generated module, without comments, as a function that returns what the panel uses."""
+    """Return a generated module as the text of a JavaScript function that returns the names which the panel uses.
+
+    Comments are left out.
+    """
     code = _COMMENT.sub("", module).replace("export class", "class")
     lines = (line.strip() for line in code.splitlines())
     body = "\n".join(line for line in lines if line)
@@ -124,7 +127,7 @@ def enclosed(module: str) -> str:
 
 
 def script(live: Live) -> str:
-    """Return the solvers and the invariants for the script of the page."""
+    """Return the JavaScript of the solvers and of the invariants, for the script of the page."""
     invariants = f"const liveInvariants = [ {live.invariants} ];\n"
     by_order = ", ".join(f"{order}: {text}" for order, text in live.solvers.items())
     return f"{invariants}const liveSolvers = {{ {by_order} }};"
@@ -150,7 +153,7 @@ def _invariants(system: System) -> str:
 
 
 def live_section(compilation: Compilation, live: Live) -> Markup:
-    """Return the panel, or the reason why there is none."""
+    """Return the section with the panel, or with the reason why there is none."""
     run, system = live.run, compilation.system
     if not live.solvers or run is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
@@ -200,7 +203,7 @@ def slid(slider: Slider) -> Markup:
 
 
 def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
-    """Return the labels of the two methods."""
+    """Return the labels of both methods of the panel, phigen's and RK4."""
     return [
         (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),
         (2, "theirs", "RK4", "id=live-cost", ""),
@@ -210,7 +213,7 @@ def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
 def quantity(
     name: str, casimirs: Sequence[int] | None = None, invariants: Sequence[int] | None = None
 ) -> dict[str, object]:
-    """Return the errors of a conserved quantity for the page: of Casimirs or invariants by number, else the energy."""
+    """Return a conserved quantity as data for the page: Casimirs or invariants by number, or else the energy."""
     return {"name": name, "casimirs": casimirs, "invariants": invariants}
 
 
@@ -231,7 +234,7 @@ def _quantities(system: System) -> list[dict[str, object]]:
 
 
 def _casimir_label(system: System, casimirs: Mapping[str, int]) -> str:
-    """Return the label of the errors of the Casimirs with these numbers."""
+    """Return the label of the errors of Casimirs, given by name and number."""
     names = ", ".join(casimirs)
     if len(casimirs) > 1:
         return f"Casimir errors ({names})" if len(casimirs) <= 3 else f"error of {len(casimirs)} Casimirs"
@@ -246,7 +249,10 @@ def _groups(system: System) -> list[Group]:
 
 
 def _leaf(system: System, group: Group) -> int | None:
-    """Return the number of the Casimir that depends only on these three coordinates; −1 is the energy in the plane."""
+    """Return the index of a Casimir that depends only on the three coordinates of the group.
+
+    −1 stands for the energy, in a group of two coordinates. None if there is no leaf to draw.
+    """
     if len(group) == 2:
         return -1 if system.dimension == 2 and ENERGY not in moving(system) else None
     coordinates = set(system.coordinates)
@@ -258,7 +264,7 @@ def _leaf(system: System, group: Group) -> int | None:
 
 
 def _caption(system: System, conserved: Sequence[Mapping[str, object]], is_leaf_drawn: bool) -> str:
-    """Return the text above the panel that describes the picture."""
+    """Return the text above the panel, which describes the picture."""
     introduction = "Two solvers integrate the motion from the same start, in your browser. "
     properties = ["conserves its energy"] if any(q["name"] == "energy error" for q in conserved) else []
     if is_leaf_drawn:
@@ -273,7 +279,7 @@ def _caption(system: System, conserved: Sequence[Mapping[str, object]], is_leaf_
 
 
 def general(live: Live) -> Iterable[Slider]:
-    """Yield the sliders of every panel."""
+    """Yield the sliders that every panel has."""
     yield Slider("Step", "h", reach=STEP)
     if len(live.solvers) > 1:
         yield Slider("Order", "order", low=0, high=len(live.solvers) - 1)

@@ -1,4 +1,4 @@
-"""Live panel of a lattice: its fields evolve by the generated JavaScript and by RK4."""
+"""Live panel of a lattice: it shows its fields, advanced by the generated JavaScript and by RK4."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ from phigen.report.live import (
 from phigen.spec.model import LieAlgebraForm, Parameter, Reduction, Run, Spec, Values
 from phigen.symbolic.expression import Expression, call, total
 
-#: Least number of sites along an axis for halved sizes; largest numbers of sites for doubled sizes.
+#: FEWEST is the least size of an axis that is offered by halving. The others are the largest numbers of sites that are
+#: offered by doubling: of pairs, of chains, of other lattices.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
 #: Largest number of list entries in a page.
 MOST_NUMBERS = 20_000
@@ -52,7 +53,7 @@ _DIRECTION = " The hue is the direction in the plane of {}, {}; lighter colours 
 
 @dataclass(frozen=True)
 class LatticeLive(Live):
-    """Panel of a run from a ``start``, with ``formulas`` in JavaScript for starts of any size."""
+    """Panel of a run of a lattice: its ``start``, and ``formulas`` in JavaScript for starts of any size."""
 
     start: Start | None = None
     formulas: str = ""
@@ -71,12 +72,13 @@ def gathered_lattice(
 
 
 def _with_invariants(compilation: CompiledLattice) -> Spec | None:
-    """Return the spec with invariants and magnitudes of their terms as further observables; None without invariants."""
+    """Return a spec whose observables include the invariants and the magnitudes of their terms; None without
+    invariants."""
     spec, cell = compilation.spec, compilation.cell
     assert spec.lattice is not None
     densities: dict[str, Expression] = {}
     for name, density in cell.invariants.items():
-        apart = "_" * (1 + max(map(len, spec.observables), default=0))  # longer than any name of the spec, so unique
+        apart = "_" * (1 + max(map(len, spec.observables), default=0))  # longer than any name of the spec, hence unique
         densities[f"{name}{apart}"] = density
         densities[f"terms_{name}{apart}"] = total(call("abs", term) for term in cell.additive_terms(density))
     if not densities:
@@ -87,12 +89,12 @@ def _with_invariants(compilation: CompiledLattice) -> Spec | None:
 
 
 def lattice_script(live: LatticeLive) -> str:
-    """Return the solvers and the formulas of starts for the script of the page."""
+    """Return the JavaScript of the solvers and of the formulas of starts, for the script of the page."""
     return f"{script(live)}\nconst liveValues = {{ {live.formulas} }};"
 
 
 def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Markup:
-    """Return the panel, or the reason why there is none."""
+    """Return the section with the panel, or with the reason why there is none."""
     run, start, cell = live.run, live.start, compilation.cell
     if not live.solvers or run is None or start is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
@@ -154,7 +156,7 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
 
 
 def _picture(compilation: CompiledLattice, start: Start) -> str:
-    """Return the kind of picture of a lattice: see fields.js."""
+    """Return the kind of picture of a lattice, one of those in fields.js."""
     cell = compilation.cell
     if start.graph and start.sizes[0] <= MOST_PLACED:
         return "graph"
@@ -164,7 +166,7 @@ def _picture(compilation: CompiledLattice, start: Start) -> str:
 
 
 def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, list[int]]]:
-    """Return the quantities that can be drawn: name, kind, and the numbers of the fields."""
+    """Return the quantities that can be drawn: name, kind, and the indices of the fields."""
     fields = compilation.spec.coordinates
     if picture == "moving":
         return [(f"{fields[0]}, {fields[1]}", "field", [0, 1])]
@@ -178,7 +180,8 @@ def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, 
 
 
 def _sizes(compilation: CompiledLattice, run: Run, start: Start) -> list[list[int]]:
-    """Return the sizes that a panel offers; only those of the run if its start is a list."""
+    """Return the sizes that the panel offers. If the start of the run is a list, only the sizes of the run are
+    offered."""
     choices, cell = [list(start.sizes)], compilation.cell
     arrays = (*_initial(compilation.spec, run).values(), *(_source(run, p) for p in compilation.spec.parameters))
     if start.graph or any(v and (v.listed or v.file) for v in arrays):
@@ -227,9 +230,9 @@ def _values(spec: Spec, run: Run, start: Start, name: str) -> float | None:
 
 
 def _array(spec: Spec, run: Run, start: Start, p: Parameter) -> dict[str, Any]:
-    """Return a parameter at sites or bonds for the page."""
+    """Return the description of a parameter at sites or bonds for the page, as plain data."""
     source = _source(run, p)
-    if source is None:  # a column of the file with the bonds
+    if source is None:  # the values are a column of the file with the bonds
         return {"at": p.at, "listed": _listed(start.parameters[p.name])}
     return {"at": p.at, **_given(source, start, p.name, spec)}
 
@@ -249,14 +252,14 @@ def _listed(array: Any) -> list[float]:
 
 
 def _numbers(spec: Spec, run: Run, start: Start) -> int:
-    """Return the numbers for a list in the page."""
+    """Return the number of list entries that the page needs for the run."""
     arrays = [_given(v, start, name, spec) for name, v in _initial(spec, run).items()]
     arrays += [_array(spec, run, start, p) for p in spec.parameters if _values(spec, run, start, p.name) is None]
     return sum(len(g.get("listed", ())) for g in arrays) + start.bonds.size
 
 
 def _formulas(spec: Spec, run: Run) -> str:
-    """Return JavaScript functions of site indices and sizes, for each array defined by a formula."""
+    """Return JavaScript functions of site indices and sizes, one for each array that is defined by a formula."""
     arrays = {**{p.name: _source(run, p) for p in spec.parameters}, **_initial(spec, run)}
     assert spec.lattice is not None
     indices = spec.lattice.indices
@@ -268,7 +271,7 @@ def _formulas(spec: Spec, run: Run) -> str:
 
 
 def _sign(spec: Spec, start: Start) -> str:
-    """Return the name of a parameter at sites whose values have both signs; empty if there is none."""
+    """Return the name of a parameter at sites whose values have both signs; "" if there is none."""
     arrays = {p.name: np.asarray(start.parameters[p.name]) for p in spec.parameters if p.at == "sites"}
     return next((name for name, a in arrays.items() if a.size and a.min() < 0 < a.max()), "")
 
@@ -277,7 +280,7 @@ def _sign(spec: Spec, start: Start) -> str:
 
 
 def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
-    """Return the conserved quantities: the energy, unless time or forces act, and one entry for all Casimirs."""
+    """Return the conserved quantities as data: the energy unless time or forces act, and one entry for all Casimirs."""
     cell, pushed = compilation.cell, compilation.program.pushed
     quantities: list[dict[str, Any]] = [] if cell.driven else [quantity("energy error")]
     casimirs = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}

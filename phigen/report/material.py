@@ -1,4 +1,4 @@
-"""Content of a page; collecting it takes most of the time, see `phigen.cli.report_material`."""
+"""Content of a page. Collecting it takes most of the time; see `phigen.cli.report_material`."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass(frozen=True)
 class Material:
-    """Proofs and measurements on one run; missing parts are None, and ``notes`` give the reasons.
+    """Proofs of a spec and measurements on one run. Missing parts are None, and ``notes`` give the reasons.
 
-    ``steps`` describes the steps of the run. ``methods`` are trajectories by label, the solver's first; ``opening``
-    contains every step of a first part of the run if ``methods`` do not. ``section`` consists of the function whose
-    zeros define the Poincaré section, some points (rows, DIM), and the number of all points. ``spectrum`` contains the
-    Lyapunov exponents. ``constancy`` is that of the modified Hamiltonian; ``no_constancy`` is the reason why it is
-    missing. ``environment`` describes the conditions of timings. ``command`` reproduces the page.
+    ``steps`` describes the steps of the run. ``methods`` are trajectories by label, that of the solver first;
+    ``opening`` contains every step of the beginning of the run if ``methods`` do not. ``section`` consists of the
+    function whose zeros define the Poincaré section, some points (rows, DIM), and the number of all points.
+    ``spectrum`` contains the Lyapunov exponents. ``constancy`` measures the modified Hamiltonian along the run;
+    ``no_constancy`` is the reason if it is missing. ``environment`` describes the conditions of timings. ``command``
+    reproduces the page.
     """
 
     examination: Examination

@@ -24,12 +24,11 @@ from phigen._version import __version__
 #: Cell of a table: its class, and its text or markup.
 Cell = tuple[str, str]
 
-#: Equations are set in columns if there are more than the first number and none has more characters of markup than the
-#: second.
+#: Equations are set in columns if there are more than MANY, and none has more than SHORT characters of markup.
 MANY, SHORT = 6, 420
 
 _STYLES, _SCRIPTS = ("report.css",), ("theme.js", "space.js", "viewer.js")
-#: Scripts of the live panel, after its solvers; each kind of picture has a separate script.
+#: Scripts of the live panel for a system. They follow its solvers; other kinds of panels have other scripts.
 CURVES = ("race.js", "start.js", "curves.js", "live.js")
 FIELDS = ("race.js", "start.js", "fields.js", "live.js")
 
@@ -71,7 +70,7 @@ def table(caption: str, columns: Sequence[Cell], rows: Sequence[tuple[str, Seque
 
 
 def facts(pairs: Iterable[tuple[str, str]]) -> Markup:
-    """Return a description list of terms."""
+    """Return a description list of pairs (term, description)."""
     return block("facts", pairs=list(pairs))
 
 
@@ -81,7 +80,8 @@ def fold(summary: str, body: Markup) -> Markup:
 
 
 def equations(listed: Sequence[Sequence[str]]) -> Markup:
-    """Return equations from parts of MathML, between which lines may break; many short ones are set in columns."""
+    """Return equations, each as pieces of MathML between which lines may break. Many short equations are set in
+    columns."""
     are_short = len(listed) > MANY and all(sum(map(len, parts)) < SHORT for parts in listed)
     return block(
         "equations",
@@ -91,7 +91,7 @@ def equations(listed: Sequence[Sequence[str]]) -> Markup:
 
 
 def data(identifier: str, value: Any) -> Markup:
-    """Return a data element for a script; no text in the data can end the element."""
+    """Return a data element for a script, as JSON that cannot end the element."""
     return block("data", identifier=identifier, value=htmlsafe_json_dumps(value, dumps=_compact))
 
 
@@ -106,7 +106,8 @@ def page(
     solvers: str = "",
     panel: Sequence[str] = CURVES,
 ) -> str:
-    """Return the page from sections (id, title, body); ``solvers`` is the JavaScript of its live ``panel``."""
+    """Return the page from sections (id, title, body). ``solvers`` is the JavaScript of the solvers of the live
+    ``panel``."""
     live = [solvers, *map(_asset, panel)] if solvers else []
     return _complete(
         "page",
@@ -125,19 +126,19 @@ def alone(title: str, body: Markup, solvers: str, panel: Sequence[str]) -> str:
 
 
 def with_origin(html: str, origin: str) -> str:
-    """Return a page that names its origin in its metadata."""
+    """Return the page with its origin (version and command) in its metadata."""
     generator = '<meta name="generator"'
     return html.replace(generator, f'<meta name="source" content="{escape(origin)}">\n{generator}', 1)
 
 
 def _minified(script: str) -> str:
-    """Return a script without comment lines and without indentation."""
+    """Return a script without comment lines and indentation."""
     lines = (line.strip() for line in script.splitlines())
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 def _complete(template: str, scripts: Sequence[str], **values: object) -> str:
-    """Return a page with its style sheet and scripts, and the policy that allows only these."""
+    """Return a page with its style sheet, its scripts, and the content security policy that allows only these."""
     css, code = "\n".join(map(_asset, _STYLES)), "\n".join(scripts)
     return _environment().get_template(f"{template}.html.jinja").render(
         policy=f"default-src 'none'; img-src data:; style-src {_hash(css)}; script-src {_hash(code)}; "
@@ -187,5 +188,5 @@ def scientific(value: float, digits: int = 2) -> str:
 
 
 def listed(values: Mapping[str, float]) -> str:
-    """Return labels with their numbers: ``rk4 3.1·10⁻⁸, dop853 …``."""
+    """Return labels with their numbers as one line, such as ``rk4 3.1·10⁻⁸, dop853 …``."""
     return ", ".join(f"{name} {scientific(value)}" for name, value in values.items())

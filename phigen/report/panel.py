@@ -12,11 +12,11 @@ from phigen.spec.model import Run
 
 
 class NoPanelError(CheckError):
-    """Refusal: a system has no live panel; the message says why."""
+    """The system has no live panel; the message says why."""
 
 
 def panel_page(compilation: Compilation, run: Run) -> str:
-    """Return the HTML of the panel of a run, with a solver of the order of the spec.
+    """Return the HTML of the panel of a run, with one solver, of the order of the spec.
 
     Raises `NoPanelError`, and `SpecError` for a start that cannot be read.
     """

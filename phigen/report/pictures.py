@@ -23,7 +23,7 @@ from phigen.symbolic.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Largest number of drawn rows of a trajectory, and of drawn Casimirs.
+#: Largest number of drawn rows of a trajectory, and largest number of drawn Casimirs.
 ROWS, CASIMIRS = 3_000, 11
 
 
@@ -32,7 +32,7 @@ def trajectory_picture(compilation: Compilation, trajectory: Trajectory) -> Mark
     names = ", ".join(trajectory.coordinates)
     figure = figures.trajectory_figure(_thinned(trajectory), compilation.system.casimirs)
     caption = f"The trajectory of {names}, from the dot at t = {trajectory.t[0]:.9g} to t = {trajectory.t[-1]:.9g}."
-    # The viewer shows three coordinates; the figure replaces it on paper and without scripts.
+    # The viewer shows three coordinates. This figure replaces it in print and without scripts.
     instead = "instead" if len(trajectory.coordinates) == 3 else ""
     return picture("trajectory", figure, "Trajectory in phase space", caption, caption, instead)
 
@@ -53,7 +53,7 @@ def error_picture(material: Material) -> Markup:
 
 
 def section_picture(names: Sequence[str], function: str, points: Floats, count: int) -> Markup:
-    """Return the figure of some points of the Poincaré section."""
+    """Return the figure of the Poincaré section: some of its ``count`` points, and its ``function``."""
     shown_points = points[:: max(1, -(-len(points) // ROWS))]
     caption = f"Poincaré section: {count} points where {function} rises through zero"
     caption += f"; {len(shown_points)} of them are drawn." if len(shown_points) < count else "."
@@ -62,7 +62,7 @@ def section_picture(names: Sequence[str], function: str, points: Floats, count: 
 
 
 def constancy_picture(constancy: Constancy) -> Markup:
-    """Return the figure of the changes of the modified Hamiltonian."""
+    """Return the figure of the variation of the modified Hamiltonian along a run."""
     largest = page.listed({truncation(m): float(e.max()) for m, e in enumerate(constancy.errors)})
     caption = "Changes of H and of H̃ with one and two corrections, relative to the energy. Thin lines have the "
     caption += "expected slopes. The dotted line is one unit in the last place of a double."
@@ -105,7 +105,7 @@ def picture(identifier: str, figure: Figure, title: str, description: str, capti
     image = inlined(figures.svg(figure), identifier, title, description)
     wide = figure.get_figwidth() > figures.NARROW
     kind = " ".join(filter(None, ["wide" if wide else "", instead]))
-    tabindex = "0" if wide else "-1"  # wide figures scroll, also by the keyboard
+    tabindex = "0" if wide else "-1"  # wide figures can be scrolled by keyboard
     return page.block(
         "figure", identifier=f"figure-{identifier}", kind=kind, tabindex=tabindex, image=image, caption=caption
     )

@@ -1,4 +1,4 @@
-"""Figures as parts of a page: colours become variables of its style sheet, ids unique, and styles become attributes.
+"""Figures of matplotlib as parts of a page: colours become variables of its style sheet, ids unique, styles attributes.
 
 Style attributes and style elements would need an exception from the page's Content-Security-Policy.
 """
@@ -15,9 +15,9 @@ from phigen.drawing.palette import PALETTE
 _SVG, _LINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _FONT = re.compile(r"(?:(\w+) )?([\d.]+)px .*")
-#: Attributes that matplotlib writes with default values.
+#: Colours of figures, and the variables of the style sheet that replace them.
 _COLOURS = {**{value: f"var(--{role})" for role, value in PALETTE.items()}, "#000000": "var(--ink)"}
-#: Pixels of a page for one point of a figure, such that the widest figure fills the column.
+#: Pixels of a page for one point of a figure. With this factor the widest figure fills the column.
 PIXELS = 1.75
 #: Elements that a page does not need.
 _DROPPED = (f"{_SVG}metadata", f"{_SVG}style")

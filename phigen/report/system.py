@@ -10,7 +10,7 @@ from phigen.report import page
 from phigen.report.equations import group
 from phigen.report.known import MOTION
 
-#: Matrices with more rows, or with more names and numbers, are shown as brackets.
+#: Matrices with more than ROWS rows, or more than ENTRIES names and numbers, are shown as brackets.
 ROWS, ENTRIES = 6, 90
 
 
@@ -41,7 +41,7 @@ def _tensor(system: System) -> Markup:
 
 
 def _kinds(system: System) -> Markup:
-    """Return the kinds of names: coordinates, parameters, Casimirs."""
+    """Return a paragraph that lists the Casimirs, declared or found by phigen, and the further invariants."""
     declared = [c for c in system.casimirs if c in system.declared]
     undeclared = [c for c in system.casimirs if c not in system.declared]
     kinds = [("Casimirs of the spec", declared), ("Casimirs that phigen found", undeclared)]

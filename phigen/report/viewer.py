@@ -17,21 +17,22 @@ from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
-#: Largest number of values of all curves; largest number of rows of a curve; number of levels of a rounded coordinate.
+#: MOST_NUMBERS is the largest number of values of all curves, MOST_ROWS the largest number of rows of a curve, STEPS
+#: the number of levels of a rounded coordinate.
 MOST_NUMBERS, MOST_ROWS, STEPS = 90_000, 4_000, 9_999
 #: Largest number of curves in the viewer.
 CURVES = 2
-#: Number of letters to which a coordinate name is cut in narrow places.
+#: Number of characters to which names of coordinates are cut in narrow places.
 LETTERS = 24
 
 
 def viewer(
     methods: Mapping[str, Trajectory], opening: Mapping[str, Trajectory], casimirs: Mapping[str, Expression]
 ) -> Markup:
-    """Return the viewer of the first two trajectories; an empty text if there is no curve.
+    """Return the viewer of the first two trajectories; empty if no curve can be drawn.
 
     If the rows of the whole run are too far apart for a line, the viewer shows ``opening``, the first steps of the same
-    methods. The leaf of one of the ``casimirs`` is drawn if it exists in the space of the initial axes.
+    methods. The leaf of one of the ``casimirs`` is drawn if it is a surface or curve in the initial axes.
     """
     first = next(iter(methods.values()), None)
     if first is None:
@@ -57,7 +58,7 @@ def viewer(
 
 
 def _until(methods: Mapping[str, Trajectory], trajectories: Mapping[str, Trajectory]) -> str:
-    """Return a sentence for a displayed part that ends before the run; else an empty text."""
+    """Return a sentence that says up to which time the curves go, or "" if they show the whole run."""
     end, shown_end = (_finite(next(iter(curves.values())))[-1, -1] for curves in (methods, trajectories))
     return f" It shows the first part of the run, up to t = {shown_end:.6g}." if abs(shown_end) < abs(end) else ""
 
@@ -67,7 +68,8 @@ def _joined(methods: Mapping[str, Trajectory], axes: list[int]) -> bool:
 
 
 def _leaf(casimirs: Mapping[str, Expression], curve: Trajectory, axes: list[int]) -> Floats | None:
-    """Return lines (points, 3) of the leaf in the space of the axes, separated by rows of NaN; None without leaf."""
+    """Return curves (points, 3) on the leaf, in the space of the axes and separated by rows of NaN; None if there is
+    no leaf."""
     if not drawable() or len(curve.coordinates) in axes:
         return None
     start = dict(zip(curve.coordinates, curve.x[0].tolist(), strict=True))
@@ -107,14 +109,14 @@ def _integer_columns(points: Floats) -> list[list[int | None]]:
 
 
 def _finite(trajectory: Trajectory) -> Any:
-    """Return the rows of coordinates and time before the first non-finite row."""
+    """Return the rows of coordinates and time before the first row that is not finite."""
     nonfinite_rows = np.flatnonzero(~np.isfinite(trajectory.x).all(axis=1))
     end = int(nonfinite_rows[0]) if len(nonfinite_rows) else len(trajectory)
     return np.column_stack([trajectory.x[:end], trajectory.t[:end]])
 
 
 def _axes(coordinates: tuple[str, ...]) -> list[int]:
-    """Return the initial columns: three coordinates of a group, or two coordinates and the time."""
+    """Return the three columns shown first: coordinates of the largest group, then other coordinates or the time."""
     group = max(groups(coordinates), key=len)
     columns = [coordinates.index(c) for c in group][:3]
     other_columns = [i for i in range(len(coordinates)) if i not in columns] if len(columns) > 2 else []
