@@ -3,7 +3,7 @@
 The transform is τ(P) = (1 − P/2)⁻¹(1 + P/2) for P = Σ p_i E_i. In a faithful matrix representation with matrices E_i,
 α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)⟩, that is
 
-α_i = x_i − ½(πp)_i − ¼⟨x, coordinates of P E_i P⟩,    β(x, p) = α(x, −p),    β − α = πp.
+    α_i = x_i − ½(πp)_i − ¼⟨x, coordinates of P E_i P⟩,    β(x, p) = α(x, −p),    β − α = πp.
 
 This requires P E_i P to be in the algebra for all P, or E_a E_i E_b + E_b E_i E_a ∈ g for all a, i, b. It holds for
 so(n), sp(2n), gl(n), sl(2), su(2), se(n), aff(n) and heisenberg(n), and not for sl(3). The paper (example so(n)) prints

@@ -2,7 +2,7 @@
 
 With M_p x = π(x)p and b(z) = z/(1 − e^{−z}) = 1 + z/2 + z²/12 − …
 
-α = b(−M_p)x,    β = b(M_p)x,    β − α = π(x)p,    β(x, p) = α(x, −p).
+    α = b(−M_p)x,    β = b(M_p)x,    β − α = π(x)p,    β(x, p) = α(x, −p).
 
 No matrix representation is needed. This is Karasev's construction for linear π. It is exact for linear H (S_t = tH),
 and its error constants are 10 to 1000 times smaller than those of the Cayley transform. An affine π, given by a Lie

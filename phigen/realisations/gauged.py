@@ -2,7 +2,7 @@
 
 In y_i = ∫ dx_i/g_i(x_i) the tensor is A and the covector g_i(x_i)p_i. With u_i = Σ_j A_ij g_j(x_j)p_j,
 
-α_i = the flow of ẋ = g_i(x) from x_i for the time −½u_i,    β_i = the same flow for the time ½u_i.
+    α_i = the flow of ẋ = g_i(x) from x_i for the time −½u_i,    β_i = the same flow for the time ½u_i.
 
 The flow is elementary, and written without cancellation, for these g:
 

@@ -3,7 +3,7 @@
 With matrices E_i, P = Σ p_i E_i and dτ(p)·E_j = ∂τ/∂p_j, the right and left trivialised derivatives R and L of τ are
 defined by (∂τ/∂p_j) τ⁻¹ = Σ_k R_kj E_k and τ⁻¹ ∂τ/∂p_j = Σ_k L_kj E_k. Then
 
-β = R^{−T} x,    α = L^{−T} x.
+    β = R^{−T} x,    α = L^{−T} x.
 
 Column i of R⁻¹ solves Σ_j (∂τ/∂p_j) (R⁻¹)_ji = E_i τ; for L⁻¹ the right side is τ E_i. The bi-realisation is symmetric
 if and only if τ(−p) = τ(p)⁻¹. For τ = (1 − P/2)⁻¹(1 + P/2) this is the kind cayley.

@@ -3,7 +3,7 @@
 Ω = ω + Ω₃ + Ω₅ + … is closed, Ω_w of weight w in (p, dp) (`phigen.realisations.cotangent`). The term Ω_w of lowest
 weight has the primitive λ = ι_E Ω_w / w, since L_E Ω_w = w Ω_w = d ι_E Ω_w. With ι_Y ω = −λ,
 
-exp(Y)*Ω = Ω + L_Y Ω + ½ L_Y² Ω + … = ω + (terms of weight above w).
+    exp(Y)*Ω = Ω + L_Y Ω + ½ L_Y² Ω + … = ω + (terms of weight above w).
 
 Repetition yields ψ = exp(Y_2) ∘ exp(Y_4) ∘ …, where Y_{w−1} raises weights by w − 1. Moser's trick itself integrates a
 time-dependent field. The recursion reaches the same normal form with one homogeneous field for each weight.

@@ -4,7 +4,7 @@ The field is X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j quadrati
 the paper (section "Poisson Spray and Moser's trick") takes α̅ = τ, β̅ = τ∘Φ¹, Ω = ∫₀¹ Φˢ*ω ds, and ψ with ψ*Ω = ω; then
 α = α̅∘ψ, β = β̅∘ψ. Here ψ = Φ^{−½}∘ψ₀, so that
 
-α = τ∘Φ^{−½}∘ψ₀,    β = τ∘Φ^{½}∘ψ₀,    ψ₀*Ω₀ = ω,    Ω₀ = ∫_{−½}^{½} Φˢ*ω ds = Σ_{k even} L_Xᵏ ω / ((k+1)! 2ᵏ).
+    α = τ∘Φ^{−½}∘ψ₀,    β = τ∘Φ^{½}∘ψ₀,    ψ₀*Ω₀ = ω,    Ω₀ = ∫_{−½}^{½} Φˢ*ω ds = Σ_{k even} L_Xᵏ ω / ((k+1)! 2ᵏ).
 
 X changes sign under p → −p up to the reversal of p, hence β(x, p) = α(x, −p) for every spray. ψ₀ is the identity to
 first order on p = 0. ψ is not (the paper says it is): it changes x by −½πp.

@@ -3,7 +3,7 @@
 If α and β are correct up to degree d in p, their brackets are correct up to degree d − 1, since {·, ·} takes one
 derivative in p. So the statements are identities between homogeneous parts:
 
-Σ_{k+l=m+1} {α_i^(k), α_j^(l)} = (π_ij∘α)^(m)    for m = 0 … d − 1,    and likewise for β and for (α, β).
+    Σ_{k+l=m+1} {α_i^(k), α_j^(l)} = (π_ij∘α)^(m)    for m = 0 … d − 1,    and likewise for β and for (α, β).
 """
 
 from __future__ import annotations

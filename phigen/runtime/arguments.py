@@ -17,17 +17,17 @@ from numpy.typing import ArrayLike
 from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface
 from phigen.runtime.members import Members
 
-#: Largest number of steps: the C counts them in 64 bits, of which NumPy's signed integers hold 63.
+#: Largest number of steps. The C counts steps in unsigned 64 bits, NumPy's largest integers have 63 bits and a sign.
 _MOST = int(np.iinfo(np.int64).max)
 
 #: Largest finite number in single precision, for C with ``real: float``.
 LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
-#: Largest values of the arguments that select random numbers, by their types in the C.
+#: Largest values of the arguments that select random numbers; they are limited by the types in the C.
 _LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
 
 
-#: Arguments that select random numbers, with none of them passed.
+#: No selection of random numbers: seed, member and step0 are all omitted.
 NONE_DRAWN: Mapping[str, int | None] = MappingProxyType({})
 
 
@@ -35,8 +35,8 @@ NONE_DRAWN: Mapping[str, int | None] = MappingProxyType({})
 class Beginning:
     """Checked arguments of a trajectory: initial state ``x`` at the time ``t0``, step size, parameters, random numbers.
 
-    ``first`` are the values of the initial attitude and position, None for the default. ``level`` is the e of a lattice
-    whose steps are equal in τ, None for −H(x).
+    ``first`` are the values of the initial attitude and position, None for the default. ``level`` is the energy level e
+    of a lattice whose steps are equal in τ; None stands for −H(x).
     """
 
     x: Floats
@@ -49,9 +49,9 @@ class Beginning:
 
 
 def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
-    """Return the energy level e of a lattice whose steps are equal in τ, taken from ``gauge`` among other arguments.
+    """Return the energy level e of a lattice whose steps are equal in τ, and remove it from the arguments (``gauge``).
 
-    None for −H of the start. Raises `ValueError` for anything but a finite number.
+    None stands for −H of the initial state. Raises `ValueError` unless the value is a finite number.
     """
     if not interface.monitored or "gauge" not in by_keyword:
         return None
@@ -70,7 +70,7 @@ def step_size(h: float) -> float:
 
 
 def end(until: float, begin: float, h: float) -> float:
-    """Return the time from ``begin`` to ``until``. Raises `ValueError` if it does not have the sign of the step."""
+    """Return the time from ``begin`` to ``until``. Raises `ValueError` if its sign differs from that of the step."""
     span = number(until, "the time until") - begin
     if span * h <= 0:
         raise ValueError(f"until = {until!r} is never reached from {begin!r} by steps of {h!r}")
@@ -78,7 +78,8 @@ def end(until: float, begin: float, h: float) -> float:
 
 
 def count(value: int, name: str, minimum: int, maximum: int = _MOST) -> int:
-    """Return an integer from ``minimum`` to ``maximum``. Raises `TypeError` and `ValueError` for others."""
+    """Return an integer from ``minimum`` to ``maximum``. Raises `TypeError` for other types, `ValueError` for other
+    values."""
     try:
         number = operator.index(value)
     except TypeError:
@@ -91,9 +92,9 @@ def count(value: int, name: str, minimum: int, maximum: int = _MOST) -> int:
 
 
 def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, float]) -> float:
-    """Return the time of a start, 0 by default.
+    """Return the initial time, 0 by default.
 
-    If the Hamiltonian does not depend on the time, the name t0 may be a parameter's, and its value is added to
+    If the Hamiltonian does not depend on the time, t0 may be the name of a parameter; its value is then added to
     ``by_keyword``.
     """
     if t0 is None or interface.time:
@@ -107,7 +108,7 @@ def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, flo
 def draws(interface: Interface, by_keyword: dict[str, Any], selections: Mapping[str, int | None] = NONE_DRAWN) -> Draws:
     """Return the random numbers selected by the arguments seed, member and step0.
 
-    Without noise, these names may be those of parameters, and their values are added to ``by_keyword``.
+    Without noise these may be names of parameters; their values are then added to ``by_keyword``.
     """
     selected = {name: value for name, value in selections.items() if value is not None}
     if interface.noise:
@@ -121,7 +122,7 @@ def draws(interface: Interface, by_keyword: dict[str, Any], selections: Mapping[
 
 
 def increments(values: ArrayLike, interface: Interface) -> Floats:
-    """Return increments of the noise (steps, draws), checked. Raises `TypeError` and `ValueError`."""
+    """Return the increments of the noise as an array (steps, draws). Raises `TypeError` and `ValueError`."""
     if not interface.noise:
         raise TypeError(f"increments were given, but {interface.name} has no noise")
     rows = real(values, "increments")
@@ -133,16 +134,16 @@ def increments(values: ArrayLike, interface: Interface) -> Floats:
 
 
 def expect_no_noise(argument: str, interface: Interface) -> None:
-    """Raise `TypeError` if the system has noise, for functions that divide steps.
+    """Raise `TypeError` if the system has noise, for functions that divide steps into parts.
 
-    The parts of a step would draw other random numbers than the whole step.
+    The parts of a step would use other random numbers than the whole step.
     """
     if interface.noise:
         raise TypeError(f"{argument} is not available with noise: parts of a step are not on the same path")
 
 
 def times_within(times: ArrayLike, t: Floats) -> Floats:
-    """Return times as an array (times,). Raises `ValueError` if one is outside of the range of ``t``."""
+    """Return times as an array (times,). Raises `ValueError` if one is outside the range of ``t``."""
     requested_times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     low, high = sorted((float(t[0]), float(t[-1])))
     slack = 1e-9 * (high - low)
@@ -168,10 +169,10 @@ def rows_at(t: Floats, x: Floats, requested_times: Floats) -> Floats:
 def times(
     t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], by_keyword: dict[str, Any]
 ) -> Floats | None:
-    """Return the times ``t`` of states, whose leading axes have the given shape, as a flat array.
+    """Return the times ``t`` of states as a flat array; ``shape`` is that of the leading axes of the states.
 
-    Returns None if the Hamiltonian does not depend on the time. Then t may be the name of a parameter, and its value
-    is added to ``by_keyword``.
+    Returns None if the Hamiltonian does not depend on the time. Then t may be the name of a parameter, and its value is
+    added to ``by_keyword``.
     """
     if not interface.time:
         if t is not None and "t" not in interface.parameters:
@@ -187,7 +188,7 @@ def times(
 
 
 def together(mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any]) -> dict[str, Any]:
-    """Return parameters passed in a mapping and by keyword. Raises `TypeError` for a name in both."""
+    """Return the parameters of a mapping and those passed by keyword. Raises `TypeError` for a name in both."""
     repeated = sorted(set(mapped or {}) & set(by_keyword))
     if repeated:
         raise TypeError(f"parameter {repeated[0]!r} is given twice")
@@ -195,7 +196,7 @@ def together(mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any]) ->
 
 
 def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
-    """Return the bound that a parameter has, ``positive`` or ``nonnegative``, if a value breaks it; otherwise empty."""
+    """Return the declared bound of a parameter, ``positive`` or ``nonnegative``, if the value violates it; else ""."""
     least = float(np.min(np.asarray(value), initial=np.inf))
     if name in interface.positive and not least > 0:
         return "positive"
@@ -205,7 +206,7 @@ def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
 def parameters(
     interface: Interface, mapped: Mapping[str, float] | None, by_keyword: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the values of all parameters: those passed in a mapping and, as ``by_keyword``, by keyword, else defaults.
+    """Return the values of all parameters, from ``mapped`` and ``by_keyword``; the others have their defaults.
 
     Raises `TypeError` for unknown names and names passed twice, `ValueError` for values that are not admissible.
     """
@@ -250,14 +251,14 @@ def ensemble(
     """Return the members of an ensemble from the arguments of `Solver.ensemble`, checked."""
     per_member: dict[str, Any] = {name: v for name, v in {**(mapped or {}), **by_keyword}.items() if np.ndim(v) > 0}
     if t0 is not None and np.ndim(t0) > 0 and not interface.time:
-        per_member["t0"] = t0  # without a time, t0 can only be a parameter
+        per_member["t0"] = t0  # for systems without a time, t0 can only be a parameter
     several: list[Any] = [v for v in (h, t0, *per_member.values()) if v is not None and np.ndim(v) > 0]
     if np.ndim(X0) == 1 and several:
         start = np.tile(state(X0, "X0", interface), (len(several[0]), 1))
     else:
         start = members(X0, "X0", interface)
     shape = (len(start),)
-    # Names are checked with a number in place of each array.
+    # Names are checked with one number in place of each array.
     shared_values: list[dict[str, Any]] = [
         {n: 1.0 if n in per_member else v for n, v in (part or {}).items()} for part in (mapped, by_keyword)
     ]
@@ -301,11 +302,11 @@ def states(x: ArrayLike, argument: str, interface: Interface) -> Floats:
 def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface, members: int) -> Floats:
     """Return the initial group elements of all members, (members, interface.element): attitude, then position.
 
-    The arguments are one attitude or position for all members, or have an axis of members. The defaults are the
+    An argument is one attitude or position for all members, or has a first axis of members. The defaults are the
     identity and the origin.
     """
     if not interface.attitude:
-        first(np.eye(1), None, interface)  # raises, with the reason why there is no attitude
+        first(np.eye(1), None, interface)  # raises the error that gives the reason why there is no attitude
     several = np.ndim(attitude0) > len(interface.attitude) if attitude0 is not None else False
     has_member_positions = position0 is not None and np.ndim(position0) > 1
     turns = array(attitude0, "attitude0", (members, *interface.attitude)) if several else None  # type: ignore[arg-type]
@@ -321,9 +322,10 @@ def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: 
 
 
 def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface) -> Floats | None:
-    """Return the values of an initial attitude, a unit quaternion or a matrix, and of a position, in one array.
+    """Return the numbers of an initial attitude, a unit quaternion or a matrix, and of a position, in one array.
 
-    Returns None if neither is passed. Raises `TypeError` if the system has none, and `ValueError` for other shapes.
+    Returns None if neither is passed. Raises `TypeError` if the system has no attitude or position, and `ValueError`
+    for other shapes.
     """
     if attitude0 is None and position0 is None:
         return None
@@ -344,7 +346,7 @@ def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: I
 
 
 def array(values: ArrayLike, argument: str, shape: tuple[int, ...]) -> Floats:
-    """Return a copy of an array. Raises `ValueError` if its shape is not ``shape``, or a value is not finite."""
+    """Return a copy of an array. Raises `ValueError` unless it has this ``shape`` and all values are finite."""
     copy = real(values, argument)
     if copy.shape != shape:
         raise ValueError(f"{argument} must have shape {shape}, not {copy.shape}")
@@ -373,7 +375,7 @@ def real(values: ArrayLike, argument: str) -> Floats:
 
 def number(value: float, argument: str) -> float:
     """Return a value as a float. Raises `TypeError` if it is not a number, `ValueError` if it is not finite."""
-    if isinstance(value, str | bytes | bytearray):  # float() would accept texts
+    if isinstance(value, str | bytes | bytearray):  # float() would accept text
         raise TypeError(f"{argument} must be a number, not {_shown(value)}")
     try:
         number = float(value)
@@ -396,7 +398,7 @@ def _shown(value: Any) -> str:
 
 
 def beyond_single(numbers: Mapping[str, Any]) -> str:
-    """Return a message that names the first value too large for single precision, "" if there is none."""
+    """Return a message that names the first value too large for single precision; "" if there is none."""
     for name, value in numbers.items():
         largest = max(np.ravel(value).tolist(), key=abs, default=0.0)
         if abs(largest) > LARGEST_SINGLE:

@@ -15,7 +15,7 @@ class Backend(Protocol):
 
     States are float64 arrays whose last axis is the coordinates. ``parameters`` holds every parameter, in the order of
     declaration. The caller has checked all arguments. A failing step raises `BackendError`. If the Hamiltonian depends
-    on the time, ``t0`` is the time of a start and ``t`` (rows,) are the times of states; else they are 0 and None.
+    on the time, ``t0`` is the initial time and ``t`` (rows,) are the times of states; otherwise they are 0 and None.
     """
 
     target: str
@@ -33,25 +33,28 @@ class Backend(Protocol):
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> Session:
-        """Return a session at x0 (DIM,), with attitude and position ``first`` (numbers,), by default the identity.
+        """Return a session at x0 (DIM,).
 
-        ``draws`` select the random numbers of its noise.
+        ``first`` (numbers,) is the initial attitude and position, by default the identity and the origin. ``draws``
+        select the random numbers of the noise.
         """
         ...
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
-        """Return the session that `Session.saved` stored as these bytes, by a back end of the same `identity`."""
+        """Return the session that `Session.saved` stored as the bytes ``saved``, by a back end of the same
+        `identity`."""
         ...
 
     def with_gauge(self, gauge: Floats) -> Backend:
-        """Return a back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
+        """Return a back end whose trajectories use a fixed gauge: one value for each Casimir of the gauge."""
         ...
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
         """Return final states (members, DIM), or frames (rows, members, DIM); ``threads`` None uses all cores.
 
-        ``attitudes`` (rows, members, numbers) holds the initial attitudes in its first row; the other rows are filled
-        with the attitudes of the frames. Without frames it has two rows, and the second receives the final attitudes.
+        ``attitudes`` (rows, members, numbers) contains the initial attitudes in its first row. The attitudes of the
+        frames are written into the other rows. Without frames it has two rows, and the second receives the final
+        attitudes.
         """
         ...
 
@@ -63,7 +66,7 @@ class Backend(Protocol):
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """Return the stored states (rows, members, DIM), and the pullback of their cotangents ``bars`` to the start.
 
-        The pullback is a cotangent of the initial states (members, DIM) and one of the parameters (parameters,
+        The pullback consists of the cotangents of the initial states (members, DIM) and of the parameters (parameters,
         members). Raises `MissingExtraError` without the extra ``adjoint``.
         """
         ...

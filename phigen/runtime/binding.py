@@ -1,4 +1,4 @@
-"""Functions of a compiled solver, with the types of their arguments."""
+"""Functions of a shared library through ctypes, with the types of their arguments."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ Signatures = Mapping[str, tuple[Any, tuple[Any, ...]]]
 def bound(
     library: Any, prefix: str, required: Signatures, optional: Signatures | None = None, *, single: bool = False
 ) -> Any:
-    """Return a namespace of the library's functions ``PREFIX_NAME``, with their types; ``optional`` ones may be absent.
+    """Return a namespace of the library's functions ``PREFIX_NAME``, with their types; ``optional`` functions may be
+    missing.
 
     With ``single``, arguments and results of type double are float. Raises `ToolchainError` if a ``required`` function
-    is absent.
+    is missing.
     """
     numbers = {ctypes.c_double: ctypes.c_float} if single else {}
     functions = SimpleNamespace()

@@ -21,14 +21,14 @@ _SIGNATURES = {
 }
 
 
-# For Hamiltonians that depend on the time; these replace the signatures of the same name.
+# Signatures if the Hamiltonian depends on the time; they replace those of the same name.
 _TIMED = {
     "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
     "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),
     "vector_field": (None, (_POINTER, _DOUBLE, _POINTER, _POINTER)),
 }
 
-# For systems with noise.
+# Signatures of functions of systems with noise.
 _WORD, _LONG = ctypes.c_uint32, ctypes.c_uint64
 _NOISY = {
     "set_noise": (_INT, (_POINTER, _LONG, _WORD, _LONG)),
@@ -57,7 +57,7 @@ _EXTRAS = {
     "noise_fields": (None, (_POINTER, _POINTER, _POINTER)),
     "observables": (None, (_POINTER, _POINTER, _POINTER)),
     "ensemble_of": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _LONG, _WORD, _LONG, _POINTER)),
-    "ensemble_attitudes": (_INT, ()),  # the order of `_of_attitudes`
+    "ensemble_attitudes": (_INT, ()),  # with the order of arguments of `_of_attitudes`
     "set_attitude": (_INT, (_POINTER, _POINTER, _POINTER)),
 }
 
@@ -67,7 +67,7 @@ def functions_of(library: Any, interface: Interface) -> Any:
     offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
     dated = _dated(offered, interface) | (_NOISY if interface.noise else {})
     timed = _TIMED if interface.time else {}
-    if interface.time or "init_gauge" in offered:  # one more argument: the time, or the gauge, of each member
+    if interface.time or "init_gauge" in offered:  # an additional argument: the time, or the gauge, of each member
         _, signature_each = _EXTRAS["ensemble_each"]
         offered |= (
             {"ensemble_each": (_INT, (*signature_each[:3], _POINTER, *signature_each[3:]))}
@@ -91,9 +91,9 @@ def functions_of(library: Any, interface: Interface) -> Any:
 
 
 def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """Return the signature of ensembles with attitudes, {} if absent.
+    """Return the signature of ensembles with attitudes; {} if the library has no such function.
 
-    It has an argument for times or gauges of the members, and arguments for the random numbers, if the system has them.
+    There are further arguments for times or gauges of the members and for random numbers, if the system has them.
     """
     name = "ensemble_attitudes"
     times_or_gauges = (_POINTER,) if interface.time or "init_gauge" in offered else ()
@@ -104,7 +104,7 @@ def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str,
 
 
 def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """Return the signatures of functions that take the time as a further argument, {} without a time."""
+    """Return the signatures of functions with the time as an additional argument; {} if the system has no time."""
     time_positions = {"observables": 1, "noise_fields": 1, "ensemble_of": 3} if interface.time else {}
     dated = {name: (offered[name], position) for name, position in time_positions.items() if name in offered}
     return {name: (result, (*a[:position], _DOUBLE, *a[position:])) for name, ((result, a), position) in dated.items()}

@@ -38,13 +38,13 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "vector_field": (None, (_POINTER, _POINTER)),
 }
 
-#: Signatures of graphs where they differ from those of grids.
+#: Signatures for graphs that differ from those for grids.
 _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "work_size": (_SIZE, (_POINTER, _SIZE)),
     "init": (_INT, (_POINTER,) * 6),
 }
 
-#: Further functions of Hamiltonians that depend on the time, for grids and pairs and for graphs; and those of noise.
+#: Additional functions if the Hamiltonian depends on the time, for grids and pairs and for graphs, and those for noise.
 _PASSED: dict[str, tuple[Any, tuple[Any, ...]]] = {"passed": (_INT, (_POINTER, _DOUBLE, _SIZE))}
 _IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 4 + (_DOUBLE, _POINTER))}
 _GRAPH_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
@@ -76,16 +76,16 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "resume_clock": (_INT, (_POINTER, _POINTER)),
 }
 
-#: A tape has room for at least this number of values: 2 MiB in double precision, which the cache of a core holds.
+#: Least number of values for which a tape has room: 2 MiB in double precision, the size of a core's cache.
 MIN_TAPE_VALUES = 1 << 18
 
-#: A tape has room for at least this number of states from which segments of a run are recomputed.
+#: Least number of states, from which segments of a run are recomputed, for which a tape has room.
 MIN_CHECKPOINTS = 8
 
-#: Number of steps over which the tape of one step is averaged, since several steps may share one stored state.
+#: Number of steps over which the tape size of a step is averaged: several steps may share one stored state.
 MEASURED_STEPS = 64
 
-#: Largest number of bytes of a tape (64 MiB), unless one of the two minima asks for more.
+#: Largest number of bytes of a tape (64 MiB), unless one of the two minima is larger.
 MAX_TAPE_BYTES = 1 << 26
 
 #: Site updates in one call of C. Python delivers keyboard interrupts between calls.
@@ -95,8 +95,8 @@ _UPDATES_PER_CALL = 1 << 26
 class SweepStage(ctypes.Structure):
     """One sweep of a step, with the data that it reads and writes.
 
-    ``behind`` and ``ahead`` are the numbers of planes that it reads before and after the planes it sweeps. ``read`` and
-    ``changed`` have a bit for each field.
+    ``behind`` and ``ahead`` are the numbers of planes before and after the swept planes that the sweep reads. ``read``
+    and ``changed`` have a bit for each field.
     """
 
     _fields_: ClassVar = [
@@ -134,10 +134,10 @@ class CLatticeSession:
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
         bonds = np.ascontiguousarray(parameters.get("bonds", ()), dtype=np.uintp).reshape(-1, 2)
-        graph = np.array([len(bonds), bonds.ctypes.data], dtype=np.uintp)  # the struct NAME_bonds
+        graph = np.array([len(bonds), bonds.ctypes.data], dtype=np.uintp)  # the C struct NAME_bonds
         work_size = functions.work_size(sizes.ctypes.data, *([len(bonds)] if interface.graph else []))
         expect_room(f"the arrays of a solver of {' × '.join(map(str, sizes))} sites", work_size)
-        self._beside = np.zeros(0, dtype=np.uint8)  # for tangent vectors
+        self._beside = np.zeros(0, dtype=np.uint8)  # memory for tangent vectors
         self._work = np.zeros(max(work_size, 64), dtype=np.uint8)
         self._address = self._struct.ctypes.data
         with np.errstate(over="ignore"):  # values beyond single precision become infinite, which C reports
@@ -146,7 +146,7 @@ class CLatticeSession:
         arrays = [a.ctypes.data for a in (packed, sizes, *([graph] if interface.graph else []), first)]
         begin, last = (functions.init_at, (t0,)) if interface.time else (functions.init, ())
         status = begin(self._address, *arrays, *last, self._work.ctypes.data)
-        del referenced  # the arrays that `packed` points to, which C has copied
+        del referenced  # C has copied the arrays that `packed` points to
         if status:
             raise BackendError(status_name(status), 0, x0[None])
         if interface.noise:
@@ -171,7 +171,7 @@ class CLatticeSession:
             steps -= chunk
 
     def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
-        """Make ``steps`` steps, and return the tangent ``vectors`` multiplied by their derivatives."""
+        """Make ``steps`` steps, and return the products of their derivative with the tangent ``vectors``."""
         if not hasattr(self._c, "integrate_tangent"):
             raise MissingExtraError("step_tangent")
         propagated = np.array(vectors, dtype=self._real, order="C")
@@ -187,9 +187,9 @@ class CLatticeSession:
         return np.asarray(propagated, dtype=np.float64)
 
     def pull_back(self, h: float, steps: int, stride: int, bars: Floats, parameters_bar: int) -> tuple[Floats, Floats]:
-        """Return the rows of a run, and the cotangent of its initial state from the cotangents ``bars`` of the rows.
+        """Return the rows of a run, and the pullback of their cotangents ``bars`` to the initial state.
 
-        The cotangent of row 0 is not added. ``parameters_bar`` is the address of a struct to which the cotangents of
+        The cotangent of row 0 is not included. ``parameters_bar`` is the address of a struct to which the cotangents of
         the parameters are added.
         """
         row_bars = np.ascontiguousarray(bars[1:], dtype=self._real)
@@ -198,10 +198,10 @@ class CLatticeSession:
         state = x0_bar.nbytes
         tape_of_steps = int(self._c.trail_size(self._address, 1 + MEASURED_STEPS)) - single_step_tape
         tape_per_step = tape_of_steps // MEASURED_STEPS
-        # At this size, checkpoints and the tape of one segment fit if each segment is recomputed once.
+        # With a tape of this size, checkpoints and the tape of one segment fit if each segment is recomputed once.
         recomputing_tape = single_step_tape + 3 * math.isqrt(steps * state * tape_per_step)
-        # A tape of the whole run pays if steps are slow, or if the tape is short because the inverse flow recomputes
-        # states.
+        # A tape of the whole run is worthwhile in two cases: steps are slow, or the tape is short because the inverse
+        # flow recomputes states.
         preferred_tape = full_tape if self._slow_steps or tape_per_step < state else recomputing_tape
         min_tape_bytes = max(MIN_TAPE_VALUES * x0_bar.itemsize, single_step_tape + MIN_CHECKPOINTS * 2 * state)
         size = max(min_tape_bytes, min(MAX_TAPE_BYTES, preferred_tape))
@@ -253,7 +253,7 @@ class CLatticeSession:
         return clock | ({"before": x[:fields].copy(), "far": full_range_flag} if fields else {"far": full_range_flag})
 
     def _clock(self) -> dict[str, Any]:
-        """Return the energy level and the physical time of steps equal in τ, else nothing."""
+        """Return the energy level and the physical time, for steps equal in τ; else nothing."""
         return {"passed": self._filled(self._c.saved_clock, (5,))} if hasattr(self._c, "saved_clock") else {}
 
     def time(self) -> float:
@@ -269,7 +269,7 @@ class CLatticeSession:
         self._expect_done(self._c.resume_clock(self._address, values.ctypes.data))
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
-        """Continue after ``steps`` steps of size h, from the result of `saved`."""
+        """Continue after ``steps`` steps of size h; ``arrays`` are the result of `saved`."""
         if hasattr(self._c, "passed"):
             self.passed(h, steps)
         else:
@@ -299,15 +299,15 @@ class CLatticeSession:
             raise BackendError(status_name(status), self.steps, self.state()[None])
 
     def passed(self, h: float, steps: int) -> None:
-        """Advance time and random numbers by ``steps`` steps of size h, for lattices that have either."""
+        """Advance the time and the random numbers by ``steps`` steps of size h without a change of the state."""
         self._expect_done(self._c.passed(self._address, h, steps))
 
     # --- caller-driven stepping: see NAME.h
 
     def set_planes(self, first: int, planes: int) -> None:
-        """Set the place of this part in a whole lattice, so that its sites have the random numbers of the whole.
+        """Set the position of this part in a whole lattice, so that its sites have the random numbers of the whole.
 
-        ``first`` is the number of its first plane in the whole, which has ``planes`` planes.
+        ``first`` is the number of the first plane of this part in the whole, which has ``planes`` planes.
         """
         self._expect_done(self._c.set_planes(self._address, first, planes))
 
@@ -363,11 +363,12 @@ class CLattice:
         """Return the number of threads that share the work on a lattice of ``sites`` sites."""
         if not self.interface.is_shared(sites):
             return 1
-        openmp_maximum = getattr(self._library, "omp_get_max_threads", None)  # of the OpenMP that it is linked with
+        # of the OpenMP library that the solver is linked with
+        openmp_maximum = getattr(self._library, "omp_get_max_threads", None)
         return int(openmp_maximum()) if openmp_maximum else 1
 
     def stages(self) -> list[SweepStage]:
-        """Return the sweeps of a step in order, and, without noise, the last and the first merged into one.
+        """Return the sweeps of a step in order. Without noise, a sweep that merges the last with the first follows.
 
         Raises `ValueError` if the C has no caller-driven stepping.
         """
@@ -427,9 +428,9 @@ class CLattice:
 def _packed(
     interface: LatticeInterface, parameters: Mapping[str, Any], sizes: tuple[int, ...], bonds: int
 ) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
-    """Return the struct of parameters, and copies of the arrays that it points to.
+    """Return the C struct of parameters, and copies of the arrays that it points to.
 
-    The caller must hold the copies as long as C uses the struct.
+    The caller must keep the copies alive as long as C uses the struct.
     """
     real: Any = np.float32 if interface.single else np.float64
     arrays = {*interface.at_sites, *interface.at_bonds}

@@ -30,7 +30,8 @@ class Cotangents(NamedTuple):
 
 
 class CSession:
-    """A struct NAME_solver. It contains no pointers, so a copy of its bytes is a copy of the session. See `Session`."""
+    """A C struct NAME_solver. It contains no pointers, so a copy of its bytes is a copy of the session. See
+    `Session`."""
 
     def __init__(
         self, functions: Any, struct: Bytes, dimension: int, element: int = 0, real: Real = np.float64
@@ -84,10 +85,11 @@ class CSession:
         return tangent.astype(np.float64, copy=False)
 
     def pull_back(self, h: float, segment: Segment, tape: Floats, bars: Floats, cotangents: Cotangents) -> Floats:
-        """Return the rows (rows, DIM) of the segment that begins here, and pull ``cotangents`` back to its start.
+        """Return the rows (rows, DIM) of the segment that begins at the current state, and pull ``cotangents`` back to
+        its start.
 
-        ``cotangents`` are those after the segment, and are overwritten by those before it. ``bars`` are the cotangents
-        of the rows, ``tape`` is work space.
+        ``cotangents`` are overwritten: on entry those after the segment, on return those before it. ``bars`` are the
+        cotangents of the rows, ``tape`` is work space.
         """
         rows, level = np.empty_like(bars), (cotangents.level.ctypes.data,) * hasattr(self._c, "level_bar")
         out = (rows.ctypes.data, bars.ctypes.data, cotangents.state.ctypes.data, cotangents.parameters.ctypes.data)

@@ -1,6 +1,6 @@
 """A generated C solver, called through ctypes.
 
-Two small functions beside the documented ones are called: ``size_t NAME_solver_size(void)``, and ``size_t
+Besides the documented functions, two others are called: ``size_t NAME_solver_size(void)``, and ``size_t
 NAME_solver_steps_done(const NAME_solver *)``, the number of successful steps since ``NAME_init``. Of the solver's
 struct only the first member, ``double x[DIM]``, is read; the struct is copied and stored as bytes.
 """
@@ -36,8 +36,8 @@ from phigen.runtime.members import Members, one_by_one, shared_out
 class CSolver:
     """Back end over the shared library compiled from generated C files (name → text).
 
-    Several threads may use it, since it holds no state of a trajectory. The library comes from the cache or is compiled
-    now. Raises `ToolchainError`.
+    It has no state of a trajectory, so several threads may use it. The library is taken from the cache or compiled.
+    Raises `ToolchainError`.
     """
 
     target = "c"
@@ -126,9 +126,9 @@ class CSolver:
         return members.checked(final if frames is None else frames, failures)
 
     def _expect_parameters(self, members: Members) -> None:
-        """Raise `BackendError` if no step can be made with the parameters of an ensemble without members.
+        """Raise `BackendError` if no step is possible with the parameters of an ensemble that has no members.
 
-        With a monitor this is not checked, since it depends on the initial state too.
+        Systems with a monitor are not checked: for them the check depends on the initial state.
         """
         if hasattr(self._c, "monitor"):
             return
@@ -145,7 +145,7 @@ class CSolver:
             raise BackendError(status_name(status), 0, members.x0)
 
     def _alike(self, members: Members, x: Floats, status: Bytes) -> None:
-        """Integrate in place members ``x`` (DIM, members) that differ in their states only."""
+        """Integrate members ``x`` (DIM, members) in place; the members differ in their states only."""
         h, parameters, t0 = members.numbers(0)
         packed = self._packed(parameters)
         start, further_arguments = (
@@ -162,9 +162,9 @@ class CSolver:
             self._c.ensemble(*start, *further_arguments)
 
     def _each(self, members: Members, x: Floats, status: Bytes, rows: Floats | None) -> None:
-        """Integrate in place members ``x`` (DIM, members) with parameters, steps and times of their own.
+        """Integrate members ``x`` (DIM, members) in place; each has its own parameters, step size and initial time.
 
-        ``rows`` (frames, members, DIM) receive the states of the frames; None if there are none.
+        ``rows`` (frames, members, DIM) receives the states of the frames; None if there are no frames.
         """
         count = len(members)
         packed, began, h = self._packed_arguments(members)
@@ -178,7 +178,7 @@ class CSolver:
             rows[: len(frames)] = frames.transpose(0, 2, 1)
 
     def _with_attitudes(self, members: Members, threads: int | None, attitudes: Floats) -> Floats:
-        """Return the result of `ensemble` for members with attitudes, and fill ``attitudes`` with these."""
+        """Return the result of `ensemble` for members with attitudes, and write these into ``attitudes``."""
         count, row_count = len(members), members.steps // members.stride if members.stride else 0
         frames = members.frames() if members.stride else None
         final, last, status = members.x0.copy(), attitudes[0].copy(), np.zeros(count, dtype=np.uint8)
@@ -206,9 +206,9 @@ class CSolver:
     def _all_turned(
         self, members: Members, initial: tuple[Floats, Floats], rows: tuple[Floats, Floats], status: Bytes
     ) -> None:
-        """Integrate members in place.
+        """Integrate members with attitudes in place.
 
-        ``initial`` are their states and attitudes (numbers, members), ``rows`` receive those of the frames.
+        ``initial`` are their states and attitudes (numbers, members); ``rows`` receives those of the frames.
         """
         packed, times_or_gauges, h = self._packed_arguments(members)
         start = [packed if members.parameters else None, *initial]
@@ -226,9 +226,10 @@ class CSolver:
         )
 
     def _packed_arguments(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
-        """Return parameters (members, parameters), a list of the times or gauges, and the step sizes (members,).
+        """Return parameters (members, parameters), a list of times or gauges, and the step sizes (members,).
 
-        The list has one array if the system has a time or a gauge, which is None for gauges that the C chooses.
+        The list has one entry if the system has a time or a gauge, else none. The entry for gauges is None if the C
+        chooses them.
         """
         count, width = len(members), max(1, len(members.parameters))
         packed = np.empty((count, width))
@@ -283,10 +284,10 @@ class CSolver:
         return rows, x0_bar, parameters_bar
 
     def _can_batch_pullback(self, members: Members) -> bool:
-        """Whether one call pulls all members back, or one call for each segment of a long run.
+        """Whether all members can be pulled back together, by one call for each segment of the run.
 
-        A run of several segments cannot be batched if it has a time or a gauge, since each segment would need its
-        own start values of these.
+        A run of several segments cannot be batched if it has a time or a gauge: each segment would need its own initial
+        values of these.
         """
         if not hasattr(self._c, "pullback_each"):
             return False
@@ -298,7 +299,7 @@ class CSolver:
     def _all_pulled(
         self, members: Members, segments: Sequence[Segment], tape: Floats, bars: Floats, status: Bytes
     ) -> tuple[Floats, Floats, Floats]:
-        """Return the pullback of some members, from one call for each segment of the run."""
+        """Return the pullback of some members; one call of C processes all of them over one segment."""
         rows, (packed, times_or_gauges, h) = np.empty_like(bars), self._packed_arguments(members)
         parameters_bar, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)
         parameters_address = packed.ctypes.data if members.parameters else None
@@ -343,7 +344,7 @@ class CSolver:
         parameters: Mapping[str, float],
         t0: float,
     ) -> tuple[Floats, Floats, Floats]:
-        """Return the pullback of one member, segment by segment."""
+        """Return the pullback of one member; the segments are processed in reverse order."""
         current, segment_sessions, rows = self.start(x0, parameters, t0), list[CSession](), np.empty_like(bars)
         for segment in segments:
             segment_sessions.append(current)
@@ -409,7 +410,7 @@ class CSolver:
         return self._own(np.array(list(parameters.values()) or [0.0]))
 
     def _own(self, values: Floats) -> NDArray[Any]:
-        """Return a copy in the precision of the C; values too large for single precision become infinite."""
+        """Return a copy in the precision of the C. Values too large for single precision become infinite."""
         if not self.interface.single:
             return np.array(values, dtype=np.float64, order="C")
         with np.errstate(over="ignore"):
@@ -417,7 +418,8 @@ class CSolver:
 
 
 def _times(t: Floats | None) -> list[list[float]]:
-    """Return a list with the times of rows, as the first argument of C functions; empty without a time."""
+    """Return a list that contains the times of rows, the first argument of C functions; empty if the system has no
+    time."""
     return [] if t is None else [t.tolist()]
 
 

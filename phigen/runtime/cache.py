@@ -150,7 +150,7 @@ def _key(files: Mapping[str, str], compiler: Compiler) -> str:
 
 @cache
 def _machine() -> str:
-    """Return the facts about the processor that -march=native depends on.
+    """Return the properties of the processor that -march=native depends on.
 
     They are part of the key, because machines with different processors may share a home folder and its cache.
     """
@@ -195,9 +195,9 @@ def _trim(folder: Path, keep: Path) -> None:
 
 @cache
 def _private_directory() -> Path:
-    """Return a folder for this process alone, removed at its end.
+    """Return a folder of this process, which is removed when the process ends.
 
-    Its name is random: in a folder with a predictable name, other users could place libraries of theirs.
+    Its name is random: other users could place libraries in a folder with a predictable name.
     """
     folder = Path(tempfile.mkdtemp(prefix="phigen-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""Checkpoints of long runs: the state of an interrupted run, and the facts by which the same run is recognised."""
+"""Checkpoints of long runs: the state of an interrupted run, and the settings that identify the run."""
 
 from __future__ import annotations
 
@@ -39,9 +39,10 @@ class Checkpoint:
 
 
 def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) -> str:
-    """Return why a run may not begin or resume with these files, or "" if it may; ``how`` names the option to resume.
+    """Return the reason why a run may not begin or resume with these files; "" if it may.
 
-    A new run does not overwrite the files of an interrupted run. A complete run cannot be resumed.
+    A new run does not overwrite the files of an interrupted run, and a complete run cannot be resumed. ``how`` is the
+    name of the option for resuming, for the message.
     """
     if not resume and checkpoint.exists():
         return f"{checkpoint} belongs to an interrupted run: continue it with {how}, or remove the file"
@@ -51,7 +52,7 @@ def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) 
 
 
 def objection_to_frames(part: Path) -> str:
-    """Return why a run without checkpoints may not write its frames to a file, or "" if it may."""
+    """Return the reason why a run without checkpoints may not write its frames to the file ``part``; "" if it may."""
     if not part.exists():
         return ""
     return f"{part} holds the frames of an interrupted run: continue it with its checkpoints=, or remove the file"
@@ -68,7 +69,7 @@ def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
         stored_identity = json.loads(arrays.pop(_IDENTITY).tobytes())
     except (ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
         raise MismatchError(f"{path} is not a checkpoint of phigen: {error}") from None
-    # JSON turns tuples into lists, in both identities that are compared.
+    # JSON turns tuples into lists, so both identities are converted before they are compared.
     expected_identity = json.loads(json.dumps(identity))
     differing = [key for key in expected_identity if stored_identity.get(key) != expected_identity[key]]
     if differing:
@@ -78,5 +79,5 @@ def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _difference(key: str, earlier: Any, current: Any) -> str:
-    # A hash in a message would not help its reader.
+    # The values of hashes are left out: they do not help a reader.
     return f"the {key} has changed" if key in HASHES else f"{key} was {earlier!r} and is {current!r}"

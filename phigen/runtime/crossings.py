@@ -1,10 +1,10 @@
 """Poincaré sections: the zeros of a function g of the state along a trajectory, located by the integrator itself.
 
-Between two steps of size h, the solution is a single step of size θh, 0 < θ < 1, from the state before. The crossing is
-at the θ for which g vanishes to round-off. So the points lie on the leaf, without interpolation.
+The states between two steps of size h are single steps of size θh, 0 < θ < 1, from the state before. The crossing is at
+the θ for which g vanishes to round-off. So the points lie on the leaf; nothing is interpolated.
 
-A method with a collocation polynomial is searched for zeros of g on that. From there Newton's method takes steps of
-size (θ − 1)h from the state after; these start from the polynomial too.
+If the method has a collocation polynomial, a zero of g is first located on the polynomial. Newton's method then takes
+steps of size (θ − 1)h from the state after; their initial guess is also taken from the polynomial.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ C = TypeVar("C", bound=Course)
 #: A function from states (rows, DIM), and their times (rows,) if H depends on the time, to values (rows,).
 Function = Callable[..., Floats]
 
-#: Steps between two evaluations of g on arrays, by default; a copy of the session is held for each.
+#: Default number of steps between two evaluations of g on arrays; a copy of the session is stored for each step.
 BLOCK = 64
-#: Values of g in each step where a collocation polynomial gives them: enough for the extrema of a motion that makes
-#: half a turn in a step.
+#: Number of values of g in each step where a collocation polynomial provides them: enough to find the extrema of a
+#: motion that makes half a turn in a step.
 SAMPLES = 4
-#: Half the distance of the two points on a collocation polynomial by which g is differentiated, in steps: about the
+#: Half the distance, in steps, of the two points of a finite difference of g on a collocation polynomial: about the
 #: cube root of rounding.
 _DIFFERENCE = 1e-5
-#: Largest number of steps by Newton's method to a zero, which takes two to four.
+#: Largest number of Newton steps to a zero; two to four are usual.
 _MOST_NEWTON = 8
-#: Numbers of equal steps that reach a point between two steps, tried in this order: a single step without a predictor
+#: Numbers of equal steps that lead to a point between two steps, tried in this order: a single step without a predictor
 #: may not converge.
 SUBSTEPS = (1, 2, 4, 8)
 #: Absolute tolerance of a fraction of a step: fractions closer than this give the same state.
@@ -77,15 +77,15 @@ def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
 class CrossingFinder(Generic[C]):
     """Locates the zeros of g along a session with steps of size h, in a ``direction`` as time increases.
 
-    At most one crossing is found between two points: steps or, with a collocation polynomial, parts of steps. If g has
-    the same sign at three points and an extremum between them, the extremum is located, in case g changes its sign
-    twice there. A start with g = 0 counts as a crossing if g leaves zero in the direction.
+    At most one crossing is located between two neighbouring points: steps or, with a collocation polynomial, points
+    inside steps. If g has the same sign at three points and an extremum between them, the extremum is located, since g
+    may change its sign twice there. A start with g = 0 counts as a crossing if g leaves zero in the direction.
 
-    ``past`` are copies of the session at the last steps except the latest, which is ``latest``. ``values`` are those of
-    g at these steps and the latest, and at the points between them, of which each step has ``points``; ``first`` is the
-    number of the first of these steps. ``t0`` is the time of step 0; g receives times if it is
-    ``timed``. ``places`` are sessions at the crossings of the latest block, with their numbers of steps from the start.
-    A ``block`` is the number of steps between two evaluations of g on arrays.
+    ``latest`` is a copy of the session at the latest step, ``past`` are copies at the steps before. ``values`` are the
+    values of g at these steps and at the ``points`` of each step; ``first`` is the number of the first of these steps.
+    ``t0`` is the time of step 0; g receives times if it is ``timed``. ``places`` are sessions at the crossings of the
+    latest block, with their numbers of steps from the start. A ``block`` is the number of steps between two evaluations
+    of g on arrays.
     """
 
     g: Function
@@ -100,12 +100,12 @@ class CrossingFinder(Generic[C]):
     block: int = BLOCK
     points: int = 1
     latest: C | None = None
-    _sign: float = 1.0  # searches for zeros where sign·g rises; g falls where −g rises
+    _sign: float = 1.0  # zeros are searched where sign·g rises; g falls where −g rises
 
     def follow(
         self, session: C, steps: int, move: Callable[[], object]
     ) -> Iterator[tuple[Floats, list[tuple[float, Floats]]]]:
-        """Make ``steps`` steps, each by a call of ``move``; yield in blocks their states (rows, DIM) and the crossings.
+        """Make ``steps`` steps, each by a call of ``move``; yield the states (rows, DIM) and the crossings in blocks.
 
         Crossings are pairs (t, x). Raises `BackendError` after the block that ends before the failing step.
         """
@@ -140,7 +140,10 @@ class CrossingFinder(Generic[C]):
                 raise failure
 
     def _interpolated_states(self, session: C) -> Floats:
-        """Return states (points, DIM) between the last two steps, if the session interpolates and g reads no clock."""
+        """Return states (points, DIM) inside the last step.
+
+        Returns an empty array if the method has no collocation polynomial, or the time must be read from the session.
+        """
         interpolated = getattr(session, "interpolated", None)
         if interpolated is None or (self.timed and not math.isnan(self._clock(session, math.nan))):
             return np.empty((0, 0))
@@ -150,7 +153,7 @@ class CrossingFinder(Generic[C]):
     def within(self, session: C, part: float) -> list[tuple[float, Floats]]:
         """Return the crossings (t, x) in the first ``part`` of the next step of a session, which is not advanced.
 
-        There are none if the whole step fails.
+        The result is empty if the whole step fails.
         """
         copy, end = session.branch(), session.steps + part * (1 + 1e-12)
         try:
@@ -164,7 +167,7 @@ class CrossingFinder(Generic[C]):
         ]
 
     def _time(self, j: Any, fraction: float = 0.0) -> Any:
-        """Return the time at a fraction of interval j, where interval 0 begins at the first of the values."""
+        """Return the time at a fraction of interval j between points; interval 0 begins at the first of ``values``."""
         return self.t0 + (self.first + (j + fraction) / self.points) * self.h
 
     def _values(self, states: Floats, t: Floats) -> Floats:
@@ -178,7 +181,7 @@ class CrossingFinder(Generic[C]):
         )
 
     def _crossings(self, searched: int) -> Iterator[tuple[float, Floats]]:
-        """Yield the crossings of this block, whose first ``searched`` intervals were searched before."""
+        """Yield the crossings of this block; its first ``searched`` intervals were searched before."""
         self.places = []
         for sign in SIGNS[self.direction]:
             self._sign = sign
@@ -198,7 +201,10 @@ class CrossingFinder(Generic[C]):
                 yield self._crossing_between(i, 0.0, v[i], 1.0, v[i + 1])
 
     def _bracket_at_extremum(self, v: list[float], i: int) -> tuple[int, float, float, float, float] | None:
-        """Return an interval beside point i and a bracket in it, if an extremum near that changes the sign of g."""
+        """Return a bracket (interval, low, g at low, high, g at high) of a zero next to an extremum of g near point i.
+
+        None if there is no extremum, or g does not change its sign there.
+        """
         a, b, c = v[i - 1 : i + 2]
         peak = a < b >= c and b < 0
         if not (peak or (a > b <= c and b >= 0 and a >= 0)):
@@ -206,7 +212,8 @@ class CrossingFinder(Generic[C]):
         curvature = a - 2 * b + c
         offset = (a - c) / (2 * curvature) if curvature else 0.0
         gain = abs((a - c) * offset / 4)
-        # The parabola through three values has an error of a fraction of its curvature; a tenth is added for it.
+        # The parabola through three values has an error of a fraction of its curvature; a tenth of the curvature is
+        # added for it.
         if not abs(b) <= 2 * gain + 0.1 * abs(curvature):
             return None
         j = i - 1 if offset < 0 else i
@@ -217,9 +224,9 @@ class CrossingFinder(Generic[C]):
         return (j, 0.0, v[j], extremum, value) if peak else (j, extremum, value, 1.0, v[j + 1])
 
     def _extremum(self, v: list[float], j: int, sign: float) -> float:
-        """Return the fraction of interval j where sign·g is smallest, or the first one found where g changes its sign.
+        """Return the fraction of interval j where sign·g is smallest, by golden-section search.
 
-        Golden-section search.
+        The search ends earlier at a fraction where g has the other sign.
         """
         low, high = 0.0, 1.0
         left, right = 1 - _GOLDEN, _GOLDEN
@@ -256,7 +263,10 @@ class CrossingFinder(Generic[C]):
         return self.past[step + 1] if step + 1 < len(self.past) else self.latest
 
     def _session_at_fraction(self, step: int, fraction: float, substeps: Sequence[int]) -> C:
-        """Return a session after a fraction of a step, made in the first number of equal steps that does not fail."""
+        """Return a session after a fraction of a step.
+
+        ``substeps`` are numbers of equal steps; the first number with which no step fails is used.
+        """
         for count in substeps:
             session = self.past[step].branch()
             try:
@@ -269,7 +279,8 @@ class CrossingFinder(Generic[C]):
         return session
 
     def _crossing_between(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
-        """Return the crossing in interval j between two fractions: its number of steps, and a session there."""
+        """Return the crossing in interval j between the fractions ``low`` and ``high``: its number of steps, and a
+        session there."""
         step, part = divmod(j, self.points)
         low, high = (part + low) / self.points, (part + high) / self.points
         if self.points > 1 and (polished := self._refined_on_polynomial(step, low, at_low, high, at_high)):
@@ -281,7 +292,7 @@ class CrossingFinder(Generic[C]):
             return self._sign * self._value(moved_session, self.points * step, self.points * fraction)
 
         for count in SUBSTEPS:
-            # All fractions take the same number of substeps, so that g is a smooth function of the fraction.
+            # All fractions take the same number of substeps, so g is a smooth function of the fraction.
             try:
                 fraction = root(value, low, at_low, high, at_high)
                 crossing_session = self._session_at_fraction(step, fraction, (count,))
@@ -295,9 +306,10 @@ class CrossingFinder(Generic[C]):
     def _refined_on_polynomial(
         self, step: int, low: float, at_low: float, high: float, at_high: float
     ) -> tuple[float, C] | None:
-        """Return the fraction of a step and the session of the zero that is nearest to one on its polynomial.
+        """Return the zero of g in a step, as its fraction and a session there, starting from the zero on the
+        polynomial.
 
-        None if steps by Newton's method do not converge to it, as where g has a double zero.
+        None if Newton's method does not converge to a zero, for instance at a double zero of g.
         """
         fraction = root(lambda at: self._on_polynomial(step, [at])[0], low, at_low, high, at_high)
         value_before, value_after = self._on_polynomial(step, [fraction - _DIFFERENCE, fraction + _DIFFERENCE])
@@ -311,7 +323,7 @@ class CrossingFinder(Generic[C]):
             except BackendError:
                 return None
             value = self._sign * self._value(step_end, self.points * step, self.points * fraction)
-            if not abs(value) < best:  # rounding, unless the step that led here was not small
+            if not abs(value) < best:  # rounding errors dominate, unless the last Newton step was not small
                 return zero if best <= abs(slope) * math.sqrt(self._session_after(step).rounding) else None
             best, zero = abs(value), (fraction, step_end)
             following = min(1.0, max(0.0, fraction - value / slope)) if slope else math.nan
@@ -321,7 +333,7 @@ class CrossingFinder(Generic[C]):
         return None
 
     def _clock(self, session: C, counted_time: float) -> float:
-        """Return the physical time of a session if its steps are equal in τ, else the ``counted_time`` time."""
+        """Return the physical time of a session if its steps are equal in τ; otherwise return ``counted_time``."""
         elapsed = getattr(session, "time", lambda: math.nan)()
         return counted_time if math.isnan(elapsed) else float(elapsed)
 

@@ -1,4 +1,4 @@
-"""Ends of runs that are not a number of whole steps: a given time, or a zero of a function of the state."""
+"""Ends of runs between two steps: at a given time, or at a zero of a function of the state."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.session import Followed
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: Maps a session after the last whole step to a session at the end, and the number of steps from the start until there.
+#: Function from a session after the last whole step to a session at the end and its number of steps from the start.
 Finish = Callable[[Any], tuple[Any, float]]
 
 
-#: Steps after the start within which a zero is ignored. A run that starts where another stopped at a zero is within
-#: rounding of that zero, and would otherwise stop at once.
+#: Number of steps after the start within which a zero is ignored. A run that starts where another run stopped at a zero
+#: is within rounding of the zero, and would otherwise stop at once.
 START = 1e-9
 
 
 @dataclass(frozen=True)
 class End:
-    """End of a run: after ``steps`` whole steps and, if ``part``, a part of one step, which ``finish`` makes.
+    """End of a run: after ``steps`` whole steps and, if ``part``, a part of a step, which ``finish`` makes.
 
     ``span`` is the time from the start to the end. ``stopped`` is true if a zero of a function ends the run.
     """
@@ -39,7 +39,7 @@ class End:
 
 
 def at_time(session: Followed, h: float, span: float) -> End:
-    """Return the end after a span of time, for a session at its start."""
+    """Return the end of a run over a ``span`` of time; the session is at its start."""
     steps, left = steps_until(session, h, span)
     part = abs(left) > EQUAL * abs(span)
 
@@ -53,9 +53,10 @@ def at_time(session: Followed, h: float, span: float) -> End:
 
 
 def after_steps(session: Followed, h: float, steps: int) -> End:
-    """Return the end after a number of whole steps, for a session at its start, which is advanced to measure the time.
+    """Return the end after a number of whole steps.
 
-    If a step fails, the span is the time before that step.
+    The session is at its start, and is advanced to measure the time. If a step fails, the span is the time before that
+    step.
     """
     with suppress(BackendError):  # the run itself will report the failure
         session.advance(h, steps)
@@ -63,7 +64,8 @@ def after_steps(session: Followed, h: float, steps: int) -> End:
 
 
 def where_zero(session: Followed, h: float, limit: int, g: Function, t0: float, *, timed: bool) -> End | None:
-    """Return the end at the first zero of g after the start, in either direction; None without one in ``limit`` steps.
+    """Return the end at the first zero of g after the start, in either direction; None if there is none in ``limit``
+    steps.
 
     The session is at its start, and is advanced. The zero is located to round-off, by steps of the solver.
     """

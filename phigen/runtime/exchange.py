@@ -1,4 +1,4 @@
-"""Conversion of trajectories to objects of xarray and pandas, which are optional packages and imported only here."""
+"""Conversion of trajectories to objects of xarray and pandas, which are optional packages."""
 
 from __future__ import annotations
 

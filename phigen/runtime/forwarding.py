@@ -1,4 +1,4 @@
-"""Sessions that make the steps of another session in a manner of their own."""
+"""Base class of sessions that wrap another session and make its steps in a different way."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Inner = TypeVar("Inner", bound=Followed)
 
 
 class Forwarding(Generic[Inner]):
-    """A `phigen.runtime.session.Followed` with the state, the time and the attitude of its ``session``."""
+    """A `phigen.runtime.session.Followed` with the state, the time and the attitude of the wrapped ``session``."""
 
     def __init__(self, session: Inner) -> None:
         self.session = session

@@ -1,4 +1,5 @@
-"""Pullback of cotangents through runs by checkpointing: which states are stored, and which steps are recomputed."""
+"""Pullback of cotangents through runs with checkpointing: division of a run into segments, some of which are
+recomputed."""
 
 from __future__ import annotations
 
@@ -21,13 +22,13 @@ MAX_TAPE_VALUES = 1 << 22
 
 
 def without_pullback(interface: Interface) -> TypeError:
-    """Return the error for a solver that was compiled without ``adjoint``."""
+    """Return the error for a solver that was compiled without the extra ``adjoint``."""
     hint = "compile it with adjoint=True, or write adjoint: true in the spec"
     return TypeError(f"{interface.name} was compiled without pullback; {hint}")
 
 
 class Pullback(NamedTuple):
-    """Result of `Solver.pullback`: states, and cotangents of the initial state and of the parameters, by name."""
+    """Result of `Solver.pullback`: states, and cotangents of the initial state and of the parameters (by name)."""
 
     x1: Floats
     x0_bar: Floats
@@ -35,7 +36,7 @@ class Pullback(NamedTuple):
 
 
 class Jacobian(NamedTuple):
-    """Result of `Solver.jacobian`: the last state, and its derivatives by the initial state and by parameters."""
+    """Result of `Solver.jacobian`: the last state, and its derivatives by the initial state and by the parameters."""
 
     x1: Floats
     by_x0: Floats
@@ -57,7 +58,10 @@ class Segment:
 
 
 def segments(steps: int, stride: int, limit: int) -> list[Segment]:
-    """Return the segments of a run, each of at most ``limit`` steps; row r follows r strides, or the last step."""
+    """Return the segments of a run, each of at most ``limit`` steps.
+
+    Row r of the run follows r strides; the last row follows the last step.
+    """
 
     def cut() -> Iterator[Segment]:
         chunk = max(1, limit // stride) * stride
@@ -68,7 +72,7 @@ def segments(steps: int, stride: int, limit: int) -> list[Segment]:
             if last - first <= limit:
                 yield Segment(first, last - first, stride, rows)
                 continue
-            for begin in range(first, last, limit):  # one stride, which is too long by itself
+            for begin in range(first, last, limit):  # a single stride that is longer than the limit
                 count = min(limit, last - begin)
                 yield Segment(begin, count, count, rows if begin + count == last else range(0))
 
@@ -86,7 +90,7 @@ def pullback(
     threads: int | None,
     parameters: Mapping[str, Any],
 ) -> Pullback:
-    """Return the pullback of `Solver.pullback`, from arguments in the shapes that users pass."""
+    """Return the result of `Solver.pullback`, for arguments in the shapes that users pass."""
     interface = solver.interface
     start = arguments.states(x0, "x0", interface)
     if start.ndim > 2:

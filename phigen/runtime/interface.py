@@ -49,10 +49,10 @@ class Interface:
     order: int
     parameters: Mapping[str, float]  # defaults
     positive: frozenset[str] = frozenset()  # the parameters that must be positive
-    nonnegative: frozenset[str] = frozenset()  # those that must be 0 or positive
+    nonnegative: frozenset[str] = frozenset()  # the parameters that must be 0 or positive
     casimirs: tuple[str, ...] = ()
     time: str = ""  # the name of the time, "" if the Hamiltonian does not depend on it
-    moving: frozenset[str] = frozenset()  # those of energy and Casimirs that time or forces change
+    moving: frozenset[str] = frozenset()  # the names among energy and Casimirs whose values time or forces change
     monitored: bool = False  # whether steps are equal in τ, not in t
     attitude: tuple[int, ...] = ()  # the shape of the attitude, () if the spec reconstructs none
     position: bool = False  # whether the spec reconstructs a position too
@@ -60,7 +60,8 @@ class Interface:
     draws: int = 0  # number of increments of the noise in a step
     single: bool = False  # whether the C computes in single precision
     observables: tuple[str, ...] = ()
-    ensemble: EnsembleLaunch = field(default_factory=EnsembleLaunch)  # of the kernel of devices
+    # launch parameters of the ensemble kernel on devices
+    ensemble: EnsembleLaunch = field(default_factory=EnsembleLaunch)
 
     @property
     def dimension(self) -> int:
@@ -97,12 +98,13 @@ class LatticeInterface(Interface):
     at_bonds: tuple[str, ...] = ()
     observed_fields: tuple[str, ...] = ()  # observables with a value at each site
     colours: int = 1
-    colour_weights: tuple[int, ...] = ()  # the colour of a site is the sum of weights times places, modulo the colours
-    launches: LatticeLaunches = field(default_factory=LatticeLaunches)  # of the kernels of devices
+    # colour of a site: the sum of weights times position, modulo the number of colours
+    colour_weights: tuple[int, ...] = ()
+    launches: LatticeLaunches = field(default_factory=LatticeLaunches)  # launch parameters of the kernels on devices
     slow_steps: bool = False  # whether recomputing a step takes longer than writing and reading its tape
 
     def is_shared(self, sites: int) -> bool:
-        """Whether threads share the work on a lattice of ``sites`` sites; the thresholds are those of the C runtime."""
+        """Whether threads share the work on a lattice of ``sites`` sites, by the thresholds of the C runtime."""
         return sites > (512 if self.pairs else 4096)
 
 
@@ -110,8 +112,8 @@ class LatticeInterface(Interface):
 class Clock:
     """The time as a function of the number of steps.
 
-    It is t + (steps − counted)·h, with ``t`` and ``counted`` from the last change of the step size. So no rounding
-    errors accumulate.
+    It is t + (steps − counted)·h, where ``t`` and ``counted`` are the time and the number of steps at the last change
+    of the step size. So rounding errors do not accumulate.
     """
 
     t: float = 0.0
@@ -129,11 +131,11 @@ class Clock:
 
 
 class BackendError(Exception):
-    """A step failed inside a back end; `phigen.runtime.solver` turns it into the user's `StepError`.
+    """A step failed inside a back end; `phigen.runtime.solver` turns this into the user's `StepError`.
 
-    ``states`` are the rows until the failure, the last one the state before the failing step; for an ensemble, the last
-    state of each member. ``step`` is the number of successful steps, −1 if unknown. ``failures`` maps each failed
-    member to its status.
+    ``states`` are the rows up to the failure; the last row is the state before the failing step. For an ensemble they
+    are the last states of all members. ``step`` is the number of successful steps, −1 if unknown. ``failures`` maps
+    each failed member to its status.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Keyboard interrupts during long calls of C, which poll a function and return early when it is not 0."""
+"""Keyboard interrupts during long calls of C: the C polls a function and returns early if its result is not 0."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ _QUESTION = ctypes.CFUNCTYPE(ctypes.c_int)
 
 @contextmanager
 def interruptible(ask: Callable[[int | None], Any]) -> Iterator[None]:
-    """Pass to ``ask`` the address of a C function that returns non-zero after Ctrl-C, and None at the end.
+    """Return a context in which Ctrl-C ends a call of C early.
 
-    After an interrupt `KeyboardInterrupt` is raised at the end. Nothing is passed outside of the main thread, which
-    alone receives signals, or if the program has its own handler for them.
+    ``ask`` receives the address of a C function that returns nonzero after Ctrl-C, and None at the end; then
+    `KeyboardInterrupt` is raised. Outside the main thread, which alone receives signals, and if the program has its own
+    signal handler, ``ask`` is not called.
     """
     signals: list[int] = []
     first = threading.current_thread() is threading.main_thread()

@@ -84,7 +84,7 @@ class LatticeSession(Protocol):
         ...
 
     def hold(self, level: float) -> None:
-        """Hold another energy level e than −H of the state, for steps equal in τ."""
+        """Set the energy level e, which is −H of the state by default, for steps equal in τ."""
         ...
 
     def advance(self, h: float, steps: int) -> None:
@@ -99,19 +99,23 @@ class LatticeSession(Protocol):
         ...
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays that `resume` needs beside the state to continue with the same bits."""
+        """Return the arrays that `resume` needs, in addition to the state, to continue with the same bits."""
         ...
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
-        """Continue after ``steps`` steps of size h, in a session at the saved state, with the ``arrays`` of `saved`."""
+        """Continue after ``steps`` steps of size h.
+
+        The session is at the saved state; ``arrays`` are the result of `saved`.
+        """
         ...
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes), and nothing else. Raises `BackendError` if not finite."""
+        """Replace the state by ``x`` (coordinates, *sizes); nothing else changes. Raises `BackendError` if x is not
+        finite."""
         ...
 
     def kick(self, change: Floats) -> None:
-        """Add ``change`` (coordinates, *sizes) to the state; else as `place`."""
+        """Add ``change`` (coordinates, *sizes) to the state. Raises `BackendError` if the sum is not finite."""
         ...
 
     def hamiltonian(self) -> float:
@@ -186,14 +190,15 @@ class LatticeBackend(Protocol):
 class LatticeTrajectory:
     """Frames of one integration. The first is the initial state, the last the final state.
 
-    ``t`` (frames,) are the times, ``x`` (frames, coordinates, *sizes) the states, mapped from their file if they were
-    written to one, ``energy`` (frames,) the values of H. There is a frame for every stride-th of the ``steps`` steps of
-    size ``h``, or at given times, and for the end, which may be a part of a step later. ``observed`` (frames,
-    observables) are the observables that are one number each. ``crossings`` are the frames where the section of a run
-    is crossed, ``retried`` the steps that were made in parts. With a monitor, ``h`` is a step in τ, and ``tau``
-    (frames,) has the values of τ; it is None without one, and where the run continues another. ``joined`` tells whether
-    the run continues another. ``structure_factor`` and ``correlated`` are the results of ``spectrum`` and
-    ``correlation`` of a run, ``origin`` a text for its files.
+    ``t`` (frames,) are the times, ``x`` (frames, coordinates, *sizes) the states, as a memory map if they were written
+    to a file, and ``energy`` (frames,) the values of H. There is a frame for every stride-th of the ``steps`` steps of
+    size ``h``, or at given times, and one for the end, which may be inside a step. ``observed`` (frames, observables)
+    are the observables that are one number each. ``crossings`` are the states at which the section of a run is crossed.
+    ``retried`` are the numbers of the steps that were made in parts.
+
+    With a monitor, ``h`` is a step in τ, and ``tau`` (frames,) has the values of τ. ``tau`` is None without a monitor,
+    and if the run continues another run (``joined``). ``structure_factor`` and ``correlated`` are the results of
+    ``spectrum`` and ``correlation`` of a run; ``origin`` is a text on the provenance, for files.
     """
 
     t: Floats
@@ -226,7 +231,7 @@ class LatticeTrajectory:
         return cast(str, display("page of a lattice trajectory")(self))
 
     def plot(self) -> Figure:
-        """Return a figure of the fields, of a chain over space and time or of planes at some times.
+        """Return a figure of the fields over space and time (chains), or of planes at some times.
 
         Below are the errors of conserved quantities. Notebooks show the figure; ``.savefig(path)`` writes it. Raises
         `MissingPackageError` without matplotlib.
@@ -286,9 +291,10 @@ class LatticeTrajectory:
         return (self.solver.casimirs(x, parameters=self.parameters) for x in self.x)
 
     def casimir_changes(self) -> dict[str, Floats]:
-        """Return the absolute change (frames,) of each Casimir since the start; for one of each site, the largest.
+        """Return the absolute change (frames,) of each Casimir since the start, by name.
 
-        Frames are read one by one, so that memory holds one frame.
+        For a Casimir of each site, this is the largest change at any site. Frames are read one by one, so memory holds
+        one frame.
         """
         if not self.solver.interface.casimirs:
             return {}
@@ -299,8 +305,10 @@ class LatticeTrajectory:
         return {name: np.array([row[name] for row in rows]) for name in first}
 
     def transforms(self) -> dict[str, tuple[tuple[str, ...], Floats]]:
-        """Return the names of dimensions and the values of ``spectrum``, ``spectrum_q_AXIS``, ``spectrum_omega`` and
-        ``correlation``, as far as the run asks for them.
+        """Return ``spectrum``, ``spectrum_q_AXIS``, ``spectrum_omega`` and ``correlation``, as names of dimensions and
+        values.
+
+        Only those that the run asks for are present.
         """
         spectrum, pair = self.structure_factor, self.correlated
         arrays = spectrum.variables("spectrum", "spectrum_") if spectrum else {}
@@ -328,7 +336,7 @@ class LatticeTrajectory:
     def at(self, times: ArrayLike) -> Floats:
         """Return the states (times, coordinates, *sizes) at given times, by steps of the method from the nearest frame.
 
-        See `phigen.Trajectory.at`; raises the same.
+        Conventions and errors are those of `phigen.Trajectory.at`.
         """
         return self.solver.states_at(self, arguments.times_within(times, self.t))
 
@@ -448,7 +456,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def carried_out(
         self, plan: IntegrationPlan, of: Sequence[str] = (), **where: Any
     ) -> LatticeTrajectory | LatticeSeries:
-        """`numbered` where numbers ``of`` the lattice are to be recorded in place of states, else `framed`."""
+        """Carry out a plan by `numbered` if ``of`` names quantities to record, else by `framed`.
+
+        ``where`` are the arguments on files and progress.
+        """
         return self.numbered(plan, of, **where) if of else self.framed(plan, **where)
 
     def framed(
@@ -507,9 +518,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return trajectory
 
     def _expect_place(self, run: LatticeRun, output: str | Path | None, frames: Frames | None, *, resume: bool) -> None:
-        """Refuse to overwrite files of an interrupted run, and to continue a complete one. Raises `ValueError`.
+        """Raise `ValueError` if files of an interrupted run would be overwritten, or a complete run continued.
 
-        A run that continues a finished one rewrites the file of that run.
+        A run that continues a finished one may rewrite the file of that run.
         """
         if run.checkpoints:
             target = Path(output) if output and run.plan.past is None else None
@@ -568,7 +579,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return self.carried_out(plan, recorded, output=output, checkpoints=checkpoints, progress=progress)
 
     def _plan_of(self, run: Run, beginning: Beginning, retry: int) -> IntegrationPlan:
-        """The plan of a run of the spec, from a start that has been checked."""
+        """Return the plan of a run of the spec, for checked initial values."""
         if retry or run.is_timed:
             arguments.expect_no_noise("retry" if retry else "every", self.interface)
         end, in_tau = None, self.interface.monitored and run.is_timed
@@ -586,11 +597,12 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         )
 
     def function(self, expression: Expression, values: Mapping[str, Any]) -> Function:
-        """An expression in observables, parameters and the time as a function of observables (rows, observables)."""
+        """Return an expression in observables, parameters and the time as a function of observables (rows,
+        observables)."""
         return function_of(expression, self.interface.observables, values, self.interface.time)
 
     def transforms_of(self, run: Run) -> Transforms | None:
-        """Spectrum and correlation of the frames of a run, if it asks for any."""
+        """Return the spectrum and the correlation that a run asks for; None if it asks for neither."""
         requested = run.lattice
         return (
             Transforms(requested.spectrum, requested.correlation)
@@ -599,7 +611,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         )
 
     def section_of(self, run: Run, values: Mapping[str, Any]) -> Crossed | None:
-        """The section of a run, if it has one."""
+        """Return the section of a run with its function; None if the run has no section."""
         from phigen.symbolic.readable import readable
 
         if run.section is None:
@@ -810,7 +822,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, values, times, draws)
 
     def _times(self, t0: ArrayLike | None, by_keyword: dict[str, Any]) -> Floats:
-        """Return the initial time, a number or an array (members,); see `arguments.start_time`."""
+        """Return the initial times, a number or an array (members,), as `arguments.start_time` does."""
         begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
         alone: Any = t0 if begin is None else 0.0
         first = arguments.start_time(alone, self.interface, by_keyword)
@@ -930,7 +942,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     # --- arguments
 
     def shape_text(self) -> str:
-        """Return the shape of a state as text for a message."""
+        """Return the shape of a state as text, for messages."""
         return ", ".join([str(len(self.coordinates)), *(f"N_{axis}" for axis in self.interface.axes)])
 
     def state(self, x: ArrayLike, argument: str) -> Floats:
@@ -961,7 +973,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def values(
         self, mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any], sizes: Sequence[int]
     ) -> dict[str, Any]:
-        """Return all parameters: numbers, and arrays over the sites or the bonds; for a graph the bonds too.
+        """Return all parameters: numbers, and arrays over the sites or the bonds. For a graph the bonds are included.
 
         Raises `TypeError` for unknown names, `ValueError` for values that are not admissible.
         """
@@ -1034,7 +1046,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def failure(
         self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any], start: Floats | None = None
     ) -> StepError:
-        """Return the exception for users after a failure in the back end; ``so_far`` are the results until then."""
+        """Return the exception for users after a failure in the back end; ``so_far`` are the results up to the
+        failure."""
         name = self.interface.name
         facts = {"step": error.step, "status": error.status, "trajectory": so_far, "members": error.members}
         if error.status == "BAD_ARGUMENT":
@@ -1056,7 +1069,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return StepError(f"{name}: {step_text}: {error.status}, {advice}", **facts)
 
     def _undefined(self, x: Floats, values: Mapping[str, Any], t: float | None) -> str:
-        """Return a message that names the first site where H is not finite, "" if there is none."""
+        """Return a message that names the first site where H is not finite; "" if H is finite everywhere."""
         density = self.density(x, t if self.interface.time else None, parameters=values)
         sites = np.argwhere(~np.isfinite(density))
         if not len(sites):
@@ -1077,7 +1090,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
 
 def missing_bonds() -> TypeError:
-    """Return the error for a graph without bonds."""
+    """Return the error for a graph that is integrated without ``bonds``."""
     return TypeError("a lattice that is a graph needs its bonds=, an array (bonds, 2) of the numbers of sites")
 
 
@@ -1101,7 +1114,8 @@ def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
 
 
 def reduced(kind: str, densities: Floats) -> Any:
-    """Return a Casimir from its densities at the sites: the densities, their sum or their product, by its kind."""
+    """Return a Casimir from its densities at the sites: the densities, their sum, or their product, depending on
+    ``kind``."""
     if kind == "sites":
         return densities
     return float(densities.sum() if kind == "sum" else densities.prod())

@@ -1,4 +1,4 @@
-"""Courses of lattices: sessions that can be copied, for ends and rows between steps, sections and retries."""
+"""Courses of lattices: sessions that can be copied. Sections, retries, and ends and rows between steps need copies."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
 
-#: Steps for which branches share one saved state: saving costs as much as some twenty steps of 64 sites.
+#: Number of steps during which branches share one saved state: saving costs as much as some twenty steps of 64 sites.
 SHARED_STEPS = 16
 
 
 class LatticeCourse:
     """A lattice being integrated (`phigen.runtime.session.Followed`); its state is (coordinates, *sizes).
 
-    Steps of a branch, and of a course restored from `saved`, have the same bits as those of one integration. The
-    session of a branch is made on its first use: sections branch at every step, and use few of the branches. So
-    branches share a saved state for up to `SHARED_STEPS` steps; a branch that is used repeats the steps since then.
+    Steps of a branch, and of a course restored from `saved`, have the same bits as those of an uninterrupted
+    integration. A branch makes its session on first use, since sections branch at every step but use few of the
+    branches. Branches share a saved state for up to `SHARED_STEPS` steps; a branch that is used repeats the steps since
+    that state.
     """
 
     def __init__(self, solver: LatticeSolver, beginning: Beginning) -> None:
@@ -35,15 +36,15 @@ class LatticeCourse:
         self._arrays: Mapping[str, Any] = {}
         self._sites: LatticeSession | None = solver.started(beginning)
         self._clock, self._before = Clock(beginning.t0), 0
-        self._ahead = 0  # steps from the saved arrays to where a course without a session stands
-        self._anchor: Mapping[str, Any] = {}  # saved arrays that branches share, with the same step size since
+        self._ahead = 0  # number of steps that a course without a session must repeat after its saved arrays
+        self._anchor: Mapping[str, Any] = {}  # saved arrays that branches share; the step size has not changed since
         self._anchor_steps = 0
 
     @property
     def sites(self) -> LatticeSession:
-        """The session of the lattice, which is started or restored when it is first needed."""
+        """The session of the lattice, which is started or restored on first use."""
         if self._sites is None:
-            # counted from the last change of the step size, so that times and random numbers are the same
+            # steps are counted from the last change of the step size, so that times and random numbers are the same
             arrays, clock, steps_before = self._arrays, self._clock, self._before
             draws = replace(self.at.draws, step=self.at.draws.step + steps_before)
             begin = Beginning(np.asarray(arrays["state"]), clock.h, self.at.values, clock.t, draws)
@@ -83,7 +84,7 @@ class LatticeCourse:
 
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps of size ``h``."""
-        sites = self.sites  # starts with the previous step size
+        sites = self.sites  # a restored session first repeats steps of the previous size
         if h != self._clock.h:
             self._anchor = {}
             self._clock.set_step(h, self.steps)
@@ -96,23 +97,24 @@ class LatticeCourse:
             self._anchor, self._anchor_steps = self.saved(), steps
         twin, clock = object.__new__(LatticeCourse), self._clock
         twin.solver, twin.at, twin._before = self.solver, self.at, clock.counted
-        twin._clock = Clock(clock.t, clock.h, clock.counted)  # the step size is that of the anchor
+        twin._clock = Clock(clock.t, clock.h, clock.counted)  # the step size at the saved state
         twin._arrays, twin._sites, twin._ahead = self._anchor, None, steps - self._anchor_steps
         twin._anchor, twin._anchor_steps = {}, 0
         return twin
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes), and nothing else; raises `BackendError` if not finite."""
+        """Replace the state by ``x`` (coordinates, *sizes); nothing else changes. Raises `BackendError` if x is not
+        finite."""
         self._anchor = {}
         self.sites.place(x)
 
     def kick(self, change: Floats) -> None:
-        """Add ``change`` (coordinates, *sizes) to the state; else as `place`."""
+        """Add ``change`` (coordinates, *sizes) to the state. Raises `BackendError` if the sum is not finite."""
         self._anchor = {}
         self.sites.kick(change)
 
     def saved(self) -> dict[str, Any]:
-        """Return arrays from which `restored` makes the same course."""
+        """Return the arrays from which `restored` makes the same course."""
         if self._sites is None and not self._ahead:
             return dict(self._arrays)
         sites, clock = self.sites, self._clock
@@ -121,7 +123,7 @@ class LatticeCourse:
 
     @classmethod
     def restored(cls, solver: LatticeSolver, beginning: Beginning, arrays: Mapping[str, Any]) -> LatticeCourse:
-        """The course that began at ``beginning`` and was saved."""
+        """Return the course that was saved as ``arrays``; ``beginning`` are its initial arguments."""
         course = object.__new__(cls)
         course.__setstate__({"solver": solver, "at": beginning, "saved": arrays})
         return course
@@ -138,9 +140,9 @@ class LatticeCourse:
 
 
 class ObservedCourse(Retrying):
-    """A course whose `state` is the observables of the spec (observables,), for sections, stops and rows.
+    """A course whose `state` consists of the observables of the spec (observables,), for sections, stops and rows.
 
-    Failing steps are made in parts, as `Retrying` does.
+    Failing steps are made in parts, as by `Retrying`.
     """
 
     def state(self) -> Floats:
@@ -149,11 +151,11 @@ class ObservedCourse(Retrying):
 
     @property
     def sites(self) -> LatticeSession:
-        """The session, with the state at the sites."""
+        """The wrapped session, which has the state at the sites."""
         return cast("LatticeCourse", self.session).sites
 
     def saved(self) -> dict[str, Any]:
-        """Return arrays from which `restored` makes the same course."""
+        """Return the arrays from which `restored` makes the same course."""
         parts = np.array([self._extra, *self.retried])
         return {**cast("LatticeCourse", self.session).saved(), "parts": parts}
 
@@ -166,7 +168,7 @@ class ObservedCourse(Retrying):
     def restored(
         cls, solver: LatticeSolver, beginning: Beginning, retry: int, arrays: Mapping[str, Any]
     ) -> ObservedCourse:
-        """The course that began at ``beginning`` and was saved."""
+        """Return the course that was saved as ``arrays``; ``beginning`` are its initial arguments."""
         course = cls(cast("Followed", LatticeCourse.restored(solver, beginning, arrays)), retry)
         course._extra, *course.retried = arrays["parts"].tolist()
         return course

@@ -1,4 +1,4 @@
-"""Ensembles of lattices whose members have their own states, steps and parameters, shared out between threads."""
+"""Ensembles of lattices whose members have different states, steps and parameters; threads share the members."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def ensemble(
     t0: Floats,
     draws: Draws,
 ) -> Floats:
-    """Return the states of `LatticeSolver.ensemble`, from arguments in the shapes that users pass."""
+    """Return the result of `LatticeSolver.ensemble`, for arguments in the shapes that users pass."""
     per_member = {
         name: np.asarray(value) for name, value in parameters.items() if has_members(solver.interface, name, value)
     }
@@ -44,7 +44,7 @@ def ensemble(
     marks = row_steps(steps, max(steps, 1) if stride is None else arguments.count(stride, "stride", 1))
     begin = np.broadcast_to(t0, count).tolist()
     sizes = [arguments.step_size(size) for size in np.broadcast_to(h, count)]
-    parameters = {**parameters, **solver.defaults(parameters, start.shape[2:])}  # once for all members
+    parameters = {**parameters, **solver.defaults(parameters, start.shape[2:])}  # computed once for all members
     values = [
         solver.values(
             {n: per_member[n][m] if n in per_member else v for n, v in parameters.items()}, {}, start.shape[2:]
@@ -67,7 +67,7 @@ def ensemble(
     max_threads = cores() if threads is None else arguments.count(threads, "threads", 1)
     uses_all_threads = solver.interface.is_shared(
         math.prod(start.shape[2:])
-    )  # each member is then integrated by all threads
+    )  # if true, members are integrated one by one, each by all threads
     in_threads(1 if uses_all_threads else max(1, min(max_threads, count)), make, range(count))
     states_or_frames = final if stride is None else frames
     if failures:
@@ -85,7 +85,7 @@ def ensemble(
 
 
 def has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
-    """Whether the value of a parameter has an axis of members in front of its axes of sites or bonds."""
+    """Whether the value of a parameter has a first axis of members, before its axes of sites or bonds."""
     if interface.graph and name == "bonds":
         return False
     axes = len(interface.axes) if name in interface.at_sites else 1 if name in interface.at_bonds else 0
@@ -95,7 +95,8 @@ def has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
 def states(solver: LatticeSolver, X0: ArrayLike, per_member: Mapping[str, Any], argument: str = "X0") -> Floats:
     """Return the initial states (members, coordinates, *sizes). Raises `ValueError` for other shapes.
 
-    ``per_member`` are the arguments with an axis of members; if there are any, one state may stand for all members.
+    ``per_member`` are the arguments that have an axis of members; if there are any, a single state is used for all
+    members.
     """
     axes = 1 + len(solver.interface.axes)
     member_states: Iterable[Floats]

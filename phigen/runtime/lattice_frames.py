@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 #: Suffixes of files to which frames are written one by one, and of files that are written at the end.
 STREAMS = (".npy", ".npz")
 WHOLE = (".csv", ".zarr")
-#: Largest number of columns of a table of states: spreadsheets show some hundred.
+#: Largest number of columns of a table of states; spreadsheets show some hundreds of columns.
 MAX_COLUMNS = 1000
 
 
 class FrameRows:
-    """Rows of states, with their energies and observables (`phigen.runtime.lattice_run.Sink`)."""
+    """Rows of states, with their energies and observables: a `phigen.runtime.lattice_run.Sink`."""
 
     def __init__(self, frames: Frames | GrowingFrames, seconds: float = 0.0) -> None:
         self.frames, self.seconds = frames, seconds
@@ -50,7 +50,7 @@ class FrameRows:
         self.record(sites)
 
     def record(self, sites: LatticeSession) -> None:
-        """Add the energy and the observables of a state to those of the frames."""
+        """Append the energy and the observables of a state."""
         self.energy.append(sites.hamiltonian())
         self.observed.append(sites.observables())
 
@@ -109,12 +109,12 @@ class GrowingFrames:
         """Do nothing: no frame is on the disk."""
 
     def restore(self, frames: Floats | None, count: int) -> None:
-        """Go on after the first frames."""
+        """Replace all frames by the first ``count`` of ``frames``."""
         self._states = [] if frames is None else list(frames[:count])
 
 
 def identity_of(solver: LatticeSolver, beginning: Beginning, rows: Sequence[int | float]) -> dict[str, Any]:
-    """Return all facts that determine an integration with ``rows`` (a description of the rows), as plain data."""
+    """Return all settings that determine an integration, as plain data; ``rows`` describes its rows."""
     arrays = {name: np.asarray(value) for name, value in beginning.values.items() if np.ndim(value)}
     numbers = {name: float(value) for name, value in beginning.values.items() if not np.ndim(value)}
     hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": beginning.x}.items()}
@@ -130,7 +130,7 @@ def identity_of(solver: LatticeSolver, beginning: Beginning, rows: Sequence[int 
 
 
 class Frames:
-    """Storage of frames: an array in memory, or a file."""
+    """Storage of a known number of frames, in an array or in a file."""
 
     def __init__(self, path: Path | None, shape: tuple[int, ...]) -> None:
         self.path = path
@@ -149,7 +149,7 @@ class Frames:
         return self._array
 
     def frame(self, k: int) -> Floats:
-        """A copy of frame k."""
+        """Return a copy of frame k."""
         return np.array(self.array[k])
 
     def put(self, k: int, state: Floats) -> None:
@@ -157,11 +157,11 @@ class Frames:
         self.array[k] = state
 
     def first(self, count: int) -> Iterator[Floats]:
-        """Iterate over the first ``count`` frames; they can be read after `discard` too."""
+        """Iterate over the first ``count`` frames, which can also be read after `discard`."""
         return iter(self.array[:count])
 
     def flush(self) -> None:
-        """Write frames that are in memory only to the disk."""
+        """Write frames that are only in memory to disk."""
         if isinstance(self._array, np.memmap):
             self._array.flush()
 
@@ -171,7 +171,7 @@ class Frames:
             self.array[:count] = frames
         elif self._part is not None:
             try:
-                with opened(self._part):  # refuses pipes, for which open_memmap would block
+                with opened(self._part):  # refuses pipes, on which open_memmap would block
                     self._array = np.lib.format.open_memmap(self._part, "r+")
             except (OSError, ValueError) as error:
                 raise MismatchError(
@@ -181,7 +181,7 @@ class Frames:
                 raise MismatchError(f"{self._part} does not hold the frames of this run")
 
     def objection(self) -> str:
-        """Return why a run without checkpoints may not write its frames here, or "" if it may."""
+        """Return the reason why a run without checkpoints may not write its frames to this file; "" if it may."""
         return "" if self._part is None else checkpoint.objection_to_frames(self._part)
 
     def discard(self) -> None:
@@ -204,7 +204,8 @@ class Frames:
 
 
 def stream_path(path: str | Path) -> Path | None:
-    """The path of a file to which frames are written one by one, None for a table. Raises `ValueError` for others."""
+    """Return the path of a file to which frames are written one by one; None for a table. Raises `ValueError` for
+    others."""
     target = Path(path)
     if target.suffix in WHOLE:
         return None
@@ -222,7 +223,7 @@ def expect_columns(shape: tuple[int, ...]) -> None:
 
 
 def site_names(coordinates: Sequence[str], sizes: Sequence[int]) -> tuple[str, ...]:
-    """Return the names of the numbers of a state, ``q_0_0``, …, field by field, the last axis fastest."""
+    """Return the names of the numbers of a state: ``q_0_0``, …, field by field, the last axis fastest."""
     sites = ["_".join(map(str, site)) for site in np.ndindex(*sizes)]
     return tuple(f"{name}_{site}" for name in coordinates for site in sites)
 
@@ -234,7 +235,10 @@ def state_columns(interface: LatticeInterface, sizes: Sequence[int]) -> list[Col
 
 
 def write_whole(path: Path, trajectory: LatticeTrajectory) -> None:
-    """Write a trajectory as ``.csv`` or ``.zarr``. Raises `ValueError` where it does not fit or the path is in use."""
+    """Write a trajectory as ``.csv`` or ``.zarr``.
+
+    Raises `ValueError` if a table has too few columns for it, or the path is in use.
+    """
     if path.suffix == ".csv":
         write_table(path, trajectory)
     else:
@@ -271,14 +275,14 @@ def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:
     root.attrs.update({str(name): value for name, value in data.attrs.items()})
     if trajectory.origin:
         root.attrs["origin"] = trajectory.origin
-    zarr.consolidate_metadata(str(part))  # without this xarray warns
+    zarr.consolidate_metadata(str(part))  # xarray warns about stores without consolidated metadata
     if path.exists():
         shutil.rmtree(path)
     part.rename(path)
 
 
 def write_table(path: Path, trajectory: LatticeTrajectory) -> None:
-    """Write a trajectory as ``.csv``. Raises `ValueError` for more sites than it has columns."""
+    """Write a trajectory as ``.csv``. Raises `ValueError` if the states need more columns than a table may have."""
     expect_columns(trajectory.x.shape[1:])
     interface, shape = trajectory.solver.interface, trajectory.x.shape
     states = trajectory.x.reshape(shape[0], int(np.prod(shape[1:])))

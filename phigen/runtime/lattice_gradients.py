@@ -28,7 +28,7 @@ def pullback(
     t0: Floats,
     parameters: Mapping[str, Any],
 ) -> Pullback:
-    """Return the pullback of `LatticeSolver.pullback`, from arguments in the shapes that users pass."""
+    """Return the result of `LatticeSolver.pullback`, for arguments in the shapes that users pass."""
     steps = arguments.count(steps, "steps", 0)
     per_member = {
         name: np.asarray(value) for name, value in parameters.items() if has_members(solver.interface, name, value)
@@ -48,7 +48,7 @@ def pullback(
     times = np.broadcast_to(t0, len(start))
     step_sizes = [arguments.step_size(size) for size in np.broadcast_to(h, len(start))]
     frames = filled(f"{rows} frames", (rows, *start.shape))
-    parameters = {**parameters, **solver.defaults(parameters, start.shape[2:])}  # once for all members
+    parameters = {**parameters, **solver.defaults(parameters, start.shape[2:])}  # computed once for all members
     x0_bar, bars_by_member = np.empty_like(start), list[dict[str, Floats]]()
     for m, x in enumerate(start):
         values = solver.values(

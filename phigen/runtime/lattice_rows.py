@@ -21,10 +21,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RowSteps:
-    """Rows after ``whole`` steps (rows,) and a further step of size ``part`` (rows,), 0 for none.
+    """Rows of a run: after ``whole`` steps (rows,) and a further step of size ``part`` (rows,), 0 for none.
 
-    The first is the start. With an ``end``, that makes the last row. Where steps are equal in τ and rows are at given
-    times, these are the ``spans`` after the start, (rows,), and what precedes them is found on the way.
+    The first row is the start. If there is an ``end``, it makes the last row. If steps are equal in τ and rows are at
+    given times, only the times ``spans`` (rows,) after the start are known; the steps before them are counted during
+    the run.
     """
 
     whole: NDArray[np.int64]
@@ -37,22 +38,22 @@ class RowSteps:
 
     @property
     def steps(self) -> int:
-        """Whole steps up to the last row."""
+        """Number of whole steps up to the last row."""
         return int(self.whole[-1])
 
     def times(self, begin: float, h: float) -> Floats:
-        """The times (rows,), from that of the start."""
+        """Return the times (rows,); ``begin`` is the time of the start."""
         return np.asarray(begin + (h * self.whole + self.part), dtype=np.float64)
 
     def described(self) -> list[int | float]:
-        """Plain data by which a resumed run recognises these rows."""
+        """Return plain data that identify these rows when a run is resumed."""
         rows = [len(self), self.steps, int(self.whole[min(1, len(self) - 1)])]
         spans = [] if self.spans is None else [float(self.spans.sum())]
         return [*rows, *spans, *([] if not self.part.any() else [float(self.part.sum()), float(self.part[-1])])]
 
 
 def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSteps:
-    """Return rows at every ``stride``-th of ``steps`` steps and the last, or up to an end with a part of a step."""
+    """Return rows at every ``stride``-th of ``steps`` steps and at the last; with an ``end``, the last row is there."""
     if end is None or not end.part:
         whole_rows = row_steps(steps if end is None else end.steps, stride)
         return RowSteps(whole_rows, np.zeros(len(whole_rows)), end)
@@ -63,7 +64,7 @@ def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSte
 
 
 def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) -> RowSteps:
-    """Return rows at times ``spans`` after the start, and at the end: after ``steps`` steps, or at ``end``."""
+    """Return rows at the times ``spans`` after the start, and at the end: after ``steps`` steps, or at ``end``."""
     last = h * steps if end is None else end.span
     inner = [span for span in spans if abs(last - span) > EQUAL * abs(last)]
     step_numbers = [whole_steps(h, span) for span in inner]
@@ -75,7 +76,7 @@ def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) 
 
 
 def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
-    """Return rows at times ``spans`` after the start, and at the end, for steps that are equal in τ."""
+    """Return rows at the times ``spans`` after the start, and at the end, for steps that are equal in τ."""
     inner = [span for span in spans if abs(end.span - span) > EQUAL * abs(end.span)]
     step_numbers = np.zeros(len(inner) + 2, dtype=np.int64)
     step_numbers[-1] = end.steps
@@ -84,7 +85,8 @@ def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
 
 @dataclass(frozen=True)
 class Crossed:
-    """A section: the zeros of ``g`` (a function of the observables) in a ``direction``; ``text`` is g for people."""
+    """A section: the zeros of ``g``, a function of the observables, in a ``direction``; ``text`` is the formula of
+    g."""
 
     g: Function
     direction: str
@@ -93,10 +95,10 @@ class Crossed:
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """A finished run that another continues: its rows ``t`` (rows,), ``energy`` and observables, and its states.
+    """A finished run that another run continues: its times ``t`` (rows,), ``energy``, observables and states.
 
     ``x`` (rows, coordinates, *sizes) are the states of all rows, None if only numbers were recorded; ``first`` and
-    ``last`` are the first and the last state. ``columns`` are numbers by name, (rows,). The run made ``steps``
+    ``last`` are the first and the last state. ``columns`` are recorded numbers (rows,) by name. The run made ``steps``
     steps.
     """
 
@@ -110,11 +112,11 @@ class Past:
 
 @dataclass(frozen=True)
 class IntegrationPlan:
-    """An integration: its start, its rows, and the number of halvings allowed for a failing step.
+    """An integration: its initial values, its rows, and the number of halvings allowed for a failing step.
 
-    ``begin`` is the time of its start, also where `Beginning` has no time because H does not depend on it.
-    ``transforms`` are the spectra and correlations computed from its frames, ``origin`` is the provenance text that is
-    written into output files.
+    ``begin`` is the initial time, also if `Beginning` has no time because H does not depend on it. ``transforms`` are
+    the spectra and correlations to be computed from its frames; ``origin`` is the provenance text that is written into
+    output files.
     """
 
     at: Beginning
@@ -134,5 +136,5 @@ class IntegrationPlan:
 
     @property
     def steps(self) -> int:
-        """Whole steps up to the end, including those of a continued run."""
+        """Number of whole steps up to the end, including those of a continued run."""
         return self.rows.steps + (self.past.steps if self.past else 0)

@@ -27,7 +27,7 @@ MOST_FOLLOWED = 1 << 22
 
 
 class Sink(Protocol):
-    """Storage of rows. ``seconds`` is the time between two checkpoints."""
+    """Storage of rows. ``seconds`` is the least time between two checkpoints."""
 
     seconds: float
 
@@ -40,17 +40,17 @@ class Sink(Protocol):
         ...
 
     def saved(self) -> dict[str, Any]:
-        """Arrays for `restore`, without those that are in files."""
+        """Return the arrays for `restore`, without those that are in files."""
         ...
 
     def restore(self, arrays: Mapping[str, Any]) -> None:
-        """Restore the rows that were stored when the checkpoint was saved; raises `MismatchError`."""
+        """Restore the rows that were stored when the checkpoint was saved. Raises `MismatchError`."""
         ...
 
 
 @dataclass
 class LatticeRun:
-    """One integration. ``rows`` stores its rows, of which ``count`` are complete; ``crossings`` are those of a
+    """One integration. ``rows`` stores its rows, of which ``count`` are complete. ``crossings`` are those of a
     section."""
 
     solver: LatticeSolver
@@ -61,7 +61,7 @@ class LatticeRun:
     identity: Mapping[str, Any] = field(default_factory=dict)
     count: int = 0
     crossed: list[float] = field(default_factory=list)  # the times of the crossings
-    clocks: list[float] = field(default_factory=list)  # times and numbers of steps of rows, where steps are equal in τ
+    clocks: list[float] = field(default_factory=list)  # if steps are equal in τ: times and numbers of steps of the rows
     numbers: list[float] = field(default_factory=list)
     course: Any = None
     last: Any = None  # the session at the latest row
@@ -93,7 +93,8 @@ class LatticeRun:
 
     @property
     def tau(self) -> Floats | None:
-        """τ of the complete rows, where steps are equal in τ and the run continues no other."""
+        """The values of τ of the complete rows, if steps are equal in τ and the run does not continue another; else
+        None."""
         if not self.solver.interface.monitored or self.plan.past is not None:
             return None
         return self.plan.at.h * np.array(self.numbers)
@@ -104,7 +105,7 @@ class LatticeRun:
         self.numbers.append(number)
 
     def _steps_before(self, k: int) -> int:
-        """The number of whole steps before row k."""
+        """Return the number of whole steps before row k."""
         rows, course = self.plan.rows, self.course
         if rows.spans is None or k == len(rows) - 1:
             return int(rows.whole[k])
@@ -134,7 +135,7 @@ class LatticeRun:
         self.count = 1
 
     def _finder(self, arrays: Mapping[str, Any]) -> CrossingFinder[ObservedCourse]:
-        """The finder of the crossings of the section, restored from ``arrays``."""
+        """Return the finder of the crossings of the section, restored from the ``arrays`` of a checkpoint."""
         plan, section = self.plan, self.plan.section
         assert section
         block = max(1, min(BLOCK, MOST_FOLLOWED // plan.at.x.size))
@@ -149,7 +150,7 @@ class LatticeRun:
         return finder
 
     def _advance(self, steps: int) -> None:
-        """Make whole steps, and store the crossings of the section among them."""
+        """Make whole steps, and store the crossings of the section that occur."""
         course, h = self.course, self.plan.at.h
         if self.finder is None:
             course.advance(h, steps)
@@ -158,14 +159,15 @@ class LatticeRun:
             self._store_crossings(crossings)
 
     def _store_crossings(self, crossings: list[tuple[float, Floats]]) -> None:
-        """Store crossings with the states of the sessions of the finder."""
+        """Store crossings, with the states of the finder's sessions at them."""
         assert self.finder
         for (t, _), (_, crossing_session) in zip(crossings, self.finder.places, strict=False):
             self.crossed.append(t)
             self.crossings.see(crossing_session.sites)
 
     def _reached(self, k: int) -> tuple[ObservedCourse, float]:
-        """The course at row k, from the whole steps before it, and its number of steps."""
+        """Return the course at row k and its number of steps, by a part of a step after the whole steps before the
+        row."""
         rows, part, h = self.plan.rows, float(self.plan.rows.part[k]), self.plan.at.h
         course: ObservedCourse = self.course
         inner_course: ObservedCourse
@@ -190,7 +192,7 @@ class LatticeRun:
     # --- checkpoints
 
     def forget(self) -> None:
-        """Remove the file of checkpoints, if there is one."""
+        """Remove the checkpoint file, if there is one."""
         if self.checkpoints:
             self.checkpoints.unlink(missing_ok=True)
 
@@ -215,7 +217,7 @@ class LatticeRun:
         return {**identity, **self.identity}
 
     def _loaded(self) -> Mapping[str, Any]:
-        """The arrays of the checkpoint, if there is one."""
+        """Return the arrays of the checkpoint, if there is one; else none."""
         if self.checkpoints is None or not self.checkpoints.exists():
             return {}
         return checkpoint.load(self.checkpoints, self._identity())

@@ -1,4 +1,4 @@
-"""Runs of lattices that record numbers in place of frames: energy, sums and products of Casimirs, observables."""
+"""Runs of lattices that record numbers instead of frames: energy, Casimirs that are sums or products, observables."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class LatticeSeries:
     """Numbers along one integration: ``t`` (rows,) and ``columns`` by name, (rows,) each.
 
     ``first`` and ``last`` are the states (coordinates, *sizes) at the start and at the end, after ``steps`` steps of
-    size ``h`` and possibly a part of a step. ``crossings`` are the same numbers at the zeros of the section of a
-    run. ``origin`` is a text for its files.
+    size ``h`` and possibly a part of a step. ``crossings`` are the same numbers at the crossings of the section of a
+    run. ``origin`` is a text on the provenance, for files.
     """
 
     t: Floats
@@ -55,7 +55,7 @@ class LatticeSeries:
 
     @property
     def ends(self) -> LatticeTrajectory:
-        """The trajectory of two frames, the first and the last state."""
+        """Return the trajectory of two frames, the first and the last state."""
         return self.solver.ends_of(self)
 
     def save(self, path: str | Path) -> None:
@@ -77,7 +77,7 @@ class LatticeSeries:
 
 
 def key_of(name: str, interface: LatticeInterface) -> str:
-    """Return the name of a column in a ``.npz``."""
+    """Return the key of a column in a ``.npz``."""
     if name in interface.observables:
         return f"observable_{name}"
     return f"casimir_{name}" if name in interface.casimirs else name
@@ -99,7 +99,7 @@ def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
 
 
 class NumberRows:
-    """Rows of the numbers ``names``, without states (`phigen.runtime.lattice_run.Sink`)."""
+    """Rows of the numbers called ``names``, without states: a `phigen.runtime.lattice_run.Sink`."""
 
     def __init__(self, interface: LatticeInterface, names: Sequence[str]) -> None:
         self.about, self.names, self.seconds = interface, names, CHECKPOINT_SECONDS
@@ -132,7 +132,7 @@ class NumberRows:
 
 
 def _recorded_columns(session: LatticeSession, interface: LatticeInterface, names: Sequence[str]) -> list[float]:
-    """Return the recorded quantities of a session by column; other quantities are not computed."""
+    """Return the recorded numbers of a session, in the order of the columns; other numbers are not computed."""
     from phigen.runtime.lattice import reduced
 
     values = {"energy": session.hamiltonian()} if "energy" in names else {}
@@ -145,7 +145,7 @@ def _recorded_columns(session: LatticeSession, interface: LatticeInterface, name
 
 
 def expect_table(path: str | Path) -> Path:
-    """Return the path of a file of columns. Raises `ValueError` for any other."""
+    """Return the path if its suffix is that of a table. Raises `ValueError` for other suffixes."""
     if Path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"columns go to files that end in {' or '.join(SUFFIXES)}, not {str(path)!r}")
     return Path(path)

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 class LiveSession:
     """A trajectory at its present state, made by `Solver.session`.
 
-    Properties of the state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by
-    name), ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps; `kick` and assignment to
-    ``x`` change the state, but neither the predictors of the solver nor a gauge; `set_parameters` changes parameters.
-    With a monitor, the energy level e becomes −H after each of these changes. ``copy()`` returns an independent
-    session. A session continues with the same bits after pickling.
+    Properties of the state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by name),
+    ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps. `kick` and assignment to ``x``
+    change the state; predictors and the gauge remain. `set_parameters` changes parameters. With a monitor, each of
+    these changes sets the energy level e to −H. ``copy()`` returns an independent session. A pickled session continues
+    with the same bits.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class LiveSession:
 
     @property
     def x(self) -> Floats:
-        """A copy of the state (DIM,). Assignment moves the session to another state, and to the leaf of that state."""
+        """A copy of the state (DIM,). Assignment replaces the state, and `leaf` becomes the leaf of the new state."""
         return self._session.state()
 
     @x.setter
@@ -57,7 +57,7 @@ class LiveSession:
     def kick(self, change: ArrayLike) -> Self:
         """Add ``change`` (DIM,) to the state, as an impulse does, and return the session.
 
-        If the new state is on another leaf, ``leaf`` has the Casimirs of that leaf from then on.
+        If the new state is on another leaf, ``leaf`` then has the Casimirs of that leaf.
         """
         self._move(self._session.kick, self._checked(change, "change"))
         return self
@@ -65,7 +65,7 @@ class LiveSession:
     def set_parameters(self, parameters: Mapping[str, float] | None = None, /, **by_keyword: float) -> Self:
         """Replace parameters, and return the session; state, time, attitude and random numbers are unchanged.
 
-        Raises `TypeError` and `ValueError` for names and values that are not admissible; nothing changes then.
+        Raises `TypeError` and `ValueError` for names and values that are not admissible; then nothing changes.
         """
         changes = arguments.together(parameters, by_keyword)
         values = self.solver.values({**self.parameters, **changes}, {})
@@ -77,7 +77,7 @@ class LiveSession:
         return self
 
     def step(self, h: float, steps: int = 1) -> Self:
-        """Make steps of size ``h``, in τ with a monitor, and return the session.
+        """Make steps of size ``h`` (in τ with a monitor), and return the session.
 
         Raises `StepError`; the session then has the state before the failing step.
         """
@@ -121,7 +121,7 @@ class LiveSession:
 
     @property
     def leaf(self) -> dict[str, float]:
-        """The Casimirs of the state at the start, or after the last kick or assignment to x."""
+        """The Casimirs of the initial state, or of the state after the last kick or assignment to x, by name."""
         return self._casimirs_of(self._put)
 
     @property
@@ -131,7 +131,7 @@ class LiveSession:
 
     @property
     def position(self) -> Floats | None:
-        """The position (3,); None without one."""
+        """The position (3,); None if the spec reconstructs none."""
         return None if (rows := self._element()[1]) is None else rows[0]
 
     def copy(self) -> LiveSession:

@@ -1,4 +1,4 @@
-"""Long integrations in pieces, after each of which rows can be stored or drawn, and the run interrupted."""
+"""Long integrations in pieces. Rows can be stored or drawn, and the run interrupted, after each piece."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.session import Session
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: Approximate limits of a piece: seconds between reports to the user, steps, and rows held in memory.
+#: Approximate limits of a piece: seconds between reports to the user, number of steps, and number of rows in memory.
 _SECONDS = 0.2
 _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 
@@ -22,9 +22,9 @@ _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 class Piece:
     """Rows and crossings of a section from one piece of an integration.
 
-    ``numbers`` (rows,) are the numbers of the steps, with a fraction for a state between two steps, and ``x`` (rows,
-    DIM) the states. ``crossings`` are pairs of time and state (DIM,). ``passed`` (rows,) is the physical time since the
-    start for steps equal in τ, else NaN. ``turned`` (rows, numbers) are attitudes and positions.
+    ``numbers`` (rows,) are the numbers of the steps, with a fraction for a state between two steps; ``x`` (rows, DIM)
+    are the states. ``crossings`` are pairs of a time and a state (DIM,). ``passed`` (rows,) is the physical time since
+    the start for steps equal in τ, else NaN. ``turned`` (rows, numbers) are attitudes and positions.
     """
 
     numbers: Floats
@@ -51,9 +51,8 @@ def march(
 ) -> Iterator[Piece]:
     """Advance a session to ``steps`` steps of size h, and yield every ``stride``-th state and the last, in pieces.
 
-    If ``goes_on``, a part of a step follows, and the last whole step is not the last state of the run.
-
-    The length of a piece depends on the speed of the machine, the rows do not. ``see_tangent`` receives the derivative
+    If ``goes_on``, a part of a step follows, so the last whole step is not yielded as the last state of the run. The
+    length of a piece depends on the speed of the machine; the rows do not. ``see_tangent`` receives the derivative
     (DIM, DIM) of each step. ``is_started`` is true if the initial state was yielded before. Raises `BackendError` after
     a piece that ends with the state before the failing step.
     """
@@ -110,9 +109,9 @@ def march_at(
 ) -> Iterator[Piece]:
     """Advance a session to ``steps`` steps, and yield the states at given times after the start, in pieces.
 
-    The session makes whole steps. A state between two of them is a part of a step, made by a copy. ``see_tangent``
-    receives the derivatives of the whole steps. ``spans`` are the remaining times; steps after the last yield no rows.
-    Raises `BackendError` after a piece.
+    The session makes whole steps; a copy makes the part of a step to a state between two steps. ``see_tangent``
+    receives the derivatives of the whole steps. ``spans`` are the remaining times; steps after the last time yield no
+    rows. Raises `BackendError` after a piece.
     """
     sizes = len(session.state()), len(session.element())
     rows: list[tuple[Session, float]] = []
@@ -181,9 +180,9 @@ def _states(
     finder: CrossingFinder[Session] | None,
     see_tangent: Callable[[Floats], None] | None,
 ) -> Iterator[tuple[int, Sequence[Floats] | Floats, Sequence[Mark], list[tuple[float, Floats]]]]:
-    """Yield the number of a step, the states and marks from that step on, and the crossings among them.
+    """Yield, for each block of steps, its first step number, its states and marks, and its crossings.
 
-    With a finder or with tangents all steps are yielded, else every ``stride``-th and the last.
+    With a finder or with tangents every step is included, else every ``stride``-th and the last.
     """
     marks: list[Mark] = []
 

@@ -1,4 +1,4 @@
-"""Ensembles: their members, and the distribution of members to threads."""
+"""Ensembles: their members, and the distribution of the members among threads."""
 
 from __future__ import annotations
 
@@ -18,23 +18,24 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 
-#: The number of members in a part of an ensemble is a multiple of this number, and so of every SIMD width. So each
-#: member stays in the same SIMD batch, with the same bits, for any number of parts.
+#: The number of members in a part of an ensemble is a multiple of this number, and hence of every SIMD width. So each
+#: member is in the same SIMD batch for any number of parts, and its bits do not change.
 PART_GRANULARITY = 32
 
-#: Number of steps (members × steps) that take longer than the start of a further thread.
+#: Number of steps (members × steps) that take longer than starting a further thread.
 _STEPS_PER_THREAD = 20_000
 
-#: Members, and steps of members, in one call of C. Python delivers keyboard interrupts between calls.
+#: Largest number of members, and of steps of members, in one call of C. Python delivers keyboard interrupts between
+#: calls.
 _MEMBERS_PER_CALL, _STEPS_PER_CALL = 1024, 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """An ensemble: initial states (members, DIM), and numbers of shape (), common to all members, or (members,).
+    """Arguments of an ensemble: initial states (members, DIM), and numbers of shape () for all members or (members,).
 
-    ``paths`` (members,) select the random numbers of each member; their seed and first step are those of ``draws``.
-    The result is the states after every ``stride`` steps, or the final states if ``stride`` is 0.
+    ``paths`` (members,) select the random numbers of each member; seed and first step are those of ``draws``. An
+    integration stores the states after every ``stride`` steps, or only the final states if ``stride`` is 0.
     """
 
     x0: Floats
@@ -85,7 +86,10 @@ class Members:
         return frames
 
     def checked(self, states: Floats, failures: Mapping[int, str], step: int = -1) -> Floats:
-        """Return the states. Raises `BackendError` if some members failed; their later frames are NaN."""
+        """Return the states.
+
+        Raises `BackendError` if some members failed; frames after their failure are NaN.
+        """
         if not failures:
             return states
         failed = tuple(sorted(failures))
@@ -100,9 +104,9 @@ def cores() -> int:
 
 
 def parts(members: Members, threads: int) -> Iterator[slice]:
-    """Yield the parts of an ensemble that are integrated by one call each.
+    """Yield the parts of an ensemble, each of which is integrated by one call.
 
-    There are at least four parts for each thread, and a part is short enough for keyboard interrupts between calls.
+    There are at least four parts for each thread. A part is so short that keyboard interrupts are delivered in time.
     """
     count = len(members)
     batches = _STEPS_PER_CALL // max(members.steps, 1) // _MEMBERS_PER_CALL
@@ -115,7 +119,7 @@ def parts(members: Members, threads: int) -> Iterator[slice]:
 def shared_out(members: Members, threads: int | None, make: Callable[[slice], None]) -> None:
     """Call ``make`` for each part of an ensemble, in at most ``threads`` threads (None: one for each core).
 
-    Short ensembles take fewer threads, since a thread must do more work than its start costs.
+    Short ensembles use fewer threads, since starting a thread costs more than their steps.
     """
     useful_threads = min(len(members) * members.steps // _STEPS_PER_THREAD, -(-len(members) // PART_GRANULARITY))
     threads = max(1, min(cores() if threads is None else threads, useful_threads))
@@ -138,7 +142,7 @@ def in_threads(threads: int, make: Callable[[Part], None], parts: Iterable[Part]
 
 
 def one_by_one(backend: Backend, members: Members, threads: int | None = 1) -> Floats:
-    """Return the final states or frames of an ensemble, from a session for each member."""
+    """Return the final states or frames of an ensemble, which is integrated by one session for each member."""
     final, failures = members.x0.copy(), dict[int, str]()
     frames = members.frames() if members.stride else None
     marks = row_steps(members.steps, members.stride or max(members.steps, 1))

@@ -33,7 +33,7 @@ class Named(Generic[B, N]):
 
     @property
     def target(self) -> str:
-        """The target of the solver: ``c`` or ``numpy``."""
+        """The target of the solver, such as ``c`` or ``numpy``."""
         return self.backend.target
 
     @property

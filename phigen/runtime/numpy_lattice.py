@@ -52,7 +52,8 @@ class NumpyLatticeSession:
         self._tell_time()
 
     def _begin(self) -> None:
-        """Start the clock of steps that are equal in τ. Raises `ValueError` where the monitor is not positive."""
+        """Start the clock of steps that are equal in τ. Raises `ValueError` if the monitor is not positive at the
+        start."""
         if hasattr(self._module, "_begin"):
             self._module._begin(self._sites, self._x)
 
@@ -76,7 +77,7 @@ class NumpyLatticeSession:
                 self._tell_time()
 
     def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
-        """Make ``steps`` steps, and return the tangent ``vectors`` multiplied by their derivatives."""
+        """Make ``steps`` steps, and return the products of their derivative with the tangent ``vectors``."""
         if not hasattr(self._module, "step_tangent"):
             raise MissingExtraError("step_tangent")
         self.prepare(h)
@@ -108,7 +109,7 @@ class NumpyLatticeSession:
         if h != self._h:
             try:
                 self._h, self._rows = h, self._module._coefficients(self._sites, h)
-            except ValueError:  # the status of the other targets for steps after which no state is finite
+            except ValueError:  # raised for steps after which no state is finite; other targets report it as a status
                 raise BackendError("NOT_FINITE", self.steps, self._x[None].copy()) from None
             self._clock.set_step(h, self.steps)
 
@@ -118,7 +119,7 @@ class NumpyLatticeSession:
             self._sites.t = self._clock.after(self.steps)
 
     def saved(self) -> dict[str, Any]:
-        """Return the energy level and the physical time of steps equal in τ, else {}."""
+        """Return the energy level and the physical time, for steps equal in τ; else {}."""
         return {"passed": np.array([self._sites.level, *self._sites.clock])} if hasattr(self._sites, "level") else {}
 
     def time(self) -> float:
@@ -130,7 +131,7 @@ class NumpyLatticeSession:
         self._sites.level = level
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
-        """Continue after ``steps`` steps of size h, from the result of `saved`."""
+        """Continue after ``steps`` steps of size h; ``arrays`` are the result of `saved`."""
         self.prepare(h)
         self.steps = steps
         if "passed" in arrays:
@@ -188,7 +189,7 @@ class NumpyLatticeSession:
 
 
 class NumpyLattice:
-    """Back end over the text of a generated module."""
+    """Back end over the text of a generated NumPy module."""
 
     target = "numpy"
 
@@ -242,6 +243,6 @@ class NumpyLattice:
         except self._module.StepError as error:
             raise BackendError(error.status, error.step, error.states) from None
         except ValueError:
-            self.start(x0, parameters, t0).prepare(h)  # raises `BackendError` if the reason is the step size
+            self.start(x0, parameters, t0).prepare(h)  # raises `BackendError` if the step size is the reason
             raise BackendError("BAD_ARGUMENT", 0, x0[None]) from None
         return pulled_back

@@ -1,4 +1,4 @@
-"""Ensembles in NumPy: a generated module steps all members at once, as rows of arrays; failed members are removed."""
+"""Ensembles in NumPy: a generated module steps all members together, as rows of arrays. Failed members are removed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from phigen.runtime.members import Members
 def ensemble(module: Any, members: Members, gauge: Floats | None, attitudes: Floats | None = None) -> Floats:
     """Return final states or frames, as `phigen.runtime.backend.Backend.ensemble` does.
 
-    ``gauge`` is (members, Casimirs), None without a gauge.
+    ``gauge`` is (members, Casimirs of the gauge), None without a gauge.
     """
     frames = members.frames() if members.stride else None
     if not len(members):
@@ -37,7 +37,8 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, attitudes: Flo
 
 
 def _refused(module: Any, members: Members) -> list[int]:
-    """Return the members that no step can begin from, for their parameters or for the monitor at their start."""
+    """Return the members for which no step is possible, because of their parameters or of the monitor at their
+    start."""
     values = module._values(dict(members.parameters))
     refused = set(map(int, module._refused(values, members.x0))) if hasattr(module, "_refused") else set()
     if not module._admissible(values):
@@ -49,9 +50,9 @@ def _refused(module: Any, members: Members) -> list[int]:
 class MemberBatch:
     """The members that have not failed, with the variables of the loop of the module's ``integrate``.
 
-    ``who`` are their numbers and ``x`` their states. Of all members, ``final`` is the last state and ``turned`` the
-    last attitude. ``failures`` maps failed members to their status; ``failed_at`` is the number of steps before the
-    first failure. ``first`` (members, numbers) are initial attitudes, None if the spec has none.
+    ``who`` are the numbers of these members and ``x`` their states. ``final`` and ``turned`` have the last state and
+    the last attitude of all members. ``failures`` maps failed members to their status; ``failed_at`` is the number of
+    steps before the first failure. ``first`` (members, numbers) are initial attitudes, None if the spec has none.
     """
 
     def __init__(self, module: Any, members: Members, gauge: Floats | None, first: Floats | None) -> None:
@@ -86,15 +87,17 @@ class MemberBatch:
         self._report()
 
     def _begin_run(self, steps: int) -> None:
-        """Apply the flows of a corrector before steps."""
+        """Apply the flows of a corrector before a sequence of steps."""
         if hasattr(self._module, "_followed") and steps and len(self.who):
             self._before = self.x
             self.x, self._carry = self._module._followed(self._module.BEGIN, self._stages[0], self.x, self._carry)
             self._running = True
 
     def _end_run(self) -> None:
-        """Apply the inverse corrector after steps. Members for which a flow has no solution fail, with their state
-        before the run."""
+        """Apply the inverse corrector after a sequence of steps.
+
+        Members for which a flow has no solution fail; they keep their state before the sequence.
+        """
         if not self._running:
             return
         x, carry = self._state()
@@ -104,7 +107,10 @@ class MemberBatch:
             self._leave(dict.fromkeys(failed_members.tolist(), "NOT_FINITE"))
 
     def _state(self) -> tuple[Floats, Floats]:
-        """The states of the remaining members and their compensation terms; inside a run, those of its inner steps."""
+        """Return the states of the remaining members and their compensation terms.
+
+        Inside a sequence with corrector, these are the states of its inner steps.
+        """
         if not self._running:
             return self.x, self._carry
         end: tuple[Floats, Floats] = self._module._followed(self._module.END, self._stages[0], self.x, self._carry)
@@ -127,12 +133,15 @@ class MemberBatch:
             self._drawn = self._module._drawing(self._h, len(left), draws.seed, left.paths, draws.step)
 
     def _of_step(self) -> tuple[Any, ...]:
-        """Return the arguments of the next step's stages beside the state: time, step size and noise."""
+        """Return the arguments of the stages of the next step other than the state: time, step size and noise."""
         time_and_step = self._t0 + self._done * self._h, self._h
         return (*time_and_step, self._drawn(self._done)) if hasattr(self._module, "_drawing") else time_and_step
 
     def _step(self) -> dict[int, str]:
-        """Make one step of all members, or none if some fail; return the status of the failed by place in ``who``."""
+        """Make one step of all members. If some fail, no member is advanced.
+
+        Returns the status of the failed members, by their index in ``who``.
+        """
         module, memory = self._module, list(self._memory)
         x, carry, attitudes = self.x, self._carry, self._turned
         of_step = self._of_step() if hasattr(module, "_renewed") else ()
@@ -153,14 +162,14 @@ class MemberBatch:
         return {}
 
     def _leave(self, failed: dict[int, str]) -> None:
-        """Remove failed members. The others also retain their predictors, so that their bits do not change."""
+        """Remove failed members. The predictors of the other members are retained, so their bits do not change."""
         remaining = np.delete(np.arange(len(self.who)), list(failed))
         self._report()
         self.failures |= {int(self.who[m]): status for m, status in failed.items()}
         self.failed_at = self._done if self.failed_at < 0 else self.failed_at
         self.who, self.x, self._carry = self.who[remaining], self.x[remaining], self._carry[remaining]
         self._before = self._before[remaining]
-        # Members are the last axis but one: arrays of Gauss methods are (unknowns, members, stages).
+        # Members are the second axis from the end: arrays of Gauss methods are (unknowns, members, stages).
         self._memory = [
             (np.take(a, remaining, max(a.ndim - 2, 0)), np.take(b, remaining, max(b.ndim - 2, 0)))
             for a, b in self._memory

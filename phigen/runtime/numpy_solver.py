@@ -1,9 +1,9 @@
 """Back end and sessions over a generated NumPy module, loaded from its source text.
 
 Sessions call the functions that the module's ``integrate`` consists of: ``_values``, ``_admissible``,
-``_coefficients``, ``_advance``; ``_renewed`` if the Hamiltonian depends on the time, ``_tangent_stage`` with tangents,
-``_time_of`` with a monitor, and those of ``reconstruct`` with attitudes. Ensembles do too, see
-`phigen.runtime.numpy_members`.
+``_coefficients``, ``_advance``; ``_renewed`` if the Hamiltonian depends on the time, ``_tangent_stage`` for tangents,
+``_time_of`` with a monitor, and those of ``reconstruct`` for attitudes. Ensembles (`phigen.runtime.numpy_members`) call
+the same functions.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from phigen.runtime.numpy_lattice import NumpyLattice
 from phigen.runtime.numpy_members import ensemble
 
 Pair = tuple[Floats, Floats]
-#: Coefficients, parameters and step of a stage, and its time if there is one. Only the module reads them.
+#: Coefficients, parameters and step of a stage, and its time if there is one. Only the generated module reads them.
 Stage = tuple[Any, ...]
 
 #: A completed stage: the stage, the state and the compensation term at its start, and the solution of its equation.
@@ -39,8 +39,8 @@ CompletedStage = tuple[Stage, Floats, Floats, Floats]
 class AttitudeState(NamedTuple):
     """Attitude of a session.
 
-    ``first`` is the group element at the time ``begun``, ``element`` the product of the increments of all steps since
-    then, ``lost`` its compensation term, and ``rate`` the rotation that the gauge adds per unit of time.
+    ``first`` is the group element at the time ``begun``. ``element`` is the product of the increments of all steps
+    since then, ``lost`` its compensation term. ``rate`` is the rotation per unit of time that the gauge adds.
     """
 
     first: Floats
@@ -62,7 +62,7 @@ class AttitudeState(NamedTuple):
 
 
 def _memory_name(stage: int, part: int) -> str:
-    """Name of an array of a saved session: a part of the memory of a stage."""
+    """Return the name of an array in a saved session, for a stage and a part of its memory."""
     return f"memory_{stage}_{part}"
 
 
@@ -80,7 +80,7 @@ class NumpySession:
         draws: Draws = FIRST_DRAWS,
     ) -> None:
         self.steps, self._draws = 0, draws
-        # Time and number of steps at the last change of the step size. The time is a multiple of h from there, so that
+        # Time and number of steps at the last change of the step size. Later times are multiples of h after it, so
         # rounding errors do not accumulate.
         self._t, self._counted = t0, 0
         self._module, self._parameters, self._gauge = module, parameters, gauge
@@ -120,9 +120,10 @@ class NumpySession:
         self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
 
     def _stand(self, x: Floats, carry: Floats) -> None:
-        """Replace the state and its compensation term. Predictors are offsets from the state, and stay as they are.
+        """Replace the state and its compensation term.
 
-        Those of Gauss methods begin anew, as the last step does not lead to the state.
+        Predictors are offsets from the state, and are not changed. Those of Gauss methods are discarded, since the last
+        step does not lead to the new state.
         """
         monitored = hasattr(self._module, "_refused")
         if not np.isfinite(x).all() or (monitored and len(self._module._refused(self._values(), x))):
@@ -188,7 +189,10 @@ class NumpySession:
             self._commit(*self._attempted_step())
 
     def _run_corrected(self, steps: int) -> None:
-        """Make steps between correctors. Without a successful step, or if a corrector fails, the state is unchanged."""
+        """Make a sequence of steps between corrector and inverse corrector.
+
+        If no step succeeds, or a corrector fails, the state is unchanged.
+        """
         start, status = (self._x, self._carry, self.steps), ""
         try:
             self._follow("BEGIN")
@@ -207,7 +211,7 @@ class NumpySession:
             raise BackendError(status, self.steps, self._x.copy())
 
     def _follow(self, flows: str) -> None:
-        """Apply the flows of a corrector."""
+        """Apply the flows of a corrector that the module's function ``flows`` makes."""
         x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
         if not np.isfinite(x).all():
             raise BackendError("NOT_FINITE", self.steps, self._x.copy())
@@ -234,7 +238,7 @@ class NumpySession:
                     raise BackendError("NO_CONVERGENCE", self.steps, self._x.copy())
                 tangent = stage[0] @ tangent
         if hasattr(self._module, "_followed"):
-            self.advance(h, 1)  # derivatives start from the state before the run
+            self.advance(h, 1)  # the derivative is that of the run from the state before it
         else:
             self._commit(x, carry, memory, stages)
         return tangent
@@ -309,7 +313,8 @@ class NumpySession:
             return stages
 
     def _of_step(self, increments: Floats | None) -> tuple[Any, ...]:
-        """Return the arguments of the next step's stages: time, step size and noise (``increments``, else random)."""
+        """Return the arguments of the stages of the next step: time, step size and noise (``increments``, else
+        random)."""
         if not hasattr(self._module, "_drawing"):
             return self._now(), self._h
         draws, prescribed = self._draws, None if increments is None else increments[np.newaxis]
@@ -321,7 +326,7 @@ class NumpySession:
     ) -> tuple[Floats, Floats, list[Pair], list[CompletedStage]]:
         """Return state, compensation term and predictors after one step, and its completed stages.
 
-        The session does not change. Raises `BackendError`.
+        The session is not changed. Raises `BackendError`.
         """
         x, carry, memory, stages = self._x, self._carry, list(self._memory), []
         of_step = self._of_step(increments) if self._renewed else ()
@@ -353,7 +358,8 @@ class NumpySession:
 
 
 class NumpySolver:
-    """Back end over a generated module, loaded from its text. It needs no compiler, and batches ensembles."""
+    """Back end over a generated module, loaded from its text. It needs no compiler, and makes the steps of all
+    members of an ensemble together."""
 
     target = "numpy"
 
@@ -398,7 +404,7 @@ class NumpySolver:
         return NumpySession.from_bytes(self.module, parameters, saved)
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`; in one thread."""
+        """See `phigen.runtime.backend.Backend`. One thread is used."""
         return ensemble(self.module, members, self._gauges(members.x0, members.parameters), attitudes)
 
     @property
@@ -433,7 +439,7 @@ class NumpySolver:
             raise BackendError("BAD_ARGUMENT", 0, x0, tuple(refused) or tuple(range(len(x0))))
 
     def _gauges(self, x0: Floats, parameters: Mapping[str, Any]) -> Floats | None:
-        """Return the gauge of each member (members, Casimirs of the gauge), None if there is no gauge."""
+        """Return the gauge of each member (members, Casimirs of the gauge); None if there is no gauge."""
         if not self.module.GAUGE:
             return None
         gauges = self.module.gauge(x0, **parameters) if self._gauge is None else self._gauge
@@ -472,7 +478,7 @@ class NumpySolver:
 
 
 def load(files: Mapping[str, str], interface: Interface) -> NumpySolver | NumpyLattice:
-    """Return the back end of generated files; see `phigen.registry`."""
+    """Return the back end of generated files, as `phigen.registry` requires."""
     if isinstance(interface, LatticeInterface):
         return NumpyLattice(files, interface)
     return NumpySolver(files[f"{interface.name}.py"], interface)

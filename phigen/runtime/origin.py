@@ -1,9 +1,9 @@
-"""Origins of files: which run of which spec wrote a table, a store, a figure or a film.
+"""Origins of files: the spec and the run that a table, store, figure or film was made from.
 
-An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``, followed by the command if that is not
-``phigen run``. It is an array ``origin`` of a ``.npz``, an attribute of a Zarr store, and in the metadata of figures,
-films and pages. A ``.csv`` has no place for it that all readers skip, so it is in the companion ``FILE-metadata.json``,
-where the W3C recommendation "Metadata Vocabulary for Tabular Data" has the metadata of a table.
+An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``, followed by the command if that is not ``phigen
+run``. It is an array ``origin`` of a ``.npz``, an attribute of a Zarr store, and part of the metadata of figures, films
+and pages. A ``.csv`` has no place for it that all readers skip. Its origin is in the companion ``FILE-metadata.json``,
+the place that the W3C recommendation "Metadata Vocabulary for Tabular Data" gives to the metadata of a table.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class Origin:
         return f"the {self._kind} {self.run} of {self.spec}"
 
     def difference(self, requested: Origin) -> str:
-        """Return how another origin differs, as the end of the sentence "the file holds …"; "" if it does not."""
+        """Return the difference of another origin as the end of the sentence "the file holds …"; "" if both are
+        equal."""
         if self.command != requested.command:
             return f"a result of phigen {requested.command}, not of phigen {self.command}"
         if (self.spec, self.run) != (requested.spec, requested.run):
@@ -66,12 +67,12 @@ def origin_of(spec: Spec, run: Run | SweepSettings | None, command: str = "run")
 
 
 def companion(path: Path) -> Path:
-    """Return the file with the metadata of a ``.csv``."""
+    """Return the path of the file with the metadata of a ``.csv``."""
     return path.with_name(f"{path.name}-metadata.json")
 
 
 def mark(path: Path, origin: Origin) -> None:
-    """Write the origin of a ``.csv`` into a file of metadata beside it. Other files contain their origin already."""
+    """Write the origin of a ``.csv`` into its companion. Other files already contain their origin."""
     if path.suffix.lower() != ".csv":
         return
     columns = [{"titles": title, "datatype": "double"} for title in _header(path)]
@@ -81,7 +82,7 @@ def mark(path: Path, origin: Origin) -> None:
 
 
 def read_origin(path: Path) -> Origin | None:
-    """Return the origin of a file, or None if it does not say it."""
+    """Return the origin of a file, or None if the file has none."""
     suffix = path.suffix.lower()
     if path.is_dir():
         return _within((path / ".zattrs").read_bytes()) if (path / ".zattrs").is_file() else None
@@ -97,7 +98,8 @@ def read_origin(path: Path) -> Origin | None:
 
 
 def _of_table(path: Path) -> Origin | None:
-    """Return the origin in the companion of a ``.csv``, if that describes a table with these columns."""
+    """Return the origin in the companion of a ``.csv``; None unless the companion describes a table with these
+    columns."""
     try:
         described = json.loads(companion(path).read_text(encoding="utf-8"))
         titles = [column["titles"] for column in described["tableSchema"]["columns"]]

@@ -1,4 +1,4 @@
-"""Sessions whose noise has prescribed increments in place of random ones."""
+"""Sessions whose noise has prescribed increments instead of random ones."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from phigen.runtime.session import Session
 
 
 class PrescribedNoise(Forwarding[Session]):
-    """Session whose k-th step takes row k of the increments (steps, draws)."""
+    """Session whose k-th step uses row k of the prescribed increments (steps, draws)."""
 
     def __init__(self, session: Session, increments: Floats) -> None:
         super().__init__(session)

@@ -1,7 +1,7 @@
 """A run of a solver as a function of arrays with leading axes, with its Jacobian and its vector–Jacobian product.
 
-`phigen.jax` and `phigen.torch` pass these functions to their frameworks. Arguments and results are NumPy arrays, with
-one member of an ensemble for each element of the leading axes.
+`phigen.jax` and `phigen.torch` register these functions with their frameworks. Arguments and results are NumPy arrays;
+each element of the leading axes is one member of an ensemble.
 """
 
 from __future__ import annotations
@@ -112,7 +112,8 @@ class Propagation:
         return states.reshape(self.shape(start))
 
     def transposed(self, x0: ArrayLike, parameters: Values, cotangent: ArrayLike) -> tuple[Floats, dict[str, Floats]]:
-        """Return cotangents of x0 and of the parameters, in the shapes of these, from the cotangent of the result."""
+        """Return the cotangents of x0 and of the parameters, in the shapes of these, from the cotangent of the
+        result."""
         start, members, values = self._members(x0, parameters)
         rows = () if self.stride is None else (self.rows,)
         bars = np.asarray(cotangent, dtype=np.float64).reshape(-1, *rows, *start[-self.axes :])
@@ -129,7 +130,7 @@ class Propagation:
     def jacobian(self, x0: ArrayLike, parameters: Values) -> tuple[Floats, dict[str, Floats]]:
         """Return the derivatives of the result by x0, with a further axis (DIM,), and by each parameter, in its shape.
 
-        Takes one reverse pass for each component of a member's result. Not for lattices.
+        One reverse pass is made for each component of a member's result. Lattices have no Jacobian.
         """
         start, members, values = self._members(x0, parameters)
         shape = self.shape((len(members), start[-1]))
@@ -146,7 +147,7 @@ class Propagation:
         }
 
     def _members(self, x0: ArrayLike, parameters: Values) -> tuple[tuple[int, ...], Floats, dict[str, Floats]]:
-        """Return the shape of the start, the initial states (members, DIM), and the parameters (members, …)."""
+        """Return the leading axes of the states, the initial states (members, DIM), and the parameters (members, …)."""
         x, values = np.asarray(x0, dtype=np.float64), dict[str, Any](self.shared)
         for name, value in parameters.items():
             array = np.asarray(value, dtype=np.float64)
@@ -164,7 +165,7 @@ class Propagation:
 
 
 def _summed(values: Floats, shape: tuple[int, ...]) -> Floats:
-    """Return values summed to a shape: the transpose of broadcasting from that shape."""
+    """Return ``values`` summed over broadcast axes, so that they have ``shape``: the transpose of broadcasting."""
     extra = values.ndim - len(shape)
     values = values.sum(axis=tuple(range(extra)))
     ones = tuple(k for k, length in enumerate(shape) if length == 1 and values.shape[k] != 1)

@@ -12,8 +12,8 @@ from phigen.runtime.session import Followed
 class Retrying(Forwarding[Followed]):
     """Session that repeats a failing step in 2, 4, …, 2^``most`` equal parts.
 
-    Each part is a step of the method: a Poisson map that stays on the leaf. The product of the parts is a different
-    map from a whole step; ``retried`` lists the numbers of the steps made in parts. ``steps`` counts whole steps.
+    Each part is a step of the method, a Poisson map that stays on the leaf. The composition of the parts is not the map
+    of a whole step; ``retried`` lists the numbers of the steps made in parts. ``steps`` counts whole steps.
     """
 
     def __init__(self, session: Followed, limit: int) -> None:
@@ -28,7 +28,7 @@ class Retrying(Forwarding[Followed]):
         return self.session.steps - self._extra
 
     def advance(self, h: float, steps: int) -> None:
-        """Make ``steps`` whole steps; raises `BackendError` if one fails in every number of parts."""
+        """Make ``steps`` whole steps. Raises `BackendError` if a step fails in every number of parts."""
         while steps > 0:
             begin = self.steps
             try:

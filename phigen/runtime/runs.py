@@ -1,7 +1,7 @@
 """Named runs of a spec from Python: `Solver.run` and `LatticeSolver.run`.
 
-`changed` is the run of a spec with other settings; `rows_of` makes the trajectory of an ordinary run that stops where a
-function vanishes, or whose rows are equal times apart, which `Solver.integrate` alone does not.
+`changed` returns a run of a spec with other settings. `rows_of` makes the rows of a run of an ordinary system that
+`Solver.integrate` cannot make: runs that stop at a zero of a function, and rows at equal distances in time.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from phigen.spec.runs import with_step
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a run that replace those of the spec; None leaves the setting of the spec."""
+    """Settings of a run that replace those of the spec; None keeps the setting of the spec."""
 
     step: float | None = None
     steps: int | None = None
@@ -82,9 +82,9 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
 
 
 def _row_times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fraction, ...]:
-    """Return times of rows in the order of the run, each once.
+    """Return the times of rows in the order of the run, without repetitions.
 
-    Raises `ValueError` for times before the start, or after the end if that is known, and if there are none.
+    Raises `ValueError` for times before the start, or after the end if that is known, and if there are no times.
     """
     forwards = run.step > 0
     ordered = sorted((_number(t, "at") for t in times), reverse=not forwards)
@@ -118,9 +118,9 @@ def _number(value: float, name: str) -> Fraction:
 
 
 def end_of(session: Followed, run: Run, stop: Function | None, *, timed: bool) -> End:
-    """Return where a run ends, for a session at its start, which is left as it is.
+    """Return the end of a run; the session is at its start, and is not changed.
 
-    ``stop`` is a function of states whose first zero ends the run; ``timed`` tells whether it takes the time too.
+    ``stop`` is a function of states whose first zero ends the run. If ``timed``, it also receives the time.
     """
     h, t0 = float(run.step), float(run.start)
     last = at_time(session.branch(), h, float(run.until) - t0) if run.until is not None else None
@@ -136,13 +136,14 @@ def end_of(session: Followed, run: Run, stop: Function | None, *, timed: bool) -
 
 
 def spans_of(interval: float, span: float) -> list[float]:
-    """Return the multiples of ``interval`` from the start to before the end of a ``span`` of time."""
+    """Return the multiples of ``interval``, from 0 on, that are less than the ``span`` of time of a run."""
     count = math.ceil(abs(span / interval) * (1 - EQUAL))
     return [k * math.copysign(interval, span) for k in range(1, count)]
 
 
 def spans_of_run(run: Run, span: float) -> list[float]:
-    """Return the times from the start to the rows of a run with ``every`` or ``at``, before the end of a span."""
+    """Return the times after the start of the rows of a run with ``every`` or ``at``, without the end of the
+    ``span``."""
     if run.every is not None:
         return spans_of(float(run.every), span)
     requested = [float(time - run.start) for time in run.at]
@@ -150,10 +151,10 @@ def spans_of_run(run: Run, span: float) -> list[float]:
 
 
 def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield a session at each row of a run up to its end, the start first, with the steps made, the last one in part.
+    """Yield a session at each row of a run, the start first, with its number of steps; the last step may be a part.
 
-    Rows are ``run.every`` apart in time, or every ``run.stride``-th step. The caller reads a session before it asks for
-    the next. Raises `BackendError`.
+    Rows are ``run.every`` apart in time, or at every ``run.stride``-th step. The caller must read a session before it
+    asks for the next. Raises `BackendError`.
     """
     yield session, 0.0
     yield from _timed_rows(session, run, end) if run.is_timed else _strided_rows(session, run, end)
@@ -162,16 +163,17 @@ def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, flo
 
 
 def _strided_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield every stride-th step before the end."""
+    """Yield the session at every stride-th step before the end, with its number of steps."""
     for mark in range(run.stride, end.steps + end.part, run.stride):
         session.advance(float(run.step), mark - session.steps)
         yield session, float(mark)
 
 
 def _timed_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield the states at the multiples of ``every``, or the times of ``at``, before the end.
+    """Yield sessions at the multiples of ``every``, or at the times of ``at``, before the end, with their numbers of
+    steps.
 
-    Each is reached by a part of a step from the step before it.
+    Each is reached by a part of a step from the last whole step before it.
     """
     h = float(run.step)
     for span in spans_of_run(run, end.span):

@@ -1,4 +1,4 @@
-"""Sections that a spec names: the expression as a function of states."""
+"""Sections in specs: conversion of an expression to a function of states."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from phigen.symbolic.expression import Expression
 def function_of(
     section: Expression, coordinates: Sequence[str], parameters: Mapping[str, float], time: str = ""
 ) -> Function:
-    """The expression at states (rows, DIM), and at their times (rows,) if the spec has a time: shape (rows,)."""
+    """Return an expression as a function of states (rows, DIM), and of times (rows,) if the spec has a time.
+
+    The values have the shape (rows,).
+    """
 
     def g(states: Floats, *t: Floats) -> Floats:
         values = {**parameters, **{c: states[:, i] for i, c in enumerate(coordinates)}, **dict.fromkeys([time], *t)}

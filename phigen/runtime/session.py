@@ -9,12 +9,12 @@ import numpy as np
 
 from phigen.runtime.interface import BackendError, Floats, Progress, row_steps
 
-#: Largest number of progress reports of `rows_along`, so that reports cost nothing beside the steps.
+#: Largest number of progress reports of `rows_along`: their cost is then negligible.
 _REPORTS = 200
 
 
 class Course(Protocol):
-    """A trajectory being computed by any method: its state, and everything that the next step depends on.
+    """A trajectory being computed by any method: its state, and all other data that the next step depends on.
 
     A failing step raises `BackendError` and leaves the state before it.
     """
@@ -38,7 +38,7 @@ class Course(Protocol):
 
 
 class Followed(Course, Protocol):
-    """A `Course` of a generated solver, which also has a time and an attitude."""
+    """A `Course` of a generated solver, which additionally has a time and an attitude."""
 
     @property
     def rounding(self) -> float:
@@ -50,14 +50,14 @@ class Followed(Course, Protocol):
         ...
 
     def element(self) -> Floats:
-        """Return a copy of the numbers of the attitude and of the position; empty if the spec has none."""
+        """Return a copy of the numbers of attitude and position; empty if the spec reconstructs neither."""
         ...
 
 
 class Session(Followed, Protocol):
     """A trajectory being computed by a generated solver.
 
-    The states have the same bits however the steps are divided into calls.
+    The states have the same bits for every division of the steps into calls.
     """
 
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
@@ -68,7 +68,8 @@ class Session(Followed, Protocol):
         ...
 
     def advance_along(self, h: float, increments: Floats) -> None:
-        """Make one step for each row of the increments of the noise (steps, draws), which replace random ones."""
+        """Make one step for each row of ``increments`` (steps, draws), which replace the random increments of the
+        noise."""
         ...
 
     def advance_tangent(self, h: float) -> Floats:
@@ -79,23 +80,23 @@ class Session(Followed, Protocol):
         ...
 
     def interpolated(self, fractions: Sequence[float]) -> Floats | None:
-        """Return states (fractions, DIM) at fractions of the last step, 0 at its start, by its collocation polynomial.
+        """Return states (fractions, DIM) at fractions of the last step, from its collocation polynomial.
 
-        They are far less accurate than steps, and serve to locate events. None if the method has no polynomial, and
-        where the last step does not lead to the state.
+        Fraction 0 is the start of the step. The states are far less accurate than steps, and serve to locate events.
+        None if the method has no polynomial, or the last step does not lead to the present state.
         """
         ...
 
     def placed(self, x: Floats) -> Self:
-        """Return a copy of a session that is at its start, with the state ``x`` (DIM,) and the same gauge."""
+        """Return a copy of a session at its start, with the state replaced by ``x`` (DIM,) and the same gauge."""
         ...
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (DIM,), and nothing else; raises `BackendError` if ``x`` is not admissible."""
+        """Replace the state by ``x`` (DIM,); nothing else changes. Raises `BackendError` if ``x`` is not admissible."""
         ...
 
     def kick(self, change: Floats) -> None:
-        """Add ``change`` (DIM,) to the state; else as `place`."""
+        """Add ``change`` (DIM,) to the state. Raises `BackendError` if the sum is not admissible."""
         ...
 
     def saved(self) -> bytes:

@@ -39,11 +39,11 @@ _ADVICE = {
 
 @dataclass(frozen=True)
 class Marks:
-    """Values at the rows of a trajectory beside the states.
+    """Data at the rows of a trajectory other than the states.
 
-    ``tau`` (rows,) are the times from the start in τ, ``passed`` (rows,) the physical times from the start if steps are
-    equal in τ, ``turned`` (rows, numbers) the values of attitudes and positions. ``steps`` is the number of all steps,
-    ``retried`` are the numbers of those made in parts.
+    ``tau`` (rows,) is τ since the start. ``passed`` (rows,) is the physical time since the start if steps are equal in
+    τ. ``turned`` (rows, numbers) are attitudes and positions. ``steps`` is the number of all steps, ``retried`` are the
+    numbers of steps made in parts.
     """
 
     tau: Floats
@@ -192,7 +192,7 @@ class Solver(Named[Backend, Interface]):
         return self._rows(run_, self._beginning(start, "x0", float(run_.step), values, {}, t0, noise_arguments))
 
     def _rows(self, run: Run, beginning: Beginning) -> Trajectory:
-        """Return the trajectory of a run that ends at a zero, or whose rows have equal distances in time."""
+        """Return the trajectory of a run that ends at a zero of a function, or has rows at given times."""
         names = self.interface
         stop = function_of(run.stop, names.coordinates, beginning.values, names.time) if run.stop is not None else None
         session = self._started(beginning)
@@ -211,7 +211,7 @@ class Solver(Named[Backend, Interface]):
         return trajectory()
 
     def _until(self, course: Retrying, span: float, stride: int, beginning: Beginning) -> Trajectory:
-        """Return the trajectory of `integrate` over a span of time."""
+        """Return the trajectory of `integrate` over a ``span`` of time."""
         rows: list[tuple[Floats, float, float, Floats, int, tuple[int, ...]]] = []
 
         def see(session: Retrying, tau: float) -> None:
@@ -684,8 +684,8 @@ class Solver(Named[Backend, Interface]):
     ) -> StepError:
         """Return the exception for users after a failure in the back end.
 
-        Its message names the step and the parameters; ``trajectory`` are the results until then. ``start`` (DIM,) is
-        the initial state, for ensembles that of the first failed member.
+        Its message names the step and the parameters. ``trajectory`` are the results up to the failure. ``start``
+        (DIM,) is the initial state, for ensembles that of the first failed member.
         """
         name = self.interface.name
         if error.status == "BAD_ARGUMENT":
@@ -697,7 +697,7 @@ class Solver(Named[Backend, Interface]):
                 return ParameterError(
                     message, step=0, status=error.status, trajectory=trajectory, members=error.members
                 )
-            # The other arguments were checked.
+            # Only the parameters are listed: the other arguments were checked before.
             settings = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
             message = f"{name}: no step can be made"
             if settings:

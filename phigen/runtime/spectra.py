@@ -32,9 +32,10 @@ _EQUAL = 1e-6
 class DynamicSpectrum:
     """Dynamic structure factor S(q, ω) of some fields of a grid.
 
-    ``values`` (*sizes, frequencies) are over the wave numbers ``q`` of each of the ``axes``, in radians for a site from
-    −π on, and the frequencies ``omega``, both in ascending order. A wave cos(qr − ωt) is at (q, ω) and (−q, −ω). The
-    sum of all values is the mean of Σ f² over sites and time, weighted with the window.
+    ``values`` (*sizes, frequencies) are S over the wave numbers ``q`` of each of the ``axes`` and the frequencies
+    ``omega``. Wave numbers are in radians per site, in ascending order from −π; frequencies are ascending too. A wave
+    cos(qr − ωt) is at (q, ω) and (−q, −ω). The sum of all values is the mean of Σ f² over sites and time, weighted with
+    the window.
     """
 
     q: tuple[Floats, ...]
@@ -48,7 +49,8 @@ class DynamicSpectrum:
         return f"<DynamicSpectrum of {', '.join(self.of)}: q of {', '.join(self.axes)} and ω, {shape} values>"
 
     def variables(self, name: str, prefix: str = "") -> dict[str, tuple[tuple[str, ...], Floats]]:
-        """Return dimensions and values of S under a ``name``, and of ``q_AXIS`` and ``omega`` with a ``prefix``."""
+        """Return the dimensions and the values of S, called ``name``, and of ``q_AXIS`` and ``omega``, with a
+        ``prefix``."""
         names = [f"{prefix}q_{axis}" for axis in self.axes] + [f"{prefix}omega"]
         coordinates = zip(names, [*self.q, self.omega], strict=True)
         return {name: (tuple(names), self.values)} | {n: ((n,), values) for n, values in coordinates}
@@ -62,15 +64,16 @@ class DynamicSpectrum:
         root = zarr.open_group(str(path), mode="w", zarr_format=2)
         for name, (dimensions, values) in self.variables("S").items():
             attributes = {"_ARRAY_DIMENSIONS": list(dimensions)}
-            root.create_array(name, data=values, fill_value=None, attributes=attributes)  # 0 is a value like others
+            # 0 is a value, not a missing one
+            root.create_array(name, data=values, fill_value=None, attributes=attributes)
         root.attrs["of"] = list(self.of)
         zarr.consolidate_metadata(str(path))
 
     def plot(self, title: str = "") -> Figure:
-        """A picture of S over q and ω ≥ 0, on a logarithmic scale; for grids of two or three axes along the first,
-        at q = 0 along the others.
+        """Return a picture of S over q and ω ≥ 0, on a logarithmic scale.
 
-        Raises `MissingPackageError` without matplotlib.
+        For grids of two or three axes, q is along the first axis and 0 along the others. Raises `MissingPackageError`
+        without matplotlib.
         """
         figure: Figure = display("figure of a spectrum")(self, title)
         return figure
@@ -78,7 +81,7 @@ class DynamicSpectrum:
 
 @dataclass(frozen=True)
 class Correlation:
-    """⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ of two fields ``of``.
+    """Correlation ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ of the two fields named in ``of``.
 
     ``values`` (distances,) are for d = 0, 1, … sites along an ``axis``.
     """
@@ -90,7 +93,7 @@ class Correlation:
 
 @dataclass(frozen=True)
 class Transforms:
-    """Spectrum and correlation of a run of a spec; None for those that it does not ask for."""
+    """Settings of the spectrum and of the correlation that a run asks for; None for those that it does not ask for."""
 
     spectrum: SpectrumChoice | None = None
     correlation: CorrelationChoice | None = None
@@ -99,8 +102,7 @@ class Transforms:
         return bool(self.spectrum or self.correlation)
 
     def expect_frames(self, t: Floats, h: float) -> None:
-        """Raise `ValueError` if frames at the times ``t`` are not suitable for the requested spectrum or
-        correlation."""
+        """Raise `ValueError` if frames at the times ``t`` do not suit the requested spectrum or correlation."""
         if self.spectrum:
             equal_times(t, h, _number(self.spectrum.after))
         if self.correlation:
@@ -140,7 +142,7 @@ def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None =
     total = np.zeros((count, *sizes))
     for k in fields:
         windowed = np.array(run.x[first : first + count, k]) * window.reshape(-1, *[1] * len(sizes))
-        # e^{+iωt} in time, so that a wave moving to larger r has q and ω of the same sign
+        # Sign e^{+iωt} in time: a wave that moves to larger r has q and ω of the same sign.
         total += np.abs(np.fft.fftn(np.fft.ifft(windowed, axis=0), axes=range(1, 1 + len(sizes)))) ** 2
     total /= float(np.prod(sizes)) ** 2
     values = np.moveaxis(np.fft.fftshift(total), 0, -1)
@@ -180,7 +182,8 @@ def correlation(
 
 
 def equal_times(t: Floats, h: float, after: float | None) -> Floats:
-    """Return the times of the frames of a spectrum: from a given time on, without a last one at a shorter distance.
+    """Return the times of the frames of a spectrum: those not before ``after``, without a last one at a shorter
+    distance.
 
     Raises `ValueError` for fewer than four frames, and for unequal distances in time.
     """
@@ -201,7 +204,7 @@ def expect_frames(t: Floats, h: float, after: float | None) -> None:
 
 
 def _later(t: Floats, h: float, after: float | None) -> Floats:
-    """Return the times of the frames from a time on, in the direction of the run."""
+    """Return the times of the frames from ``after`` on, in the direction of the run."""
     sign = np.sign(h)
     return t if after is None else t[sign * t >= sign * after - 1e-9 * abs(h)]
 

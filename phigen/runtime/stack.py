@@ -1,4 +1,4 @@
-"""Stack of generated C: the longest chain of calls, by the call graph that gcc writes (``-fcallgraph-info=su``)."""
+"""Stack of generated C: the longest chain of calls in the call graph that gcc writes (``-fcallgraph-info=su``)."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from phigen.targets.header import plain
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n[^"]*?(?:\\n(\d+) bytes \((\w+(?:,\w+)?)\))?"')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _HINT = "gcc of version 10 or later, or one named in the environment variable CC, such as CC=arm-none-eabi-gcc"
-#: Names of gcc for calls by a pointer, and of functions of OpenMP that call others by a pointer.
+#: Names that gcc gives to calls through a pointer, and to functions of OpenMP that call others through a pointer.
 _BY_POINTER = ("__indirect_call", "GOMP_")
 _TIMEOUT = 300.0  # seconds
 
 
 @dataclass(frozen=True)
 class CallGraph:
-    """Functions of a solver: bytes of stack and the functions called by each; those of libraries have no bytes.
+    """Functions of a solver, with the bytes of stack and the callees of each; functions of libraries have no bytes.
 
-    ``kinds`` are those of gcc: ``static``; ``dynamic,bounded``, where the bytes are an upper bound; and ``dynamic``.
+    ``kinds`` are those of gcc: ``static``; ``dynamic,bounded``, if the bytes are an upper bound; and ``dynamic``.
     """
 
     stack: Mapping[str, int]
@@ -95,7 +95,7 @@ def _command() -> list[str]:
 
 
 def _output(command: Sequence[str], folder: Path | None = None) -> str:
-    """Return what a command prints. Raises `ToolchainError` with its messages if it fails."""
+    """Return the output of a command. Raises `ToolchainError` with its messages if it fails."""
     try:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=_TIMEOUT, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -107,5 +107,8 @@ def _output(command: Sequence[str], folder: Path | None = None) -> str:
 
 
 def _plain(title: str) -> str:
-    """Return a function without the file of static ones; parts and copies that gcc makes keep their own names."""
+    """Return the name of a function without the file name that gcc adds for static functions.
+
+    Parts and copies of functions that gcc makes keep their own names.
+    """
     return title.rpartition(":")[2]

@@ -21,12 +21,12 @@ from phigen.writing import naming, replacing
 
 SUFFIXES = (".csv", ".npz")
 
-_ROWS = 1 << 14  # rows that are copied at a time
+_ROWS = 1 << 14  # number of rows that are copied at a time
 
 
 @dataclass(frozen=True)
 class Column:
-    """Neighbouring columns: ``names`` in the first line of a ``.csv``, the array ``key`` in a ``.npz``.
+    """Adjacent columns of a table: ``names`` in the first line of a ``.csv``, the array ``key`` in a ``.npz``.
 
     The array has shape (rows,) if it is ``flat``, else (rows, len(names)).
     """
@@ -44,11 +44,11 @@ class TableFile(Protocol):
         ...
 
     def flush(self) -> int:
-        """Write buffered rows to the disk, and return the size of the file in bytes, from which `opened` can resume."""
+        """Write buffered rows to disk, and return the size of the file in bytes, from which `opened` can resume."""
         ...
 
     def close(self, scalars: Mapping[str, Any]) -> None:
-        """Complete the file; ``scalars`` are further arrays of a ``.npz``."""
+        """Complete the file; ``scalars`` are additional arrays of a ``.npz``."""
         ...
 
     def clean(self) -> None:
@@ -104,7 +104,7 @@ class CsvTable:
             self._file.close()
 
     def clean(self) -> None:
-        """See `TableFile`; there are no further files."""
+        """See `TableFile`; a ``.csv`` has no further files."""
 
     def discard(self) -> None:
         """See `TableFile`."""
@@ -177,7 +177,7 @@ def _opened(path: Path, size: int | None) -> BinaryIO:
 
 
 def _discarded(file: BinaryIO, path: Path) -> None:
-    with suppress(OSError):  # closing flushes rows that a full disk cannot take
+    with suppress(OSError):  # closing flushes rows, which fails if the disk is full
         file.close()
     with suppress(OSError):
         path.unlink()

@@ -1,7 +1,7 @@
-"""States at given times, each by a further step of the same method from a state nearby.
+"""States at given times, each reached by a further step of the same method from a nearby state.
 
-A step of any size is a Poisson map and stays on its leaf. With a monitor, steps have a given size in τ; the size that
-takes a given time is found by the secant method, to rounding.
+A step of any size is a Poisson map and stays on its leaf. With a monitor, steps have a given size in τ; the size for a
+given time is found by the secant method, up to rounding.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from phigen.runtime.session import Session
 
 
 class Clocked(Protocol):
-    """The interface of sessions that this module needs: see `phigen.runtime.session.Followed`."""
+    """Interface of sessions that this module needs; see `phigen.runtime.session.Followed`."""
 
     @property
     def steps(self) -> int: ...
@@ -30,15 +30,15 @@ class Clocked(Protocol):
 
 C = TypeVar("C", bound=Clocked)
 
-#: Largest number of secant iterations; they converge in four to seven.
+#: Largest number of secant iterations; four to seven are usual.
 MAX_SECANTS = 30
-#: Times are equal if they differ by at most this number of roundings, relative to their size.
+#: Largest difference of times that count as equal, in units of rounding relative to their size.
 _ROUNDINGS = 8
 EQUAL = float(_ROUNDINGS * np.finfo(float).eps)
 
 
 def reached(session: C, h: float, span: float) -> tuple[C, float]:
-    """Return a copy of a session after one further step that takes the time ``span``, and the size of that step.
+    """Return a copy of a session after a further step that takes the time ``span``, and the size of this step.
 
     ``h`` is the size of a whole step. Raises `BackendError`.
     """
@@ -48,7 +48,7 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
     target = begin + span
     rounded = _ROUNDINGS * session.rounding * max(abs(begin), abs(span))
     size, lower_size, missed_before = h, 0.0, -span
-    while True:  # halve the first step until it succeeds
+    while True:  # the first step is halved until it succeeds
         try:
             copy = _moved(session, size)
             break
@@ -80,7 +80,7 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
 def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
     """Return the number of whole steps in a span of time, and the rest of the span.
 
-    If a step fails within the span, the number includes that step, so that the caller meets the same failure.
+    If a step fails within the span, it is counted too, so that the same step fails for the caller.
     """
     if not np.isfinite(session.time()):
         whole_count = whole_steps(h, span)
@@ -105,9 +105,9 @@ def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
 
 
 def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C, float], object]) -> None:
-    """Advance a session by a span of time; the last step is a part of one.
+    """Advance a session by a span of time; the last step is shortened.
 
-    ``see`` receives every stride-th session and the last, each with its τ. Raises `BackendError`.
+    ``see`` receives the session and its τ at every stride-th step and at the end. Raises `BackendError`.
     """
     see(session, 0.0)
     steps_done = 0
@@ -159,7 +159,8 @@ def states_at(session_at: Callable[[int], Session], t: Floats, x: Floats, h: flo
 
 
 def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -> None:
-    """Make steps for the time ``span``: whole steps of size h, then a part of one. For steps equal in time."""
+    """Make steps for the time ``span``: whole steps of size h, then a part of a step. The steps must be equal in
+    time."""
     step = float(np.copysign(h, span))
     whole_count = whole_steps(step, span)
     advance(step, whole_count)
@@ -169,7 +170,7 @@ def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -
 
 
 def moved_on(session: C, h: float, span: float) -> C:
-    """Return the session after the time ``span``, in whole steps and a part of one. Raises `BackendError`."""
+    """Return the session after the time ``span``, by whole steps and a part of a step. Raises `BackendError`."""
     step = np.copysign(h, span)
     if not np.isfinite(session.time()):
         advance_by(span, h, session.advance)
@@ -188,7 +189,8 @@ def moved_on(session: C, h: float, span: float) -> C:
 
 
 def whole_steps(h: float, span: float) -> int:
-    """Return the number of whole steps in a span of time; a step that the span misses only by rounding counts."""
+    """Return the number of whole steps in a span of time. A last step that exceeds the span only by rounding is
+    counted."""
     ratio = span / h
     return round(ratio) if abs(ratio - round(ratio)) <= 1e-12 * max(1.0, abs(ratio)) else max(0, int(np.floor(ratio)))
 

@@ -29,8 +29,8 @@ BASE_FLAGS = ("-std=c99", "-O3", "-fPIC", "-shared")
 
 #: Flags for this processor, each used if the compiler accepts it. Fused multiply-adds change results by round-off only:
 #: the compensated sums of the generated code contain no product that could be fused. The generated code does not read
-#: floating-point exceptions. Without traps, gcc may divide by 0 in a SIMD lane whose value is not used, and vectorises
-#: loops over pairs without AVX-512 too.
+#: floating-point exceptions. Without traps gcc may divide by 0 in a SIMD lane whose value is not used, and so
+#: vectorises loops over pairs without AVX-512 too.
 TUNING_FLAGS = ("-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
 
 #: Flag for threads, which only lattices use.
@@ -40,7 +40,8 @@ OPENMP = "-fopenmp"
 TIMEOUT = 300.0
 
 _CANDIDATES = ("cc", "gcc", "clang")
-#: Python package with a C compiler, and the time limit of its trial in seconds: its first run compiles its runtime.
+#: Python package with a C compiler, and the time limit of its trial in seconds: on its first run it compiles its
+#: runtime.
 _PACKAGE, _FIRST_TRIAL = "ziglang", 120.0
 _HINT = (
     "install gcc or clang, or the compiler of the package ziglang (pip install ziglang), or name one in the "
@@ -84,7 +85,7 @@ def find() -> Compiler:
     """Return the compiler named in CC, else the first of cc, gcc, clang and zig that compiles a one-line library.
 
     zig is that of the Python package ziglang. Raises `ToolchainError` if the compiler named in CC does not work, and
-    `NoCompilerError` if none of the others does; the messages say why.
+    `NoCompilerError` if none of the others works; the messages give the reasons.
     """
     configured = os.environ.get("CC", "").strip()
     if configured:
@@ -168,7 +169,8 @@ def _command(configured: str) -> tuple[str, ...]:
 
 
 def _examined(command: tuple[str, ...]) -> Compiler | str:
-    """Return the compiler of a command, or why it does not work, as the end of a sentence about it."""
+    """Return the compiler of a command, or the reason why it does not work, as the end of a sentence about the
+    compiler."""
     path = shutil.which(command[0])
     if path is None:
         return "is not a program" if shutil.which(command[0], os.F_OK) else _NOT_FOUND
@@ -193,9 +195,9 @@ def _responding_compilers(command: tuple[str, ...]) -> Compiler | str:
 
 
 def _with_tuning_flags(command: tuple[str, ...], version: str, folder: Path) -> Compiler | str:
-    """Return the compiler with the tuning flags that it accepts, or why it compiles no library.
+    """Return the compiler with the tuning flags that it accepts, or the reason why it compiles no library.
 
-    All flags are tried at once, and one by one if that fails.
+    All flags are tried together, and one by one if that fails.
     """
     patience = _FIRST_TRIAL if _PACKAGE in command else _TRIAL_TIMEOUT
     source, library = folder / "trial.c", folder / "trial.so"
@@ -217,7 +219,7 @@ def _with_tuning_flags(command: tuple[str, ...], version: str, folder: Path) -> 
 def _compile_library(
     command: Sequence[str], flags: Sequence[str], sources: Sequence[Path], output: Path, timeout: float
 ) -> str:
-    """Compile a library; return "", or why there is none, as the end of a sentence about the compiler."""
+    """Compile a library. Return "" or the reason of the failure, as the end of a sentence about the compiler."""
     code, messages = _run([*command, *flags, *map(str, sources), "-o", str(output), "-lm"], timeout)
     if code:
         return _failure_text(code, messages)
@@ -270,7 +272,8 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
         return 126, f"it could not be started: {error.strerror or error}"
     with process:
         listener = threading.Thread(target=listen, args=(process.stdout,), daemon=True)
-        # A waiting thread returns at once when the process ends; `wait(timeout)` polls every twentieth of a second.
+        # The waiting thread returns as soon as the process ends, whereas `wait(timeout)` polls every twentieth of a
+        # second.
         waiter = threading.Thread(target=process.wait, daemon=True)
         listener.start()
         waiter.start()
@@ -279,7 +282,8 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
             if waiter.is_alive():
                 raise subprocess.TimeoutExpired(command, timeout)
             listener.join(_GRACE)
-        finally:  # on a keyboard interrupt too: processes of the new session do not receive the terminal's
+        # also after a keyboard interrupt: processes of the new session do not receive the signals of the terminal
+        finally:
             if waiter.is_alive() or listener.is_alive():
                 with contextlib.suppress(ProcessLookupError):
                     os.killpg(process.pid, signal.SIGKILL)

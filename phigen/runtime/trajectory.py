@@ -32,9 +32,10 @@ class Trajectory:
 
     ``t`` (rows,) are the times, ``x`` (rows, DIM) the states, ``energy`` (rows,) the values of H; ``casimirs`` and
     ``observables`` map names to values (rows,). There is a row for every stride-th of the ``steps`` steps of size
-    ``h``, and for the last. With a monitor, h is a step in τ and ``tau`` (rows,) the values of τ; else ``tau`` is
-    ``t``. ``retried`` are the numbers of steps that were made in parts. If the spec says ``reconstruct``, ``attitude``
-    is a quaternion (w, x, y, z) in each row (rows, 4), or a matrix (rows, n, n), and ``position`` is (rows, 3).
+    ``h``, and for the last step. With a monitor, h is a step in τ, and ``tau`` (rows,) are the values of τ; otherwise
+    ``tau`` is ``t``. ``retried`` are the numbers of steps that were made in parts. If the spec says ``reconstruct``,
+    ``attitude`` is a quaternion (w, x, y, z) in each row (rows, 4), or a matrix (rows, n, n), and ``position`` is
+    (rows, 3).
     """
 
     t: Floats
@@ -125,7 +126,7 @@ class Trajectory:
 
     @property
     def moving(self) -> frozenset[str]:
-        """The names among energy and Casimirs that time or forces change, so that their changes are not errors."""
+        """The names among energy and Casimirs that time or forces change; their changes are not errors."""
         return self.solver.interface.moving if self.solver else frozenset()
 
     def columns(self) -> list[Column]:
@@ -147,13 +148,13 @@ class Trajectory:
         )
 
     def scalars(self) -> dict[str, Any]:
-        """Return the entries of a ``.npz`` beside the columns: names of coordinates, steps, h and parameters."""
+        """Return the entries of a ``.npz`` besides the columns: names of coordinates, steps, h and parameters."""
         entries = {"coordinates": np.array(self.coordinates), "steps": self.steps, "h": self.h}
         return {**entries, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
 
 
 class Turned(NamedTuple):
-    """Result of `Solver.attitudes`: states, attitudes, and positions, None if the spec has none."""
+    """Result of `Solver.attitudes`: states, attitudes, and positions (None if the spec has none)."""
 
     x: Floats
     attitude: Floats
@@ -161,7 +162,8 @@ class Turned(NamedTuple):
 
 
 def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, Floats | None]:
-    """Split ``elements`` (…, numbers) into attitudes (…, *shape) and positions (…, 3), None if the system has none."""
+    """Split ``elements`` (…, numbers) into attitudes (…, *shape) and positions (…, 3); None for what the system
+    lacks."""
     if not interface.attitude:
         return None, None
     size = math.prod(interface.attitude)

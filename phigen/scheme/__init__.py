@@ -1,1 +1,1 @@
-"""The one-step map as a staged straight-line program."""
+"""The one-step map of a method as a staged straight-line program."""

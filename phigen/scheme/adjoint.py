@@ -1,10 +1,11 @@
-"""The transpose of a step: kernels that pull cotangents back, by reverse accumulation on the kernels of the step.
+"""The transpose of a step: kernels that propagate cotangents backwards, by reverse accumulation on the kernels of the
+step.
 
-From the cotangent of x' follow the cotangents of x and of the coefficients of the step. The latter are summed over the
-steps of a run, and ``prepare`` is pulled back once. *newton*: let a(y) + y = x, x' = x + d(y), J = 1 + a' and M = d',
+The cotangent of x' determines the cotangents of x and of the coefficients of the step. The latter are summed over the
+steps of a run, and ``prepare`` is transposed once. *newton*: let a(y) + y = x, x' = x + d(y), J = 1 + a' and M = d',
 with J and M of ``linearise``. If λ is the cotangent of x' and μ = J⁻ᵀ Mᵀ λ, the cotangent of x is λ + μ, and that of a
-coefficient is the derivative of λ·d − μ·a along it. *explicit* and flows: one reverse sweep. *path*: `adjoint_path`.
-*gauss*: `gauss_adjoint`.
+coefficient is the derivative of λ·d − μ·a with respect to it. *explicit* and flows: one reverse sweep. *path*:
+`adjoint_path`. *gauss*: `gauss_adjoint`.
 """
 
 from __future__ import annotations
@@ -41,10 +42,10 @@ def pulled_back(
     variables: Mapping[str, Sequence[str]],
     purpose: str,
 ) -> Kernel:
-    """Return the derivatives of Σ cotangent · value by some inputs of a kernel, over the values that have ``seeds``.
+    """Return the kernel of the derivatives of Σ cotangent · value with respect to some inputs of a kernel.
 
-    A seed ``bar`` adds an input ``bar``: the cotangents of its values. An array x in ``variables`` gives the output
-    ``x_bar``.
+    The sum runs over the values in ``seeds``. A seed ``bar`` adds an input ``bar``: the cotangents of its values. An
+    array x in ``variables`` yields the output ``x_bar``.
     """
     value = total(
         symbol(Symbol(seed, i)) * e for seed, values in seeds.items() for i, e in enumerate(values) if not e.is_zero
@@ -59,7 +60,7 @@ def pulled_back(
 
 
 def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression]) -> list[Expression]:
-    """Return the slopes with 1 - versin(a) for cos(a), if the values contain versin(a)."""
+    """Return the slopes with cos(a) written as 1 - versin(a), if the values contain versin(a)."""
     versine_arguments = {e.args[0] for e in topological(values) if e.op == "versin"}
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
@@ -71,7 +72,7 @@ def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression])
 
 
 def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
-    """Return the cotangents of coefficients, from λ (``increment_bar``) and −μ (``displacement_bar``)."""
+    """Return the kernel of the cotangents of coefficients, from λ (``increment_bar``) and −μ (``displacement_bar``)."""
     displacement, increment, *_ = linearise.outputs
     kernel = replace(linearise, inputs={**linearise.inputs, TABLE: coefficients.table})
     return pulled_back(
@@ -84,7 +85,7 @@ def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
 
 
 def explicit_adjoint(explicit: Kernel, coefficients: Coefficients, name: str = "explicit_adjoint") -> Kernel:
-    """Return the cotangents of state and coefficients, from that of the increment of a step or a flow."""
+    """Return the kernel of the cotangents of state and coefficients, from that of the increment of a step or a flow."""
     kernel = replace(explicit, inputs={**explicit.inputs, TABLE: coefficients.table})
     return pulled_back(
         kernel,
@@ -100,9 +101,9 @@ def gauss_adjoint(
 ) -> list[Kernel]:
     """Return the transposes of the kernels of a Gauss step.
 
-    The stages are Z_i = Σ_j μ_ij L_j with L_j = w_j f(x, Z_j), and x' = x + D(x, Σ_j L_j). From the cotangent λ of
-    x' follows ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of the unknowns and κ_i of the stage increments L_i satisfy ζ_i =
-    w_i (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j, which fixed-point sweeps solve, as for the stages.
+    The stages are Z_i = Σ_j μ_ij L_j with L_j = w_j f(x, Z_j), and x' = x + D(x, Σ_j L_j). Let λ be the cotangent of x'
+    and ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of the unknowns and κ_i of the stage increments L_i satisfy ζ_i = w_i
+    (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j. Fixed-point sweeps solve these equations, as for the stages.
 
     The first kernel is for a sweep. The second returns the contribution of a stage to the cotangents of the start of
     the step and of the coefficients. The third is the transpose of D.
@@ -132,7 +133,8 @@ def completed(
     refresh: Kernel | None,
     path: PathAdjoint | None = None,
 ) -> Adjoint:
-    """Return the transpose of a step. The table must be full, and ``prepare`` and ``refresh`` must exist."""
+    """Return the transpose of a step. The table of coefficients must be full; ``prepare`` and ``refresh`` are built
+    before."""
     differentiated = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):
         differentiated["gauge"] = (LEVEL,)
@@ -174,7 +176,7 @@ def _constant_coefficients(coefficients: Coefficients, differentiated: Mapping[s
 
 
 def _without(kernel: Kernel, constant: Sequence[bool]) -> Kernel:
-    """Return the kernel with zeros for the cotangents of constant coefficients."""
+    """Return the kernel with zeros as the cotangents of constant coefficients."""
     outputs = [
         replace(o, values=tuple(ZERO if is_constant else e for e, is_constant in zip(o.values, constant, strict=True)))
         if o.name == f"{TABLE}_bar"
@@ -185,7 +187,7 @@ def _without(kernel: Kernel, constant: Sequence[bool]) -> Kernel:
 
 
 def level_adjoint(system: System) -> Kernel:
-    """Return the gradient of H along state and parameters, on which the energy level e = −H(x₀) depends."""
+    """Return the gradient of H with respect to state and parameters, on which the energy level e = −H(x₀) depends."""
     variables = [*system.coordinates, *system.parameter_names]
     slopes = gradient(system.hamiltonian, variables)
     n = system.dimension
@@ -198,12 +200,12 @@ def level_adjoint(system: System) -> Kernel:
 
 
 def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, slopes: PathSlopes) -> PathAdjoint:
-    """Return the path integrated backward with its cotangents, and the transpose of its slope by the coefficients.
+    """Return the path integrated backwards with its cotangents, and the transpose of its slope along the coefficients.
 
-    Let λ be the cotangent of x' = m(1), and ν the cotangent of y = ∫ m dt. Along the path backwards, ȧ =
-    ∂(π(m)p)/∂mᵀ a + ν with the start a = λ. The cotangents are: of x, the end value of a; of p, ∫ π(m)ᵀ a dt; of a
-    coefficient c, ∫ ∂(a·π(m)p)/∂c dt. With p = ∇S_h(y), ν = Hess S_hᵀ ω for the cotangent ω of p, which gives a linear
-    equation for ω.
+    Let λ be the cotangent of x' = m(1), and ν the cotangent of y = ∫ m dt. Backwards along the path, ȧ = ∂(π(m)p)/∂mᵀ a
+    + ν with the initial value a = λ. The cotangents are: of x, the final value of a; of p, ∫ π(m)ᵀ a dt; of a
+    coefficient c, ∫ ∂(a·π(m)p)/∂c dt. With p = ∇S_h(y), ν = Hess S_hᵀ ω for the cotangent ω of p, which results in a
+    linear equation for ω.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]

@@ -27,7 +27,7 @@ _S10 = (
 
 @dataclass(frozen=True)
 class Alternation:
-    """A named method: α_1, …, α_2s, and their order."""
+    """A splitting method, given by its name, its order, and the fractions α_1, …, α_2s."""
 
     name: str
     order: int
@@ -35,12 +35,12 @@ class Alternation:
 
     @property
     def stages(self) -> int:
-        """s, the number of pairs of χ* and χ."""
+        """The number s of pairs of χ* and χ."""
         return len(self.fractions) // 2
 
 
 def _partitioned(name: str, order: int, halves: tuple[str, str]) -> Alternation:
-    """Return the method with the first halves of a_1, … and b_1, …, without their middles."""
+    """Return a method from the first halves of a_1, … and b_1, …; the middle values follow from Σa = Σb = 1."""
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     a = [*a, 1 - 2 * sum(a, Fraction(0)), *reversed(a)]
     remainder = Fraction(1, 2) - sum(b, Fraction(0))
@@ -84,13 +84,14 @@ def orders(name: str) -> list[int]:
 
 @dataclass(frozen=True)
 class Schedule:
-    """The flows of one step: part 0 for ``times[0]``, then ``stages`` times the ``pattern``.
+    """The flows of one step: part 0 for ``times[0]``, then ``stages`` repetitions of the ``pattern``.
 
-    The pattern lists parts with the row of ``times`` of each, counted from the first row of the stage. Kicks with
-    modified potential have a multiple in units of h² each: ``multiples`` by row, 0 for other flows. If H depends on
-    the time, ``moments`` has for each row the fraction of the step at which H is evaluated.
+    The pattern lists pairs: a part, and the row of ``times`` with the duration of its flow, counted from the first row
+    of the stage. Kicks with modified potential have ``multiples`` by row, in units of h²; other flows have 0. If H
+    depends on the time, ``moments`` has for each row the fraction of the step at which H is evaluated.
 
-    A run starts and ends with the flows ``begin`` and ``end`` (a corrector), whose rows follow those of the step.
+    A run starts with the flows ``begin`` and ends with the flows ``end`` (a corrector); their rows follow those of the
+    step.
     """
 
     times: tuple[float, ...]
@@ -103,27 +104,28 @@ class Schedule:
 
     @property
     def rows(self) -> int:
-        """Rows of ``times`` in one stage."""
+        """The number of rows of ``times`` in one stage."""
         of_step = len(self.times) - len(self.begin) - len(self.end)
         return (of_step - 1) // self.stages if self.stages else 0
 
     @property
     def flows(self) -> list[tuple[int, int]]:
-        """All flows of a step in order: part and row of ``times``."""
+        """All flows of a step in order, as pairs of a part and a row of ``times``."""
         later = [(part, 1 + k * self.rows + row) for k in range(self.stages) for part, row in self.pattern]
         return [(0, 0), *later]
 
     @property
     def flows_of_run(self) -> list[tuple[int, int]]:
-        """All flows of a run of one step, with its corrector."""
+        """All flows of a run of one step in order, with those of the corrector."""
         return [*self.begin, *self.flows, *self.end]
 
 
 def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
-    """Return the schedule of ``parts`` flows in which the first or the last part, ``carrier``, advances the time.
+    """Return the schedule with the fractions of the step at which its flows are evaluated; the flow ``carrier``
+    advances the time.
 
-    The conjugate e of the time, in H + e, belongs to the carrier. If no flow has this number, the carrier is the
-    flow of e alone, and is left out. All other parts are evaluated at a fixed time.
+    The carrier is the first or last of ``parts`` flows: the conjugate e of the time, in H + e, belongs to it. A carrier
+    equal to ``parts`` is the flow of e alone, which is left out. All other parts are evaluated at a fixed time.
     """
     clock, moments = Fraction(0), dict[int, Fraction]()
     for part, row in schedule.flows:
@@ -137,7 +139,7 @@ def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
 
 
 def schedule(method: Alternation, parts: int) -> Schedule:
-    """Return the flows of a step of a method; a single part has one exact flow."""
+    """Return the flows of a step of a method. A single part has one flow, which is exact."""
     if parts == 1:
         return Schedule((1.0,), 0, ())
     alpha = [*method.fractions, Fraction(0)]

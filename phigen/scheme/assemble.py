@@ -46,8 +46,8 @@ from phigen.symbolic.symbols import STEP
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
-#: Largest dimension in which paths are solved in SIMD lanes. In five and six the cost of derivatives outweighs the
-#: gain: measured, blocks take 0.6 to 1.9 times as long as single steps.
+#: Largest dimension in which paths are solved in SIMD lanes. In dimensions five and six the cost of derivatives
+#: outweighs the gain: blocks were measured to take 0.6 to 1.9 times as long as single steps.
 MAX_PATH_LANE_DIMENSION = 4
 
 
@@ -72,7 +72,7 @@ def build_program(
         attitude = stage_attitude(system, group, realisation, scheme.generating, gauge)
     lanes = solver.lanes and extras.offers("lanes", spec.profile)
     elapsed = elapsed_kernel(system, scheme.generating)
-    gauged_system = replace(system, forces=gauged.system.forces)  # with a monitor, step sizes are in τ
+    gauged_system = replace(system, forces=gauged.system.forces)  # with a monitor, the step size is in τ
     step = _step(gauged_system, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
     attitude = scheme.generating.coefficients.settled(attitude)
     level = level_adjoint(system) if gauge.monitor and extras.adjoint else None
@@ -130,7 +130,7 @@ def _step(
     if realisation.path:
         return _path(system, generating, gauge, inner, extras, lanes=lanes)
     coefficients = generating.coefficients
-    # A monitored step needs y, from which its physical time follows.
+    # A monitored step needs y: its physical time is a function of y.
     increment = None if gauge.monitor else explicit_kernel(system, realisation, generating, coefficients)
     if increment is None:
         linearise = linearise_kernel(system, realisation, generating, coefficients)
@@ -180,7 +180,7 @@ def _path(
 
 
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of all coefficients; it must be built last, when the table is full."""
+    """Return the kernel that computes all coefficients. It must be built last, when the table is full."""
     return Kernel(
         "prepare",
         "everything that depends on parameters and step size only",
@@ -192,7 +192,7 @@ def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel
 def _facts(
     system: System, realisation: BiRealisation, scheme: Discretisation, gauge: Gauge, step: Step, order: Order
 ) -> Iterator[str]:
-    """Yield the lines of the header; some may be empty."""
+    """Yield the lines of the header of generated files; some may be empty."""
     generating = scheme.generating
     series = "S_1" if scheme.terms == 1 else f"S_1 ... S_{scheme.terms}"
     terms = f", {generating.terms} terms" if generating.terms else ""
@@ -211,7 +211,7 @@ def _facts(
 
 
 def approximation(realisation: BiRealisation) -> list[str]:
-    """Return the header line for a solver that is Poisson up to truncation only; none for an exact bi-realisation."""
+    """Return the header line for a bi-realisation that is a truncation; no line for an exact one."""
     if realisation.exact:
         return []
     degree = realisation.degree

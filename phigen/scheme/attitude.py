@@ -1,4 +1,5 @@
-"""Kernels of attitudes: the group element of each stage from the covector p = ∇S_h(y), and the gauge rotation."""
+"""Kernels of attitudes: the group element of each stage from the covector p = ∇S_h(y), and the rotation by the
+gauge."""
 
 from __future__ import annotations
 
@@ -28,12 +29,12 @@ from phigen.symbolic.symbols import Symbol
 #: Description of the last entry of a covector of a matrix algebra.
 SIZE_OF_COVECTOR = "a bound for the square of its size"
 
-#: Bi-realisations with a known group element: the exponential, or the Cayley transform.
+#: Bi-realisations with a known group element: the exponential or the Cayley transform.
 KINDS = ("exponential", "karasev", "cayley")
 
 
 def expect_element(system: System, realisation: BiRealisation) -> None:
-    """Raise `SpecError` for a bi-realisation whose group element phigen does not know."""
+    """Raise `SpecError` for a bi-realisation without a known group element."""
     if realisation.kind not in KINDS or not realisation.exact:
         message = f"reconstruct: the bi-realisation {realisation.kind} has no group element that phigen knows"
         raise refused(system, message, "exponential and cayley have one")
@@ -42,7 +43,7 @@ def expect_element(system: System, realisation: BiRealisation) -> None:
 def stage_attitude(
     system: System, group: Group, realisation: BiRealisation, generating: GeneratingFunction, gauge: Gauge
 ) -> Attitude:
-    """Return the attitude of an implicit step; its coefficients go to the table of ``generating``."""
+    """Return the attitude of an implicit step. Its coefficients are added to the table of ``generating``."""
     coefficients, cayley = generating.coefficients, realisation.kind == "cayley"
     p, slope = list(generating.turning), "grad S_h(y), without the forces," if generating.free else "p = grad S_h(y)"
     values = coefficients.hoist(_element_less_one(group, p, cayley))
@@ -63,7 +64,8 @@ def stage_attitude(
 def gauss_attitude(
     system: System, group: Group, points: StageMap, coefficients: Coefficients, gauge: Gauge
 ) -> Attitude:
-    """Return the attitude of a Gauss step; its coefficients go to the table. Raises `SpecError` where there is none."""
+    """Return the attitude of a Gauss step. Its coefficients are added to the table. Raises `SpecError` if it has
+    none."""
     series = "scheme: series or splitting"
     if not points.realisation.exact:
         raise refused(
@@ -85,14 +87,17 @@ def gauss_attitude(
 
 
 def _path_element_kernel(group: Group, system: System) -> Kernel:
-    """Return the kernel of the element of a path, where p is known but y is not."""
-    p = [symbol(c) for c in system.coordinates]  # names of the arguments; the kernel does not depend on x
+    """Return the kernel of the group element of a path, as a function of p."""
+    p = [symbol(c) for c in system.coordinates]  # the names of the inputs; the kernel does not depend on x
     inputs = {"p": system.coordinates}
     return Kernel("along", "the increment of p", inputs, (Output("turn", tuple(_element_less_one(group, p, False))),))
 
 
 def _element_less_one(group: Group, p: list[Expression], cayley: bool) -> list[Expression]:
-    """Return the element of p minus 1; for exponentials of matrices p itself, and a bound for its squared norm."""
+    """Return the group element of p, minus 1.
+
+    For exponentials of matrices, return p and a bound for its squared norm.
+    """
     if not group.matrices:
         return [*element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=cayley)]
     return cayley_transform(group, p) if cayley else [*p, size_of(group, p)]
@@ -115,10 +120,10 @@ def flow_attitude(
     coefficients: Coefficients,
     time_of: Callable[[Flow], Expression] | None = None,
 ) -> Attitude:
-    """Return the attitude of a splitting; its coefficients go to the table. Raises the errors of `turnings`.
+    """Return the attitude of a splitting. Its coefficients are added to the table. Raises the errors of `turnings`.
 
-    ``moved`` are the increments of the sources of noise, then of the ``flows``. With a monitor, ``time_of``
-    returns the physical time of a flow.
+    ``increments`` are those of the sources of noise, then those of the ``flows``. With a monitor, ``time_of`` returns
+    the physical time of a flow.
     """
     flow_rotations = turnings(system, group, flows, put_back=uniform(system))
     noise_rotations = [turning_of(system, group, s.hamiltonian, s.name, put_back=False) for s in system.noise]
@@ -140,18 +145,18 @@ def flow_attitude(
 
 
 def _carrier(group: Group) -> tuple[Symbol, ...]:
-    """Return the symbols of the product of the elements of the flows of a step so far, minus 1."""
+    """Return the symbols of the product of the group elements of the flows since the start of the step, minus 1."""
     return tuple(Symbol("element", i) for i in range(group.size))
 
 
 def _element_after_flow(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
-    """Return the element minus 1 after one more flow."""
+    """Return the product of the group elements, minus 1, after a further flow."""
     element_before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
     return joined(group, [element_before, joined(group, factors)]) if factors else element_before
 
 
 def uniform(system: System) -> bool:
-    """Whether the Casimirs rotate a body uniformly, in the frame where momenta are constant."""
+    """Whether the Casimirs rotate a body with constant velocity in the frame in which momenta are constant."""
     monitored = system.spec is not None and system.spec.monitor is not None
     return not (system.forces or system.time or monitored)
 
@@ -159,9 +164,10 @@ def uniform(system: System) -> bool:
 def rate_kernel(
     system: System, group: Group, gauge: Gauge, further_gradients: Sequence[Expression] = ()
 ) -> Kernel | None:
-    """Return the gradient of the Casimirs that the gauge subtracts from H, plus further gradients; None without any.
+    """Return the kernel of the gradient of the Casimirs that the gauge subtracts from H, plus ``further_gradients``.
 
-    With a monitor or forces the gauge must subtract none: the rotation would not be uniform.
+    None if both are empty. With a monitor or forces the gauge must subtract no Casimirs: the rotation would not be
+    uniform.
     """
     subtracted = [e for e in further_gradients if not e.is_zero]
     subtracted += [symbol(s) * system.casimirs[c] for s, c in zip(gauge.multiples, gauge.free, strict=True)]

@@ -11,10 +11,10 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 
 
 def over_ends(gather: Gather) -> list[tuple[Ends, frozenset[str]]]:
-    """The loops over the bonds of a site, each with the parameters that have the opposite sign at the end b.
+    """Return the loops over the bonds of a site, each with the parameters that have the opposite sign at the end b.
 
-    Parameters at bonds may depend on the direction of a bond. If the contribution at the end b is proved to be that
-    at the end a with some signs reversed, one loop serves both.
+    Parameters at bonds may depend on the direction of a bond. If the contribution at the end b is proved to be that at
+    the end a with some signs reversed, one loop is sufficient for both ends.
     """
     apart = [(e, frozenset[str]()) for e in gather.ends]
     if len(apart) != 2 or gather.ends[0].chosen != gather.ends[1].chosen:

@@ -1,8 +1,8 @@
 """Choice of the composition of a splitting: by the order, the brackets of its parts, and the cost of its flows.
 
-If {V, {V, {V, T}}} = 0 for one of two parts as V, the methods of `phigen.scheme.nystrom` apply, with modified kicks
-if V + κ{V, {V, T}} has a flow. The cost of reaching an accuracy is proportional to the cost of a step times
-error^{1/order}; of the methods that apply, the one with the least such product is chosen. Other splittings get the
+If {V, {V, {V, T}}} = 0 for one of two parts as V, the methods of `phigen.scheme.nystrom` apply; if V + κ{V, {V, T}} has
+a flow, also those with modified kicks. The cost of an accuracy is proportional to the cost of a step times
+error^{1/order}; of the applicable methods, the one with the least product is chosen. Other splittings get the
 recommended alternation.
 """
 
@@ -28,17 +28,17 @@ from phigen.splitting.statements import bracket
 from phigen.symbolic.expression import gradient, symbols_of
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Operations that a flow costs beyond its formulas, for each coordinate that it updates: mostly the latency of the flow
-#: before. Fitted to timings: of fourteen pairs of methods on seven systems the faster one is chosen in twelve, and in
-#: the other two the chosen one takes at most 1.34 times as long.
+#: Cost of a flow, in operations, for each coordinate that it updates, in addition to the cost of its formulas: mostly
+#: the latency of the flow before. Fitted to timings: of fourteen pairs of methods on seven systems, the faster one is
+#: chosen in twelve; in the other two, the chosen one takes at most 1.34 times as long.
 FLOW_LATENCY = 12
 
 
 @dataclass(frozen=True)
 class ScheduledMethod:
-    """A method with the flows in the order of its steps, including modified kicks; ``why`` is for the user.
+    """A method with the flows in the order of its steps, including modified kicks; ``why`` is the reason, for the user.
 
-    Where H depends on the time, the time advances with the flow ``carrier``, or by itself if no flow has that number.
+    If H depends on the time, the time advances with the flow ``carrier``, or by itself if no flow has that number.
     """
 
     order: Order
@@ -60,22 +60,22 @@ class ScheduledMethod:
 
 
 class Host(Protocol):
-    """A spec or a system whose parts are composed."""
+    """The object whose parts are composed, a spec or a system; errors name places in its spec."""
 
     @property
     def locations(self) -> Mapping[tuple[Any, ...], Location]:
-        """Places of its keys in the spec."""
+        """The places of keys in the spec, by path."""
         ...
 
 
 def plan(system: System, splitting: SplitHamiltonian, requested: int, composition: str) -> ScheduledMethod:
-    """Return the method that gives an order; odd orders round up.
+    """Return the method of the ``requested`` order; odd orders round up.
 
     Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
     """
     if splitting.small is not None and _unsuited(system, splitting, splitting.small):
         splitting = replace(splitting, small=None)
-    if system.forces:  # with forces no part can be V
+    if system.forces:  # with forces no part can be a V
         choice = planned(system, splitting, requested, composition, lambda: ())
         return with_carrier(choice, system.time) if system.time else choice
     if not system.time:
@@ -86,12 +86,19 @@ def plan(system: System, splitting: SplitHamiltonian, requested: int, compositio
 
 
 def _unsuited(system: System, splitting: SplitHamiltonian, small: int) -> bool:
-    """Whether there are forces, or A depends on the time: then the conjugate of the time must belong to A."""
+    """Whether a method for near-integrable systems does not apply: there are forces, or A (not ``small``) depends on
+    the time.
+
+    The conjugate of the time must belong to A.
+    """
     return len(splitting.flows) != 2 or (bool(system.time) and is_dated(splitting.flows[1 - small], system.time))
 
 
 def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
-    """Return the parts that can be V beside T + e: T must not depend on the time, and V must commute with ∂V/∂t."""
+    """Return the parts that can be a V with T + e in place of T.
+
+    T must not depend on the time, and V must commute with ∂V/∂t.
+    """
     kicks_found = []
     for kick in kicks(system.frozen, splitting):
         drift, v = splitting.flows[1 - kick.part], splitting.flows[kick.part].hamiltonian
@@ -102,9 +109,10 @@ def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
 
 
 def with_carrier(choice: ScheduledMethod, time: str) -> ScheduledMethod:
-    """Return the choice with the flow that carries the time: the first or last, independent of the time.
+    """Return the choice with its ``carrier``, the flow that advances the time: the first or last, independent of the
+    time.
 
-    Else the time advances by itself, in place of a last part.
+    If no such flow exists, the time advances by itself, in place of a last part.
     """
     flows = choice.splitting.flows
     if isinstance(choice.method, Nystrom):
@@ -128,7 +136,7 @@ def is_dated(flow: Flow, time: str) -> bool:
 def planned(
     system: Host, splitting: SplitHamiltonian, requested: int, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> ScheduledMethod:
-    """Return the method as `plan` does; ``kicks_of`` returns the parts that can be V."""
+    """Return the method as `plan` does; ``kicks_of`` returns the parts that can be the V of a Nyström method."""
     even_order = requested + requested % 2
     note = "" if even_order == requested else f"order {requested} was asked for; a symmetric method has even order"
     order = Order(even_order, 0, note)
@@ -154,9 +162,9 @@ def planned(
 
 
 def _near_integrable(splitting: SplitHamiltonian, order: Order, method: NearIntegrable) -> ScheduledMethod:
-    """Return the choice of a method for H = A + εB, with the flow of A first.
+    """Return the choice of a method for H = A + εB, in which the flow of A comes first.
 
-    Between correctors, which begin and end with a flow of A, a step is a flow of B and one of A.
+    Correctors begin and end with a flow of A. Between correctors, a step is a flow of B and one of A.
     """
     assert splitting.small is not None
     large_flow, small_flow = splitting.flows[1 - splitting.small], splitting.flows[splitting.small]
@@ -168,7 +176,8 @@ def _near_integrable(splitting: SplitHamiltonian, order: Order, method: NearInte
 
 
 def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMethod:
-    """Return the choice with the flow of B + κ{B, {B, A}} if the method takes it. Raises `SpecError` without one."""
+    """Return the choice with the flow of B + κ{B, {B, A}}, if the method uses it. Raises `SpecError` if there is no
+    such flow."""
     method = choice.method
     if not isinstance(method, Corrected) or not method.multiple:
         return choice
@@ -182,7 +191,7 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
 
 
 def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) -> SpecError:
-    """Return the error for a method for near-integrable systems that does not apply."""
+    """Return the error for a near-integrable method on a splitting without a small part."""
     count = len(splitting.flows)
     situation = "none is known to be small" if count == 2 else f"here {'is one' if count == 1 else f'are {count}'}"
     message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {situation}"
@@ -196,16 +205,17 @@ def chosen(splitting: SplitHamiltonian, order: Order, method: Nystrom, kick: Kic
 
 
 def orders(composition: str) -> list[int]:
-    """Return the orders of the methods of this name."""
+    """Return the orders of the methods called ``composition``."""
     if composition in near_integrable.NAMES:
         return near_integrable.orders(composition)
     return nystrom.orders(composition) if composition in nystrom.NAMES else alternation.orders(composition)
 
 
 def arranged(splitting: SplitHamiltonian) -> SplitHamiltonian:
-    """Return the parts in the order in which an alternation is cheapest: the costliest last.
+    """Return the parts in the order in which an alternation is cheapest: the most expensive part last.
 
-    In each stage the last part has one flow, as has the first, with one more in the step; the others have two.
+    The last part has one flow in each stage, the first part one in each stage and one more in the step. All other parts
+    have two in each stage.
     """
     by_cost = sorted(splitting.flows, key=lambda flow: cost(flow.increment))
     return SplitHamiltonian((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))
@@ -220,7 +230,10 @@ def _applicable(kicks_of: Callable[[], Sequence[Kick]], order: int, name: str) -
 
 
 def _price(splitting: SplitHamiltonian, method: Nystrom, kick: Kick) -> float:
-    """Return the cost of a step times error^{1/order}, proportional to the cost of a time at a given accuracy."""
+    """Return the cost of a step times error^{1/order}.
+
+    This is proportional to the computing time for a given accuracy.
+    """
     first, last = (_cost(flow) for flow in _arranged(splitting, method, kick).flows)
     step = (method.stages + 1) * first + method.stages * last
     return step * math.pow(method.error, 1 / method.order)
@@ -238,7 +251,7 @@ def _arranged(splitting: SplitHamiltonian, method: Nystrom, kick: Kick) -> Split
 
 
 def _why(method: Nystrom) -> str:
-    """Return the condition under which a method applies."""
+    """Return the condition under which a method applies, as text."""
     v, t = ("H_1", "H_2") if method.kicks_first else ("H_2", "H_1")
     modified = f" and {v} + κ{{{v}, {{{v}, {t}}}}} has a flow" if method.multiples else ""
     return f"{{{v}, {{{v}, {{{v}, {t}}}}}}} = 0{modified}"
@@ -259,7 +272,7 @@ def _no_order(system: Host, composition: str, offered_orders: Sequence[int], ord
 def _not_applicable(
     system: Host, splitting: SplitHamiltonian, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> SpecError:
-    """Return the error for a method for kicks that does not apply."""
+    """Return the error for a Nyström method on parts without a V."""
     count = len(splitting.flows)
     if count != 2:
         reason = f"H = T + V, of two parts; here there {'is one' if count == 1 else f'are {count}'}"

@@ -1,8 +1,8 @@
-"""Collected polynomials: monomials in state-dependent variables over state-independent coefficients.
+"""Collected polynomials: monomials in state-dependent variables with state-independent coefficients.
 
 The coefficients are expressions in parameters and step size. Differentiation multiplies them by integers or by
-coefficients of the generators' derivatives, so the coefficients of a gradient and a Hessian share those
-of the function itself, and ``prepare`` computes each of them once.
+coefficients of the generators' derivatives. So the coefficients of a gradient and a Hessian are those of the function
+itself, and ``prepare`` computes each of them once.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Collected:
 
     @cached_property
     def _moving(self) -> list[list[int]]:
-        """The variables that depend on a coordinate, for each coordinate."""
+        """For each coordinate, the indices of the variables that depend on it."""
         return [[v for v, row in enumerate(self.slopes) if row[j]] for j in range(len(self.slopes[0]))]
 
     def derivative(self, terms: Terms, j: int) -> Terms:
-        """Return the total derivative along coordinate j."""
+        """Return the total derivative with respect to coordinate j."""
         result: dict[Monomial, Expression] = {}
         moving = self._moving[j]
         for m, c in terms.items():
@@ -46,7 +46,7 @@ class Collected:
         return {m: c for m, c in result.items() if not c.is_zero}
 
     def cells(self, terms: Terms, j: int) -> int:
-        """Return the number of exponents that `derivative` would write, to which its time is proportional."""
+        """Return the number of exponents that `derivative` would write; its time is proportional to this number."""
         wide = [len(row[j]) for row in self.slopes]
         return sum(wide[v] for m in terms for v in self._moving[j] if m[v]) * len(self.variables)
 
@@ -58,10 +58,10 @@ class Collected:
 def collect(
     tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], times: Sequence[str] = ()
 ) -> tuple[Collected, list[Terms]]:
-    """Return elements of a tower as collected polynomials, with the ring that differentiates them.
+    """Return elements of a tower as collected polynomials, and the ring that differentiates them.
 
-    Coefficients that depend on ``times`` are polynomials in the dated variables, whose coefficients depend on
-    parameters only.
+    Coefficients that depend on ``times`` become polynomials in time-dependent variables, with coefficients that depend
+    on parameters only.
     """
     state, dated = _state(tower, coordinates), _state(tower, times)
     static = [i for i in range(len(tower.names)) if i not in state and i not in dated]
@@ -90,7 +90,8 @@ def cells(tower: Tower, elements: Sequence[Poly]) -> int:
 
 
 def exceeds(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], max_monomials: int) -> bool:
-    """Whether the collected elements have more than ``max_monomials`` monomials in all; much faster than `collect`."""
+    """Whether the collected elements have more than ``max_monomials`` monomials in total. Much faster than
+    `collect`."""
     state, count = _state(tower, coordinates), 0
     if sum(map(len, elements)) <= max_monomials:
         return False

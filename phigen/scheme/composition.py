@@ -1,8 +1,8 @@
 """Symmetric compositions: a step of high order from steps of a symmetric method of order 2.
 
 Φ_h = φ_{γ_s h} ∘ … ∘ φ_{γ_1 h} with γ_i = γ_{s+1−i}. A composition of Poisson maps is a Poisson map, and one of
-symmetric methods with symmetric coefficients is symmetric. Coefficients as in E. Hairer, C. Lubich, G. Wanner,
-Geometric Numerical Integration, 2nd ed., section V.3.2, where their authors are named.
+symmetric methods with symmetric coefficients is symmetric. The coefficients are those in E. Hairer, C. Lubich, G.
+Wanner, Geometric Numerical Integration, 2nd ed., section V.3.2, which names their authors.
 """
 
 from __future__ import annotations

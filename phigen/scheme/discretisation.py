@@ -25,30 +25,31 @@ from phigen.symbolic.symbols import STEP
 #: Largest number of operations in one kernel.
 MOST_OPERATIONS = limits.OPERATIONS
 
-#: Alternative to a lower order in the hint of an error about size.
+#: Alternative to a lower order, in the hint of an error about size.
 _ALTERNATIVE = "for scheme: splitting, "
 
-#: Cost of gradient and Hessian below which the direct series is taken without a comparison: its error is smaller.
+#: Cost of gradient and Hessian below which the direct series is chosen without a comparison: its error is smaller.
 MIN_COST_TO_COMPOSE = 2_000
 
-#: Largest ratio of the costs of a direct series and a composition; the direct series has a smaller error constant.
+#: Largest accepted ratio of the costs of the direct series and of a composition. The direct series has a smaller error
+#: constant.
 MAX_DIRECT_COST_RATIO = 4
 
-#: Largest number of terms for which the graph form is tried; with more, only the collected form is.
+#: Largest number of terms for which the graph form is tried; with more terms, only the collected form is tried.
 MAX_GRAPH_TERMS = 5
 
 
 def formal_alpha(system: System, realisation: BiRealisation, terms: int) -> tuple[Expression, ...]:
-    """Return the source map for S_1 … S_terms; for paths, its series to the degree that the terms need."""
+    """Return the map α for S_1 … S_terms; for paths, its series up to the degree that the terms need."""
     return tuple(karasev.series(system, terms - 1)) if realisation.path and terms > 1 else realisation.alpha
 
 
 def hamilton_jacobi(
     system: System, realisation: BiRealisation, max_terms: int, static: Sequence[str] = ()
 ) -> HamiltonJacobi:
-    """Return the series of a system; its tower contains the step size and other ``static`` symbols too.
+    """Return the Hamilton–Jacobi series of a system; its tower also contains the step size and the ``static`` symbols.
 
-    The tower is large enough for terms up to S_most.
+    The tower is large enough for terms up to S_max_terms.
     """
     return HamiltonJacobi(
         system.hamiltonian,
@@ -66,7 +67,7 @@ def generating_function(
 ) -> GeneratingFunction:
     """Return ∇S_h and Hess S_h in the cheapest form. Raises `LimitError` if every form is too large.
 
-    The series is that of K if there is a ``monitor``, but with forces that of H.
+    With a ``monitor`` the series is that of K, but with forces that of H.
     """
     if monitor and system.forces:
         return forced_form(system, monitor, series.static)
@@ -106,7 +107,7 @@ def _noise(system: System) -> list[Expression]:
 
 @dataclass(frozen=True)
 class Discretisation:
-    """The terms of the series in one stage, and the stages of a step."""
+    """The number of terms of the series in a stage, the stages of a step, and the generating function of a stage."""
 
     generating: GeneratingFunction
     terms: int
@@ -124,11 +125,11 @@ def discretise(
     *,
     affordable: bool = False,
 ) -> Discretisation:
-    """Return the direct series, or a composition of the method of order 2 if the spec asks for it or it is cheaper.
+    """Return the direct series, or a composition of the method of order 2.
 
-    ``auto`` composes only if the direct series is beyond the budget, or costs more than `MAX_DIRECT_COST_RATIO` times
-    the stages of a composition, since its error constant is much smaller. ``affordable`` says that
-    `expect_affordable` has passed already.
+    A composition is chosen if the spec asks for one. With ``auto`` it is chosen only if the direct series is beyond the
+    budget, or costs more than `MAX_DIRECT_COST_RATIO` times the stages of the composition, since the direct series has
+    a much smaller error constant. ``affordable`` says that `expect_affordable` has already passed.
     """
     if system.noise:
         expect_noise(system, realisation, order, composition)
@@ -136,7 +137,7 @@ def discretise(
         return _forced(system, realisation, series, order, composition, monitor)
     if not affordable:
         expect_affordable(system, realisation)
-    series.reach(order.order)  # S_{k+1} = 0 gives a symmetric method the order k + 1, which will be proved
+    series.reach(order.order)  # S_{k+1} = 0 raises the order of a symmetric method to k + 1; it is proved later
     if composition not in ("auto", "none"):
         return _composed(system, realisation, series, order, composition)
     can_compose = composition == "auto" and series.symmetric and find("auto", order.order) is not None
@@ -155,7 +156,7 @@ def discretise(
 
 
 def expect_noise(system: System, realisation: BiRealisation, order: Order, composition: str) -> None:
-    """Raise `SpecError` where the noise would be split among stages, or its integral is not Stratonovich's."""
+    """Raise `SpecError` if the noise would be divided among stages, or if its integral would not be Stratonovich's."""
     reason, hint = "", ""
     if not realisation.symmetric:
         reason = f"noise needs a symmetric bi-realisation; {realisation.kind} is not"
@@ -180,7 +181,7 @@ def _forced(
     composition: str,
     monitor: Expression | None,
 ) -> Discretisation:
-    """Return the discretisation with p = h(∇H + ζ), of order 2 by symmetry; higher orders are compositions."""
+    """Return the discretisation with p = h(∇H + ζ), which has order 2 by symmetry; higher orders are compositions."""
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
         reason = f"forces: a vector needs a bi-realisation in closed form; {realisation.kind} follows paths"
         place = system.locations.get(("forces", "vector"))
@@ -220,12 +221,12 @@ def _composed(
 
 
 def is_large(system: System) -> bool:
-    """Whether S_1 of a system of this dimension may be too large, so that `expect_affordable` counts its terms."""
+    """Whether S_1 of a system of this dimension may be too large; then `expect_affordable` counts its terms."""
     return may_have(system.dimension, MOST_OPERATIONS)
 
 
 def expect_affordable(system: System, realisation: BiRealisation) -> None:
-    """Raise `LimitError` if S_1 = H alone is too large, before any other term is computed."""
+    """Raise `LimitError` if S_1 = H is too large; no other term is computed before."""
     if not is_large(system):
         return
     index = {c: i for i, c in enumerate(system.coordinates)}
@@ -238,7 +239,7 @@ def expect_affordable(system: System, realisation: BiRealisation) -> None:
 def _afforded(
     system: System, realisation: BiRealisation, series: HamiltonJacobi, terms: int, monitor: Expression | None = None
 ) -> GeneratingFunction:
-    """Return the `generating_function`; `LimitError` if the Newton step is too large with it."""
+    """Return the `generating_function`. Raises `LimitError` if the Newton step with it is too large."""
     generating = generating_function(system, series, terms, monitor)
     absent = {c for c, slope in zip(system.coordinates, generating.slope, strict=True) if slope.is_zero}
     hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in generating.hessian]
@@ -258,7 +259,7 @@ def _expect_few(
 
 
 def too_large(system: System, reason: str, alternative: str = _ALTERNATIVE) -> LimitError:
-    """Return the error for a program beyond the budget; ``alternative`` is an alternative to a lower order."""
+    """Return the error for a program beyond the budget. The hint names a lower order and the ``alternative``."""
     hint = f"ask for a lower order, {alternative}or for fewer terms in H"
     return LimitError([Diagnostic(reason, system.locations.get(("order",)), hint)])
 

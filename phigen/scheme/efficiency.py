@@ -1,10 +1,9 @@
 """A model of the cost of steps, to compare schemes: the time of a step, and the step size for a given accuracy.
 
-The time is estimated from the operations of a program. The accuracy is the typical one of an order: an orbit error
-of 10^(−order) over a few turns. Step sizes are relative to Gauss collocation of the same order, which has 1. The
-numbers were fitted to measured pairs of system and order, on a processor with vectors of eight doubles: twelve systems,
-rigid bodies, tops, spins, vortices, species, in dimensions 2 to 15, at the orders 4, 8 and 12. `phigen tune` measures
-instead.
+The time is estimated from the operations of a program. The accuracy is typical for an order: an orbit error of
+10^(−order) over a few turns. Step sizes are relative to those of Gauss collocation of the same order. The numbers were
+fitted to measurements of twelve systems (rigid bodies, tops, spins, vortices, species) in dimensions 2 to 15 at the
+orders 4, 8 and 12, on a processor with vectors of eight doubles. `phigen tune` measures instead.
 """
 
 from __future__ import annotations
@@ -18,29 +17,31 @@ from phigen.scheme.program import Program
 from phigen.scheme.step_kinds import GAUSS, NEWTON, PATH, StepKind
 from phigen.scheme.steps import Gauss
 
-#: Nanoseconds of an operation in straight-line code, and of a function: from a library, or by a polynomial in a lane.
+#: Nanoseconds of an operation in straight-line code, and of a function (from a library, or a polynomial in a lane).
 OPERATION, FUNCTION = 0.5, 7.0
-#: Nanoseconds of an explicit step besides its operations: the sums of coordinates, and the latency of the flows.
+#: Nanoseconds of an explicit step in addition to its operations: the sums of coordinates, and the latency of the flows.
 EXPLICIT_STEP = 25.0
-#: Flows of many coordinates do not all wait for one another: the time of their operations is divided by the dimension
-#: over the first number, at least 1 and at most the second. Of the tops and so(4) it was 2.4 times too large otherwise.
+#: Flows of many coordinates do not all wait for one another. The time of their operations is divided by the dimension
+#: over WAITING_COORDINATES, at least 1 and at most MOST_PARALLEL. Without this, the estimates for tops and so(4) were
+#: 2.4 times too large.
 WAITING_COORDINATES, MOST_PARALLEL = 2.6, 2.4
-#: Nanoseconds of an operation in a Newton iteration, with several lanes; the number of operations that still fit the
-#: caches.
+#: Nanoseconds of an operation in a Newton iteration with several lanes, the number of operations that fit into the
+#: caches, and nanoseconds of the operations beyond that number.
 NEWTON_OPERATION, CACHED_OPERATIONS, UNCACHED_OPERATION = 0.04, 3000, 0.1
 #: Nanoseconds of a step by Newton's method for each entry of its matrix.
 NEWTON_ENTRY = 8.0
-#: Nanoseconds of an operation at eight stages in lanes, and of a function, in all sweeps of a step; of a step besides
-#: these, and of a change of frame. Steps with up to four stages take half of the time of operations.
+#: Nanoseconds, in all sweeps of a Gauss step, of an operation at eight stages in lanes and of a function; nanoseconds
+#: of the rest of a step, and of a change of frame. With up to four stages, operations take half of the time.
 STAGE_OPERATION, STAGE_FUNCTION, GAUSS_STEP, CHANGE_OF_FRAME = 3.0, 70.0, 130.0, 30.0
-#: Additions that take the time of a division.
+#: Number of additions that take the time of a division.
 DIVISION = 4
-#: Stages that fill a vector.
+#: Number of stages that fill a SIMD vector.
 LANES = 8
-#: Nanoseconds of a step along paths, and of one of its operations.
+#: Nanoseconds of a step along paths without its operations, and of one of its operations.
 PATH_STEP, PATH_OPERATION = 200.0, 0.3
 
-#: Step sizes by order, relative to Gauss collocation. Errors of splittings of Nyström type are smaller.
+#: Step sizes for equal accuracy by order, relative to Gauss collocation. Splittings of Nyström type have smaller errors
+#: than others.
 SERIES_STEPS: Mapping[int, float] = {2: 1.3, 4: 0.63, 6: 0.55, 8: 0.5, 10: 0.43, 12: 0.37, 14: 0.33, 16: 0.3}
 SPLITTING_STEPS: Mapping[int, float] = {2: 1.3, 4: 2.5, 6: 1.3, 8: 0.9, 10: 0.7}
 NYSTROM_STEPS: Mapping[int, float] = {2: 1.3, 4: 4.0, 6: 2.6, 8: 1.6, 10: 1.3}
@@ -49,14 +50,14 @@ NYSTROM_STEPS: Mapping[int, float] = {2: 1.3, 4: 4.0, 6: 2.6, 8: 1.6, 10: 1.3}
 def cost(program: Program, grown: float = 1.0) -> float:
     """Return the estimated nanoseconds for a unit of time, at the accuracy of the order; the unit is arbitrary.
 
-    ``grown`` multiplies the operations: it gives a lower bound for programs of a higher order.
+    The operations are multiplied by ``grown``, which yields a lower bound for programs of a higher order.
     """
     step, even_order = program.step, program.order + program.order % 2
     return STEP_TIMES.get(step.kind, _explicit)(program, grown) / _steps(program)[even_order]
 
 
 def series_bound(program: Program, order: int) -> float:
-    """Return a lower bound of the cost of a series, from its program of a lower order."""
+    """Return a lower bound of the cost of a series of a given ``order``, from its program of a lower order."""
     longest = cost(program, order / program.order) * _steps(program)[program.order + program.order % 2]
     return longest / SERIES_STEPS[order + order % 2]
 
@@ -108,7 +109,7 @@ def _path(program: Program, grown: float) -> float:
     return PATH_STEP + PATH_OPERATION * grown * (operations + FUNCTION / OPERATION * functions)
 
 
-#: Nanoseconds of a step, of the kinds whose time is not that of an explicit step.
+#: Functions that estimate the nanoseconds of a step, for the kinds of steps that are not like explicit steps.
 STEP_TIMES: Mapping[StepKind, Callable[[Program, float], float]] = {
     NEWTON: _newton, PATH: _path, GAUSS: _gauss,
 }  # fmt: skip

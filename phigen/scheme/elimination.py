@@ -16,12 +16,12 @@ from phigen.scheme.lowering import COST
 from phigen.symbolic.expression import ZERO, Expression, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: pattern[i][j]: whether entry (i, j) may differ from zero; diagonal entries always may.
+#: pattern[i][j]: whether entry (i, j) may differ from zero. Diagonal entries always may.
 Pattern = Sequence[Sequence[bool]]
 
 
 def pivot_order(pattern: Pattern) -> list[int]:
-    """Return the pivots, each with the fewest entries in row and column; the first of several equal ones."""
+    """Return the pivots in order: each has the fewest entries in its row and column, the first one among equals."""
     return [k for k, _ in _pivots(pattern)]
 
 
@@ -40,9 +40,7 @@ def _pivots(pattern: Pattern) -> Iterator[tuple[int, int]]:
         k = min(remaining, key=lambda k: (len(rows[k]) * len(columns[k]), k))
         remaining.remove(k)
         column_length, row_length = len(columns[k]), len(rows[k])
-        fill_in = sum(
-            len(rows[k] - rows[i] - {i}) for i in columns[k]
-        )  # an entry that was 0 costs a product and no difference
+        fill_in = sum(len(rows[k] - rows[i] - {i}) for i in columns[k])  # a new entry costs a product but no difference
         yield (
             k,
             COST["reciprocal"] + column_length * (1 + 2 * row_length) - fill_in + 2 * (column_length + row_length) + 1,
@@ -55,7 +53,7 @@ def _pivots(pattern: Pattern) -> Iterator[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Factors:
-    """A matrix as P L U Pᵀ: pivots in order, multipliers (row, pivot), rows of U by pivot, reciprocal pivots."""
+    """A factorised matrix P L U Pᵀ: pivots in order, multipliers by (row, pivot), entries of U, reciprocal pivots."""
 
     order: tuple[int, ...]
     lower: dict[tuple[int, int], Expression]
@@ -64,18 +62,18 @@ class Factors:
 
     @property
     def values(self) -> tuple[Expression, ...]:
-        """All numbers that `solved` reads: reciprocal pivots, multipliers, entries of U."""
+        """All numbers that `solved` reads: reciprocal pivots, multipliers and entries of U."""
         return (*self.reciprocals, *self.lower.values(), *self.upper.values())
 
     def named(self, kind: str) -> Factors:
-        """Return the factors with symbols of that kind for `values`."""
+        """Return the factors with the `values` replaced by symbols of this kind."""
         names: Iterator[Expression] = (symbol(Symbol(kind, k)) for k in range(len(self.values)))
         reciprocals = tuple(next(names) for _ in self.reciprocals)
         lower = {place: next(names) for place in self.lower}
         return Factors(self.order, lower, {place: next(names) for place in self.upper}, reciprocals)
 
     def solved(self, side: Sequence[Expression]) -> list[Expression]:
-        """Return the solution for a right-hand side."""
+        """Return the solution for the right-hand side ``side``."""
         b, x = list(side), [ZERO] * len(side)
         rows: list[list[tuple[int, Expression]]] = [[] for _ in side]
         for (k, j), e in self.upper.items():
@@ -87,7 +85,7 @@ class Factors:
         return x
 
     def solved_transposed(self, side: Sequence[Expression]) -> list[Expression]:
-        """Return the solution for a right-hand side and the transpose of the matrix, P Uᵀ Lᵀ Pᵀ."""
+        """Return the solution for the right-hand side ``side`` with the transposed matrix, P Uᵀ Lᵀ Pᵀ."""
         z, columns = list(side), defaultdict[int, list[tuple[int, Expression]]](list)
         for (k, j), e in self.upper.items():
             columns[j].append((k, e))
@@ -99,7 +97,7 @@ class Factors:
 
 
 def factorise(pattern: Pattern) -> Factors:
-    """Return the factors of the matrix with entries ``J:i:j`` where the pattern has them."""
+    """Return the factors of the matrix with the symbols ``J:i:j`` where the pattern is true."""
     n = len(pattern)
     a = [[symbol(Symbol("J", i, j)) if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]
     lower: dict[tuple[int, int], Expression] = {}
@@ -120,13 +118,13 @@ def factorise(pattern: Pattern) -> Factors:
 
 
 def elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, ...]]:
-    """Return the solution for the right-hand side ``r:i``, and the reciprocal pivots."""
+    """Return the solution for the right-hand side with the symbols ``r:i``, and the reciprocal pivots."""
     factors = factorise(pattern)
     return factors.solved([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
 
 
 def transposed_elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, ...]]:
-    """Return the solution for the transpose of the matrix, and the reciprocal pivots, which are the same."""
+    """Return the solution with the transposed matrix, and the reciprocal pivots, which are those of the matrix."""
     factors = factorise(pattern)
     return factors.solved_transposed([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
 

@@ -1,8 +1,8 @@
 """Operation counts of products of matrices of expressions, before the products are built.
 
-The matrix a' = ∂_xα + ∂_pα · Hess S_h is nearly all of the step of a large system. To build a node of an expression
-takes some fifty times as long as to count it. Here a node is a number, the same for equal operations on equal
-operands.
+The matrix a' = ∂_xα + ∂_pα · Hess S_h makes up nearly all of the step of a large system. Building a node of an
+expression takes some fifty times as long as counting it. Here a node is represented by a number, which is the same for
+equal operations on equal operands.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from phigen.scheme.lowering import cost
 from phigen.symbolic.expression import ZERO, Expression, fold, sparse_derivatives, substitute
 from phigen.symbolic.symbols import momentum
 
-#: Rows of a matrix that are counted first; a matrix far beyond the limit is recognised by a few rows.
+#: Number of rows of a matrix that are counted first; a matrix far beyond the limit is recognised by a few rows.
 FIRST_ROWS = 8
 
 #: The nonzero entries of a row of a matrix, by column.
@@ -28,9 +28,9 @@ def newton_operations(
 ) -> int:
     """Return the operations of the matrices of a Newton step (`phigen.scheme.step`); ``limit`` + 1 if there are more.
 
-    ``absent`` are the coordinates that S_h does not depend on, so their momenta are 0. The count is a lower bound: it
-    leaves out the computation of the Hessian, which is small where H is a polynomial of low degree. Small systems,
-    whose matrices are below the limit in any case, count as 0.
+    ``absent`` are the coordinates that S_h does not depend on; the corresponding momenta are 0. The count is a lower
+    bound: it omits the computation of the Hessian, which is small if H is a polynomial of low degree. For small
+    systems, whose matrices are always below the limit, the result is 0.
     """
     names, momenta = realisation.coordinates, realisation.covector
     if realisation.path or not may_have(len(names), limit):
@@ -43,7 +43,8 @@ def newton_operations(
     count = OperationCount(limit, lambda name: name not in state)
     rows_so_far: list[SparseRow] = []
     try:
-        while len(rows_so_far) < len(expressions):  # batches grow, so few rows of a huge matrix are counted
+        # the number of rows grows from batch to batch, so few rows of a huge matrix are counted
+        while len(rows_so_far) < len(expressions):
             rows = sparse_derivatives(expressions[len(rows_so_far) : 4 * len(rows_so_far) + FIRST_ROWS], momenta)
             new_rows = [{index[p]: e for p, e in row.items()} for row in rows]
             rows_so_far += new_rows
@@ -57,12 +58,12 @@ def newton_operations(
 
 
 def may_have(dimension: int, limit: int) -> bool:
-    """Whether the dimension allows the matrices of a step more than ``limit`` operations."""
+    """Whether a system of this dimension can have more than ``limit`` operations in the matrices of a step."""
     return 4 * dimension**3 > limit
 
 
 def path_operations(system: System, hessian: Sequence[SparseRow], limit: int) -> int:
-    """Return the operations of Hess S_h · π, needed by a step along paths; ``limit`` + 1 if there are more."""
+    """Return the operations of Hess S_h · π in a step along paths; ``limit`` + 1 if there are more."""
     tensor = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in system.poisson]
     count = OperationCount(limit, lambda name: name not in system.coordinates)
     try:
@@ -72,14 +73,14 @@ def path_operations(system: System, hessian: Sequence[SparseRow], limit: int) ->
 
 
 class TooManyError(Exception):
-    """There are more operations than the limit."""
+    """The number of operations exceeds the limit."""
 
 
 class OperationCount:
-    """The operations of products of matrices with sums as in `total_at`.
+    """Counter of the operations of products of matrices, with sums as in `total_at`.
 
-    Expressions in ``fixed`` symbols only cost nothing, since they are computed once. Raises `TooManyError` as soon as
-    there are more than ``most`` operations.
+    Expressions in fixed symbols only are not counted, since they are computed once. Raises `TooManyError` as soon as
+    there are more operations than the limit.
     """
 
     def __init__(self, limit: int, is_fixed: Callable[[str], bool]) -> None:
@@ -89,7 +90,7 @@ class OperationCount:
         self._leaves: dict[int, int] = {}
 
     def matrix(self, left: Sequence[SparseRow], right: Sequence[SparseRow]) -> int:
-        """Return the operations of left · right beyond those counted before."""
+        """Return the operations of left · right that are not shared with products counted before."""
         operations_before = self.operations
         self._know([e for row in (*left, *right) for e in row.values()])
         columns = self._different([{j: self._leaves[id(e)] for j, e in row.items()} for row in right])
@@ -110,7 +111,7 @@ class OperationCount:
 
     @staticmethod
     def _different(rows: Sequence[Mapping[int, int]]) -> list[dict[int, int]]:
-        """Return the rows without repeated columns: equal columns make equal nodes."""
+        """Return the rows without repeated columns: equal columns lead to equal nodes."""
         columns: dict[int, list[tuple[int, int]]] = {}
         for k, row in enumerate(rows):
             for j, leaf in row.items():

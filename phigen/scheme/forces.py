@@ -1,4 +1,4 @@
-"""Header lines on forces: with forces a step is not a Poisson map."""
+"""Header lines of generated files on forces: with forces a step is not a Poisson map."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from phigen.symbolic.expression import Expression
 
 
 def force_facts(system: System, manner: str) -> Iterator[str]:
-    """Yield the lines of a header; ``manner`` says how forces enter the step, or is empty."""
+    """Yield the header lines on forces; ``manner`` says how forces enter the step, "" for nothing."""
     yield from forced_lines(system.forces is not None, system.pushed, manner)
 
 
 def forced_lines(forced: bool, pushed: Sequence[str], manner: str) -> Iterator[str]:
-    """Yield the lines of a header if the system is ``forced``, by forces that change the Casimirs ``pushed``."""
+    """Yield the header lines of a ``forced`` system, whose forces change the Casimirs ``pushed``."""
     if not forced:
         return
     if manner:

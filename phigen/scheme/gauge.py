@@ -1,9 +1,9 @@
-"""The Casimir gauge: H and H − Σ λ_c C_c have the same flow, but not the same discretisation.
+"""The Casimir gauge: H and H − Σ λ_c C_c have the same flow, but different discretisations.
 
-Casimirs subtracted from H before discretising change S_h, hence the error constant. The leading local error of a
-symmetric method is h³ π∇S_3 at order 2, and |π∇S_3| is a good guide for higher orders. ``auto`` leaves λ open. The
-solver then chooses λ at the start of each trajectory: it minimises |π∇S_3| along a short piece of the trajectory. For
-each fixed λ the step is an exact Poisson map; trajectories with different λ are steps of different maps.
+Casimirs subtracted from H before discretising change S_h and hence the error constant. The leading local error of a
+symmetric method is h³ π∇S_3 at order 2, and |π∇S_3| is a good guide for higher orders. With ``auto``, the solver
+chooses λ at the start of each trajectory: it minimises |π∇S_3| along a short piece of the trajectory. For each fixed λ
+the step is an exact Poisson map; trajectories with different λ use different maps.
 """
 
 from __future__ import annotations
@@ -23,24 +23,25 @@ from phigen.symbolic.expression import ONE, Expression, gradient, symbol, symbol
 from phigen.symbolic.symbols import GAUGE, LEVEL, Symbol
 from phigen.symbolic.tower import Tower
 
-#: Largest ratio of the numbers of terms with a gauge and without; beyond, the gauge costs more than it gains.
+#: Largest accepted ratio of the numbers of terms with a gauge and without; above it the gauge costs more than it gains.
 MAX_TERM_RATIO = 1.3
 
-#: The error term whose size the gauge minimises.
+#: Index of the S_i that determines the error term which the gauge minimises.
 GUIDE = 3
 
-#: Operations of π∇S_3, by `guide_operations`, up to which a gauge is searched for. The search evaluates π∇S_3 at 32
-#: states for 7 values of λ, up to four times for each λ: some ten million operations, a hundredth of a second, at the
-#: start of each trajectory. The systems of the corpus take at most 2,600.
+#: Largest number of operations of π∇S_3, by `guide_operations`, with which a gauge is searched for. The search
+#: evaluates π∇S_3 at 32 states for 7 values of λ, up to four times for each λ: some ten million operations, a hundredth
+#: of a second, at the start of each trajectory. The systems of the corpus need at most 2,600.
 MOST_GUIDE_OPERATIONS = 10_000
 
 
 @dataclass(frozen=True)
 class Gauge:
-    """The Casimirs ``free``, whose λ the solver chooses, and the part ``fixed`` that is always subtracted.
+    """The Casimirs ``free``, whose multiples λ the solver chooses, and those ``fixed``, which have multiples in the
+    spec.
 
     A ``monitor`` g replaces H by K = g(H + e) before the subtraction (`phigen.scheme.monitor`); then no λ is free.
-    ``omitted`` maps Casimirs whose λ would cost more to choose than it gains to the reason.
+    ``omitted`` maps Casimirs that are not free to the reason: choosing their λ would cost more than it gains.
     """
 
     free: tuple[str, ...] = ()
@@ -50,7 +51,7 @@ class Gauge:
 
     @property
     def symbols(self) -> tuple[str, ...]:
-        """The symbols with a fixed value for each trajectory: the free λ, or e."""
+        """The symbols with a constant value for each trajectory: the free λ, or e."""
         return (LEVEL,) if self.monitor else self.multiples
 
     @property
@@ -60,12 +61,12 @@ class Gauge:
 
     @property
     def inputs(self) -> dict[str, tuple[str, ...]]:
-        """The argument that passes the symbols to a kernel, if there are any."""
+        """The argument of kernels that holds the symbols, by name; empty if there are none."""
         return {"gauge": self.symbols} if self.symbols else {}
 
     @property
     def facts(self) -> list[str]:
-        """The lines of the header about the gauge."""
+        """The lines about the gauge in the header of generated files."""
         lines = [f"gauge: the multiple of {', '.join(self.free)} is chosen at the start of each trajectory"]
         terms = ", ".join(f"({value}) {name}" for name, value in self.fixed.items())
         return (lines if self.free else []) + ([f"gauge: {self.letter} - {terms}"] if terms else []) + self.notes
@@ -80,21 +81,22 @@ class Gauge:
 
     @property
     def letter(self) -> str:
-        """The letter of the function from which the Casimirs are subtracted."""
+        """The letter, H or K, of the function from which the Casimirs are subtracted."""
         return "K" if self.monitor else "H"
 
     def timed(self, hamiltonian: Expression) -> Expression:
-        """Return H, or K = g(H + e)."""
+        """Return H or, with a monitor, K = g(H + e)."""
         return self.monitor * (hamiltonian + symbol(LEVEL)) if self.monitor else hamiltonian
 
     def pace(self, system: System) -> Expression:
-        """Return the factor of ∇H + ζ in the discretised system: g if a monitor acts together with forces, else 1."""
+        """Return the factor of ∇H + ζ in the discretised system: g if there are both a monitor and forces, else 1."""
         return self.monitor if self.monitor and system.forces else ONE
 
     def applied(self, system: System) -> System:
-        """Return the system with H − Σ λ_c C_c, or K − Σ λ_c C_c, in place of H, to be discretised.
+        """Return the system that is discretised, with H − Σ λ_c C_c or K − Σ λ_c C_c in place of H.
 
-        With forces there is no K: H stays, and p = τg(∇H + ζ) is made from it; the impulse of a vector f is τgf.
+        With a monitor and forces, H remains: p = τg(∇H + ζ) is derived from H, and the impulse of a vector force f is
+        τgf.
         """
         if self.monitor and system.forces:
             vector = tuple(self.monitor * f for f in system.forces.vector)
@@ -108,7 +110,7 @@ class Gauge:
 
 @dataclass(frozen=True)
 class Gauged:
-    """The system to discretise, with H less the Casimirs of the gauge, and its Hamilton–Jacobi series."""
+    """The system that is discretised, with Casimirs subtracted from H, and its Hamilton–Jacobi series."""
 
     gauge: Gauge
     system: System
@@ -123,9 +125,9 @@ def choose(
 ) -> Gauged:
     """Return the system in the gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
 
-    ``auto`` frees the λ of a Casimir on three conditions. S_3 depends on λ, which it never does in log-canonical
-    structures; S_3 has hardly more terms with λ, unlike on tops; and π∇S_3 is cheap enough for a search. No λ is free
-    where H depends on the time, forces act, there is noise, or with a monitor.
+    ``auto`` frees the λ of a Casimir under three conditions: S_3 depends on λ, which is never so for log-canonical
+    structures; S_3 has hardly more terms with λ, which is not so for tops; π∇S_3 is cheap enough for a search. No λ is
+    free if H depends on the time, or with forces, noise or a monitor.
     """
     if not isinstance(setting, str):
         return _gauged(system, realisation, replace(fixed_gauge(system, setting), monitor=monitor))
@@ -145,7 +147,7 @@ def choose(
 
 
 def unaffordable(system: System) -> str:
-    """Return the reason not to search for λ with this H, which contains λ; "" if the search is cheap enough."""
+    """Return the reason why λ in this H is not searched for; "" if the search is cheap enough."""
     try:
         operations = guide_operations(system)
     except OverflowError as error:
@@ -161,9 +163,9 @@ def unaffordable(system: System) -> str:
 def guide_operations(system: System) -> int:
     """Return an estimate of the operations of π∇S_3, from H and π, before S_3 is computed.
 
-    Up to factors, S_3 is the sum of ∂_i∂_jH v_i v_j with v = π∇H: the estimate is the number of products of monomials
-    in this sum. For sums of thousands of products the measured operations were 0.6 to 1 of the estimate. Raises
-    `OverflowError` if H or its derivatives are too large to be counted.
+    Up to factors, S_3 is the sum of ∂_i∂_jH v_i v_j with v = π∇H. The estimate is the number of products of monomials
+    in this sum. For sums of thousands of products, 0.6 to 1 times the estimate was measured. Raises `OverflowError` if
+    H or its derivatives are too large to be counted.
     """
     h, tensor = system.hamiltonian, system.poisson
     entries = [e for row in tensor for e in row if not e.is_zero]
@@ -184,7 +186,7 @@ def guide_operations(system: System) -> int:
 
 @contextmanager
 def fixed_gauge_named(gauge: Gauge, system: System) -> Iterator[None]:
-    """Name the gauge of the spec in errors about the size of the program that are raised inside this context."""
+    """Return a context in which errors about the size of the program name the gauge of the spec."""
     try:
         yield
     except (LimitError, OverflowError) as error:
@@ -206,7 +208,7 @@ def _gauged(system: System, realisation: BiRealisation, gauge: Gauge) -> Gauged:
 
 
 def fixed_gauge(system: System, values: Mapping[str, Expression]) -> Gauge:
-    """Return the gauge with these multiples of Casimirs. Raises `SpecError` for names of other functions."""
+    """Return the gauge with these multiples of Casimirs. Raises `SpecError` for names that are not Casimirs."""
     for name in values:
         if name not in system.casimirs:
             casimir_names = ", ".join(system.casimirs) or "none"
@@ -221,7 +223,7 @@ def _worthwhile(ungauged: Gauged, gauged: Gauged, name: str) -> bool:
     try:
         limit = MAX_TERM_RATIO * _state_terms(ungauged.series.polynomial(GUIDE), ungauged.system)
         if _state_terms(_first_term(gauged), ungauged.system) > limit:
-            return False  # without the series, which is slow for a long Casimir
+            return False  # decided without the series, which is slow for a long Casimir
         polynomial = gauged.series.polynomial(GUIDE)
     except OverflowError:
         return False
@@ -231,7 +233,7 @@ def _worthwhile(ungauged: Gauged, gauged: Gauged, name: str) -> bool:
 
 
 def _first_term(gauged: Gauged) -> PolynomialSeries:
-    """Return S_1 = H in a ring of its own."""
+    """Return S_1 = H in a separate ring."""
     h = gauged.system.hamiltonian
     tower = Tower(symbols_of(h), [h])
     return PolynomialSeries(tower, (tower.convert(h),))
@@ -245,7 +247,8 @@ def _state_terms(series: PolynomialSeries, system: System) -> int:
 
 
 def free_gauge(system: System, gauged: Gauged) -> FreeGauge | None:
-    """Return the kernels for the choice of λ: the error π∇S_3, and the products of ∇H and ∇C, which set the scale."""
+    """Return the kernels for the choice of λ: the error π∇S_3, and the products of ∇H and ∇C, which set the scale of
+    λ."""
     gauge = gauged.gauge
     if not gauge.free:
         return None

@@ -33,10 +33,10 @@ from phigen.symbolic.symbols import STEP
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
-#: Largest number of sweeps in the solve of a step, after which it has failed; the spec may set another.
+#: Largest number of sweeps in the solve of a step, after which the step fails; the spec may set another number.
 MAX_SWEEPS = 100
 
-#: Hint where no exact Poisson map is known.
+#: Hint for systems without a known exact Poisson map.
 TRUNCATION_HINT = (
     "structure: to truncation applies to every bracket, but its steps are not Poisson maps; those of scheme: series are"
 )
@@ -50,7 +50,7 @@ def expect_offered(spec: Spec) -> None:
 
 
 def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
-    """Yield the options of a spec that Gauss methods do not have: path of keys, message, hint."""
+    """Yield the options of a spec that Gauss methods do not have, as a path of keys, a message and a hint."""
     extras, series = spec.extras, "scheme: series has it"
     if spec.lattice:
         yield ("lattice",), "not for lattices", "scheme: auto, splitting or series"
@@ -65,7 +65,7 @@ def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
 
 
 def plan_gauss(spec: Spec) -> Order:
-    """Return the order of the method, and its stages. Raises `SpecError` for orders that it does not have."""
+    """Return the order of the method with its number of stages. Raises `SpecError` for orders that it does not have."""
     order = spec.wanted_order
     if order > 2 * MOST_STAGES:
         hint = f"order: {2 * MOST_STAGES}"
@@ -75,7 +75,10 @@ def plan_gauss(spec: Spec) -> Order:
 
 
 def realise_gauss(spec: Spec, system: System) -> Realisation:
-    """Return the realisation of the coordinates. Raises `SpecError` for `structure: exact` where none is known."""
+    """Return the realisation of the coordinates.
+
+    Raises `SpecError` for `structure: exact` if no exact Poisson map is known.
+    """
     if spec.structure == "to truncation":
         return direct(system)
     realisation = collective(system)
@@ -109,7 +112,7 @@ def _is_pushed(system: System, i: int) -> bool:
 def build_gauss(
     system: System, gauge: Gauge, realisation: Realisation, order: Order, spec: Spec, group: Group | None = None
 ) -> Program:
-    """Return the solver as a program, with H less the Casimirs of the gauge. `LimitError` if it is too large."""
+    """Return the solver as a program, with the Casimirs of the gauge subtracted from H. Raises `LimitError`."""
     discretised = gauge.applied(system)
     points = stage_map(discretised, realisation, gauge.pace(system))
     coefficients = Coefficients((*system.parameter_names, *gauge.symbols))
@@ -172,7 +175,7 @@ def build_gauss(
 
 
 def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -> Monitor | None:
-    """The physical time of a monitored solver."""
+    """Return the physical time of a monitored solver as a record; None without a monitor."""
     if gauge.monitor is None:
         return None
     level = level_adjoint(system) if spec.extras.adjoint else None
@@ -180,7 +183,7 @@ def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -
 
 
 def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
-    """Return the kernel with the final table of coefficients as input."""
+    """Return the kernel with the full table of coefficients as input."""
     return Kernel(
         kernel.name, kernel.purpose, {**kernel.inputs, "coef": coefficients.slots}, kernel.outputs, kernel.named
     )
@@ -191,7 +194,7 @@ def _with_all_coefficients(reduced: ReducedSweeps, coefficients: Coefficients) -
 
 
 def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
-    """Return the Jacobians of a stage: by the coordinates, which exclude the time, then by the unknowns."""
+    """Return the Jacobians of a stage, with respect to the coordinates (without the time) and to the unknowns."""
     names = (*points.system.coordinates, *points.unknowns)
     kernels = []
     for values, name, subject in (
@@ -207,7 +210,7 @@ def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
 
 
 def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge, step: Gauss) -> Iterator[str]:
-    """Yield the lines of the header."""
+    """Yield the lines of the header of generated files."""
     stages = order.terms
     yield f"scheme: Gauss collocation, {stages} stage{'s' * (stages > 1)}"
     if not realisation.exact:

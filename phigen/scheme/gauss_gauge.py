@@ -1,8 +1,8 @@
-"""Multiples of Casimirs that reduce the velocities of group elements, so that sweeps contract faster.
+"""Multiples of Casimirs that reduce the velocities of group elements, so that fixed-point sweeps converge faster.
 
-H and H − Σ λ_c C_c have the same flow of the coordinates, but the group element G moves by ∇H or by ∇H − Σ λ_c ∇C_c.
-The second derivatives of a quadratic H and of quadratic Casimirs are constant; the λ_c minimise the norm of their
-difference.
+H and H − Σ λ_c C_c have the same flow of the coordinates, but the group element G has the velocity ∇H or ∇H − Σ λ_c
+∇C_c. The second derivatives of a quadratic H and of quadratic Casimirs are constant; the λ_c minimise the norm of the
+second derivatives of the difference.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ LARGEST_DENOMINATOR = 1000
 
 
 def slowest(system: System, realisation: Realisation) -> Gauge:
-    """Return the gauge of the quadratic Casimirs; none where the second derivatives of H are not constant."""
+    """Return the gauge of the quadratic Casimirs; no gauge if the second derivatives of H are not constant."""
     indices = [i for group in realisation.groups for i in group.indices]
     names = [system.coordinates[i] for i in indices]
     if not names or not realisation.exact or system.driven:
@@ -39,9 +39,9 @@ def _hessian(e: Expression, names: Sequence[str]) -> list[Expression]:
 
 
 def _projected(vector: Sequence[Expression], basis: Sequence[Sequence[Fraction]]) -> list[Expression]:
-    """Return the coefficients of the element of the span of a basis that is nearest to a vector."""
+    """Return the coefficients, in a basis, of the projection of a vector onto the span of the basis."""
     orthogonal: list[list[Fraction]] = []
-    transform: list[list[Fraction]] = []  # coefficients of the orthogonal vectors in the basis
+    transform: list[list[Fraction]] = []  # coefficients of the orthogonal vectors in terms of the basis
     for k, b in enumerate(basis):
         residual, row = list(b), [Fraction(int(i == k)) for i in range(len(basis))]
         for o, t in zip(orthogonal, transform, strict=True):

@@ -11,7 +11,7 @@ from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import Expression, fold, raw, substitute, symbol
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: The kinds of symbols of derivatives that are transformed to a new frame, and of velocities in Lie algebras.
+#: Kinds of symbols: of derivatives that are transformed to a new frame, and of velocities in Lie algebras.
 SLOPE, VELOCITY = "k", "velocity"
 
 #: The symbol of h b_j, the weight of a stage.
@@ -19,7 +19,7 @@ WEIGHT = Symbol("w")
 
 
 def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """Return the vector field of the unknowns at a stage, multiplied by the weight h b_j of the stage."""
+    """Return the kernel of the vector field of the unknowns at a stage, times the weight h b_j of the stage."""
     forms = [_field(points, coefficients, collected=collected) for collected in (False, True)]
     values = min(forms, key=lambda form: operation_counts(form)["multiplications"])
     return Kernel(
@@ -56,7 +56,7 @@ def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> 
 
 
 def _with_scaled_weights(roots: Sequence[Expression]) -> list[Expression]:
-    """Return roots with (c·w)·e in place of c·(w·e): compilers compute c·w once for all sweeps of a step."""
+    """Return roots with (c·w)·e in place of c·(w·e): compilers then compute c·w once for all sweeps of a step."""
     weight = symbol(WEIGHT)
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
@@ -68,7 +68,7 @@ def _with_scaled_weights(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def elapsed_kernel(points: StageMap, monitor: Expression, coefficients: Coefficients) -> Kernel:
-    """Kernel of the time that passes at a stage: the weight times dt/dτ."""
+    """Return the kernel of the time that passes at a stage: the weight times dt/dτ."""
     (rate,) = coefficients.hoist(substitute([monitor], at_unknowns(points)))
     return Kernel(
         "elapsed",
@@ -89,7 +89,11 @@ def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
 
 
 def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
-    """Return the derivatives of group elements in the frame of the next step: G* = G⁻¹ times the derivatives."""
+    """Return the kernel of the derivatives of group elements in the frame of the next step: G* = G⁻¹ times the
+    derivatives.
+
+    None without group elements.
+    """
     if not points.realisation.groups:
         return None
     slopes = tuple(Symbol(SLOPE, k) for k in range(len(points.unknowns)))

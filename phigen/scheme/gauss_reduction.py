@@ -1,10 +1,12 @@
-"""Elimination of unknowns whose derivatives are linear in others, as positions are where q̇ = M⁻¹p.
+"""Elimination of unknowns whose derivatives are linear in others, as those of positions are for q̇ = M⁻¹p.
 
-If ḟ = r₀ + Σ_k c_k z_k with constant c_k, the stages of f follow from the moves of the z_k by the squared matrix of the
-method, and so does its end: Z_f = h (τ_i r₀ + Σ_k c_k Σ_j ν_ij L_k,j), f' = f + h (r₀ + Σ_k c_k Σ_j (1 − τ_j) L_k,j),
-where τ are the nodes, and ν = Aμ. If all other unknowns depend on such f only, as momenta on positions, sweeps iterate
-them alone, and one of these contracts as two over all unknowns. If ν_ij − ν_ji = τ_i − τ_j, and brackets of two f or of
-two other unknowns are 0, the step is symplectic, as Suris showed. Unknowns that no other depends on, such as
+If ḟ = r₀ + Σ_k c_k z_k with constant c_k, the stages and the end of f follow from the stage increments L of the z_k:
+Z_f = h (τ_i r₀ + Σ_k c_k Σ_j ν_ij L_k,j), f' = f + h (r₀ + Σ_k c_k Σ_j (1 − τ_j) L_k,j). Here τ are the nodes, A is the
+matrix of the method, and ν = Aμ.
+
+If all other unknowns depend on such f only, as momenta depend on positions, sweeps iterate these other unknowns alone;
+one such sweep contracts as much as two sweeps over all unknowns. If ν_ij − ν_ji = τ_i − τ_j, and brackets of two f or
+of two other unknowns are 0, the step is symplectic, as Suris showed. Unknowns that no other unknown depends on, such as
 quadratures, are computed after the last sweep.
 """
 
@@ -20,15 +22,15 @@ from phigen.scheme.steps import ReducedSweeps
 from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, substitute, symbol, symbols_of, total
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: The kind of symbols of what reduced sweeps read: integrals of moves.
+#: Kind of the symbols of the inputs of reduced sweeps: integrals of the increments of unknowns.
 READ = "u"
 
-#: The time of a stage after the start of the step, in steps, and the step.
+#: Symbols of the time of a stage since the start of the step, in steps, and of the step.
 TIME, LENGTH = Symbol("stage_time"), Symbol("stage_step")
 
 
 def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweeps | None:
-    """Return the sweeps over some of the unknowns, or None where these do not depend on unknowns that follow only."""
+    """Return sweeps over some of the unknowns; None if these depend on unknowns that are not followers."""
     if points.realisation.groups or points.realisation.logarithms:
         return None
     rates = vector_field(points, at_unknowns(points))
@@ -65,7 +67,10 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
 
 
 def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequence[int]) -> bool:
-    """Whether these are all unknowns but the time, and only brackets of one kind with the other are not zero."""
+    """Whether iterated unknowns and followers are conjugate.
+
+    Together they must be all unknowns except the time, and only brackets between the two sets may be nonzero.
+    """
     places = [{points.moved[k] for k in group if k < len(points.moved)} for group in (iterated, followers)]
     index_pairs = ((i, j) for group in places for i in group for j in group)
     complete = sum(map(len, places)) == len(points.moved)
@@ -73,7 +78,7 @@ def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequenc
 
 
 def _required_unknowns(reads: Sequence[set[int]]) -> list[int]:
-    """Return the unknowns that others depend on, directly or through others, or that depend on themselves."""
+    """Return the unknowns that others depend on, directly or indirectly, and those that depend on themselves."""
     required = set(range(len(reads)))
     while True:
         read_unknowns = {k for i in required for k in reads[i]}
@@ -83,7 +88,7 @@ def _required_unknowns(reads: Sequence[set[int]]) -> list[int]:
 
 
 def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
-    """Return unknowns among the linear ones of which none depends on itself or on another."""
+    """Return a set of linear unknowns, none of which depends on itself or on another one of the set."""
     followers: list[int] = []
     for k in linear:
         candidates = {*followers, k}
@@ -95,9 +100,9 @@ def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
 def _followed(rate: Expression, row: Mapping[str, Expression], integrals: Mapping[str, Expression]) -> Expression:
     """Return the increment of a follower up to a stage, from the increments ``integrals`` of the other unknowns.
 
-    A follower has the constant ``rate`` at the start, and depends on each other unknown by the slope in ``row``.
+    At zero offsets a follower has the constant ``rate``; ``row`` has its derivatives with respect to other unknowns.
     """
     (start,) = substitute([rate], {z: ZERO for z in symbols_of(rate) if kind_of(z) == OFFSET})
     terms = [symbol(TIME) * start, *(slope * integrals[z] for z, slope in row.items())]
-    # the times are exact, and their products with the step would not be
+    # the times of stages are exact, their products with the step are not
     return symbol(LENGTH) * total(terms)

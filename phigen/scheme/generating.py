@@ -1,9 +1,9 @@
 """The generating function S_h = Σ h^i S_i as code: gradient and Hessian in the cheapest form.
 
-Two forms compete. *Collected*: S_h as one polynomial in coordinates and function values whose coefficients depend on
-parameters and h only, so ``prepare`` collapses all orders into one set of numbers; each derivative is a nested Horner
-form. *Graph*: the recursion itself, never expanded, differentiated as a graph. In low dimension collected polynomials
-are much cheaper; in high dimension their expansion explodes. The operation count decides.
+Two forms are compared by their operation counts. *Collected*: S_h is one polynomial in coordinates and function values,
+whose coefficients depend on parameters and h only. ``prepare`` combines all orders into one set of numbers, and each
+derivative is a nested Horner form. *Graph*: the recursion is not expanded, and is differentiated as a graph. In low
+dimension collected polynomials are much cheaper; in high dimension their expansion is too large.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ from phigen.symbolic.symbols import LEVEL, STEP
 
 @dataclass(frozen=True)
 class GeneratingFunction:
-    """∇S_h (``slope``) and Hess S_h (``hessian``, full n×n) as expressions, and the ``form`` that they are written in.
+    """∇S_h (``slope``) and Hess S_h (``hessian``, full n×n) as expressions; ``form`` names the form in which they are
+    written.
 
-    ``coefficients`` is the table for their symbols ``c:k``, including coefficients that are renewed in every step. Of
-    a monitored system, ``elapsed`` is ∂S_h/∂e, the time that a step takes. With forces, ``free`` is p without them.
+    ``coefficients`` is the table of their symbols ``c:k``, including coefficients that are renewed in every step. For a
+    monitored system, ``elapsed`` is ∂S_h/∂e, the time that a step takes. With forces, ``free`` is p without the forces.
     """
 
     slope: tuple[Expression, ...]
@@ -41,18 +42,19 @@ class GeneratingFunction:
 
     @property
     def turning(self) -> tuple[Expression, ...]:
-        """The covector that rotates a body: p without the forces, which change its momentum only."""
+        """The covector that rotates a body: p without the forces, which change only the momentum of the body."""
         return self.free or self.slope
 
     def pushed(self, push: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:
-        """Return the function with p = ∇S_h + a covector field; then the Hessian need not be symmetric."""
+        """Return the function with p = ∇S_h + ``push``, a covector field; the Hessian is then not symmetric in
+        general."""
         columns = [derivatives(push, c) for c in coordinates]
         slope = tuple(s + z for s, z in zip(self.slope, push, strict=True))
         rows = [[e + columns[j][i] for j, e in enumerate(row)] for i, row in enumerate(self.hessian)]
         return replace(self, slope=slope, hessian=tuple(map(tuple, rows)))
 
     def cost(self) -> int:
-        """Return the cost of one evaluation of gradient and Hessian, after staging."""
+        """Return the cost of one evaluation of gradient and Hessian, with state-independent values computed before."""
         return self._cost
 
     @cached_property
@@ -69,17 +71,17 @@ def collected_form(
     times: Sequence[str] = (),
     increments: Sequence[str] = (),
 ) -> list[GeneratingFunction]:
-    """Return the collected gradient with the Hessian, collected entry by entry or by differentiation.
+    """Return two collected forms: with the Hessian collected entry by entry, and with the Hessian by differentiation.
 
-    ``increments`` are inputs of a step that the series does not contain, besides the time. Empty if a gradient of one
-    operation per term would cost more than ``worth``, or if the monomials would take more than `limits.CELLS`. Raises
-    `OverflowError` if the polynomial is too large to be counted.
+    ``increments`` are inputs of a step that the series does not contain, in addition to the time. The list is empty if
+    a gradient of one operation per term would cost more than ``worth``, or if the monomials would need more than
+    `limits.CELLS`. Raises `OverflowError` if the polynomial is too large to be counted.
     """
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)
     s = tower.combine(term * h ** (i + 1) for i, term in enumerate(series.terms))
     worth = max(worth, 200)
-    if len(s) > 10 * worth:  # terms share monomials in the coordinates, but rarely ten of them
+    if len(s) > 10 * worth:  # terms share monomials in the coordinates, but rarely ten terms share one
         return []
     slopes = tower.gradient(s, coordinates)
     if cells(tower, [s, *slopes]) > limits.CELLS or exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):
@@ -110,8 +112,8 @@ def graph_form(
 ) -> GeneratingFunction:
     """Return the gradient by one reverse sweep over the shared graph, and the Hessian by one sweep for each row.
 
-    ``inputs`` are those of a step, such as the time. Raises `OverflowError` as soon as the derivatives so far exceed
-    the budget of one kernel.
+    ``inputs`` are inputs of a step, such as the time. Raises `OverflowError` as soon as the derivatives exceed the
+    budget of one kernel.
     """
     h = symbol(STEP)
     s = total(h ** (i + 1) * term for i, term in enumerate(series) if not term.is_zero)
@@ -121,7 +123,7 @@ def graph_form(
         for i in range(len(coordinates)):
             if not i & (i - 1) and cost([*slope, *(e for row in rows for e in row)]) > limits.OPERATIONS:
                 raise OverflowError(f"more than {limits.OPERATIONS} operations for a part of the Hessian")
-            rows.append(gradient(slope[i], coordinates[i:]))  # one reverse sweep a row
+            rows.append(gradient(slope[i], coordinates[i:]))  # one reverse sweep for each row
             running.done = i + 1
     elapsed = derivatives([s], LEVEL)[0] if LEVEL in static else None
     return GeneratingFunction(slope, _symmetric(rows), "shared graph", 0, Coefficients(static, inputs), elapsed)
@@ -130,7 +132,7 @@ def graph_form(
 def forced_form(
     system: System, monitor: Expression, static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """Return p = τg(∇H + ζ) of a monitored system with forces, which is no gradient and does not depend on e."""
+    """Return p = τg(∇H + ζ) of a monitored system with forces, which is not a gradient and does not depend on e."""
     assert system.forces is not None
     rate = symbol(STEP) * monitor
     slope = gradient(system.hamiltonian, system.coordinates)
@@ -148,6 +150,6 @@ def _differentiated(slope: Sequence[Expression], coordinates: Sequence[str]) -> 
 
 
 def _symmetric(rows: Sequence[Sequence[Expression]]) -> tuple[tuple[Expression, ...], ...]:
-    """Return the full matrix of upper-triangular rows: ``rows[i][j - i]`` for j ≥ i."""
+    """Return the full symmetric matrix of upper-triangular rows: entry (i, j) is ``rows[i][j - i]`` for j ≥ i."""
     n = len(rows)
     return tuple(tuple(rows[min(i, j)][abs(i - j)] for j in range(n)) for i in range(n))

@@ -1,4 +1,4 @@
-"""Kernels: the straight-line functions that a program consists of, as expression graphs.
+"""Kernels: the straight-line functions of a program, as expression graphs.
 
 `phigen.scheme.lowering` turns a kernel into a list of assignments.
 """
@@ -11,23 +11,24 @@ from enum import Enum, auto
 
 from phigen.symbolic.expression import Expression
 
-#: Arguments of kernels that are numbers, not arrays: the step, or the time of a flow; the time.
+#: Arguments of kernels that are numbers, not arrays: h is the step or the duration of a flow, t the time.
 SCALARS = ("h", "t")
 
-#: The input of a transpose that holds the cotangents of matrices whose exponentials are taken.
+#: Input of a transposed kernel: the cotangents of matrices whose exponentials are taken.
 EXPONENTS = "exponents_bar"
 
 
 class Role(Enum):
-    """Purpose of a kernel, and of the function with its loops, from which loops derive the arrays that they use."""
+    """Purpose of a kernel and of the function that contains its loops; loops derive from it the arrays that they
+    use."""
 
     OTHER = auto()
     SWEEP = auto()  # the increment of a state by a flow
-    SWEEP_TANGENT = auto()  # its derivative, the increment of a variation
+    SWEEP_TANGENT = auto()  # the derivative of SWEEP: the increment of a variation
     RELAX = auto()  # the right-hand side of the equation of a stage
     ADVANCE = auto()  # the increment of the state by a stage
     SLOPE = auto()  # the derivative of RELAX along a variation of y
-    OWN_SLOPE = auto()  # the part of SLOPE at the site itself, as a matrix
+    OWN_SLOPE = auto()  # the part of SLOPE from the same site, as a matrix
     SIDE = auto()  # the derivative of RELAX along a variation of x
     FOLLOW = auto()  # the derivative of ADVANCE along a variation of y
     GATHER = auto()  # terms of sums over bonds or pairs
@@ -44,12 +45,12 @@ class Role(Enum):
 
     @property
     def is_sweep(self) -> bool:
-        """Whether a kernel has the increments of a state, or of a variation."""
+        """Whether the kernel computes the increments of a state or of a variation."""
         return self in (Role.SWEEP, Role.SWEEP_TANGENT)
 
     @property
     def is_stage(self) -> bool:
-        """Whether a kernel belongs to the equation of a stage."""
+        """Whether the kernel belongs to the equation of a stage."""
         is_sweep_or_observable = self.is_sweep or self.is_observable
         return (
             self in (Role.RELAX, Role.ADVANCE, Role.OWN_SLOPE, *_OF_STARTS, *_OF_VARIATIONS)
@@ -58,18 +59,19 @@ class Role(Enum):
 
     @property
     def is_observable(self) -> bool:
-        """Whether a kernel computes observables, which are no part of a step."""
+        """Whether the kernel computes observables, which are not part of a step."""
         fields = (Role.CASIMIRS, Role.VECTOR_FIELD, Role.OBSERVABLES, Role.SITE_OBSERVABLES)
         return self.is_energy or self in fields
 
     @property
     def is_energy(self) -> bool:
-        """Whether a kernel has the density of an energy, of which bonds and pairs add shares, or its derivative."""
+        """Whether the kernel computes the density of an energy, or its derivative; bonds and pairs add to such
+        densities."""
         return self in (Role.ENERGY, Role.ENERGY_SLOPE)
 
     @property
     def is_transposed_stage(self) -> bool:
-        """Whether a kernel is the transpose of one of the equation of a stage."""
+        """Whether the kernel is the transpose of a kernel of the equation of a stage."""
         return self in (Role.TRANSPOSED_RELAX, Role.TRANSPOSED_ADVANCE)
 
     @property
@@ -78,7 +80,7 @@ class Role(Enum):
         return Role[f"TRANSPOSED_{self.name}"]
 
 
-#: Kernels that read the start of a stage, and those that read variations.
+#: Roles of kernels that read the start of a stage, and of those that read variations.
 _OF_STARTS = frozenset({Role.RELAX, Role.SLOPE, Role.SIDE})
 _OF_VARIATIONS = frozenset({Role.SWEEP_TANGENT, Role.SLOPE, Role.SIDE, Role.FOLLOW, Role.ENERGY_SLOPE})
 
@@ -98,10 +100,10 @@ class Kernel:
     ``inputs`` maps the name of an argument to the symbols of its entries. ``named`` are values that get a name in the
     generated code (momenta, second derivatives).
 
-    ``exponentials`` are parts of the first output, by start and number of rows, that hold a matrix A; exp(A) − 1 is
-    returned in its place. In the transpose of such a kernel, ``exponents`` computes the matrices A one after the
-    other, and the input `EXPONENTS` has their cotangents, which follow from those of exp(A) − 1 in the input
-    ``coef_bar``.
+    ``exponentials`` are parts of the first output, given by start and number of rows, that hold a matrix A; the
+    generated function returns exp(A) − 1 in its place. In the transpose of such a kernel, ``exponents`` computes the
+    matrices A one after the other. The input `EXPONENTS` has the cotangents of the A, which follow from those of exp(A)
+    − 1 in the input ``coef_bar``.
     """
 
     name: str
@@ -129,6 +131,6 @@ class Kernel:
         return [v for o in self.outputs for v in o.values]
 
     def along(self, array: str) -> list[tuple[str, Expression]]:
-        """Return, for a transpose, the symbols of an input with their cotangents."""
+        """Return, for a transposed kernel, the symbols of the input ``array``, each with its cotangent."""
         values = next((o.values for o in self.outputs if o.name == f"{array}_bar"), ())
         return list(zip(self.inputs[array] if values else (), values, strict=True))

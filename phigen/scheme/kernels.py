@@ -30,14 +30,15 @@ from phigen.symbolic.symbols import STEP, Symbol, momentum
 
 #: Largest dimension whose elimination is unrolled for every pattern.
 UNROLLED_DIMENSION = 4
-#: Largest share of n³ operations with which the elimination of a larger matrix is unrolled; a full matrix takes 0.7 n³.
+#: Largest share of n³ operations with which the elimination of a larger matrix is unrolled; a full matrix needs 0.7 n³.
 MAX_SPARSE_SHARE = 0.6
 
 
 def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expression], Sequence[Expression]]:
-    """Return α − y and β − α; half of the impulse hf of a vector force f acts before and half after the motion.
+    """Return α − y and β − α, with half of the impulse hf of a vector force f before the motion and half after it.
 
-    That is α(y, p) = x + hf(y)/2 and x' = β(y, p) + hf(y)/2: symmetric if the bi-realisation is, hence of order 2.
+    So α(y, p) = x + hf(y)/2 and x' = β(y, p) + hf(y)/2. The step is symmetric if the bi-realisation is, hence of order
+    2.
     """
     if system.forces is None:
         return realisation.displacement, realisation.increment
@@ -47,7 +48,7 @@ def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expressio
 
 
 def is_centred(system: System, realisation: BiRealisation) -> bool:
-    """Whether y is the mean of the ends of a step; then the Jacobian of the increment is 2(1 − J)."""
+    """Whether y is the mean of the ends of a step; then the derivative of the increment is 2(1 − J)."""
     half = number(Fraction(1, 2))
     means = [a + half * d for a, d in zip(*ends(system, realisation), strict=True)]
     names = [*system.coordinates, *map(momentum, system.coordinates)]
@@ -57,7 +58,7 @@ def is_centred(system: System, realisation: BiRealisation) -> bool:
 def explicit_kernel(
     system: System, realisation: BiRealisation, generating: GeneratingFunction, coefficients: Coefficients
 ) -> Kernel | None:
-    """Return the increment of a step if the equation for y is solved by substitution; else None."""
+    """Return the kernel of the increment of a step if the equation for y can be solved by substitution; else None."""
     coordinates = system.coordinates
     to_start, to_end = ends(system, realisation)
     displacement = at_momenta(to_start, coordinates, generating.slope)
@@ -77,7 +78,7 @@ def explicit_kernel(
 def linearise_kernel(
     system: System, realisation: BiRealisation, generating: GeneratingFunction, coefficients: Coefficients
 ) -> Kernel:
-    """Return the kernel of one Newton iteration at a point, see `phigen.scheme.step`."""
+    """Return the kernel of one Newton iteration at a point; see `phigen.scheme.step`."""
     n, coordinates = system.dimension, system.coordinates
     point = linearise(*ends(system, realisation), coordinates, generating)
     flat = [
@@ -103,7 +104,7 @@ def linearise_kernel(
 
 @dataclass(frozen=True)
 class Solvers:
-    """Kernels that solve linear equations with the Newton matrix; see `phigen.scheme.steps.Newton`."""
+    """Kernels that solve linear equations with the Newton matrix, as in `phigen.scheme.steps.Newton`."""
 
     eliminate: Kernel | None = None
     invert: Kernel | None = None
@@ -111,7 +112,10 @@ class Solvers:
 
 
 def newton_solvers(linearised: Kernel, *, centred: bool) -> Solvers:
-    """Return elimination by the pattern of the Jacobian, where unrolling pays; ``centred`` as in `is_centred`."""
+    """Return the elimination kernels for the pattern of the Jacobian, if unrolled code is worthwhile.
+
+    ``centred`` is the result of `is_centred`.
+    """
     jacobian, slope = _patterns(linearised)
     n = len(jacobian)
     if n <= UNROLLED_DIMENSION:
@@ -122,12 +126,12 @@ def newton_solvers(linearised: Kernel, *, centred: bool) -> Solvers:
 
 
 def transposed_elimination_kernel(linearised: Kernel) -> Kernel:
-    """Return elimination for the transpose of the Jacobian, by the pattern of the Jacobian itself."""
+    """Return the elimination kernel for the transposed Jacobian, by the pattern of the Jacobian."""
     return _elimination_kernel(_patterns(linearised)[0], transposed=True)
 
 
 def _patterns(linearised: Kernel) -> tuple[Pattern, Pattern]:
-    """Return the entries of the Jacobian, and of the slope of the increment, that may differ from zero."""
+    """Return two patterns: entries that may be nonzero in the Jacobian, and in the derivative of the increment."""
     _, _, jacobian, slope = linearised.outputs
     return _pattern(jacobian.values), _pattern(slope.values)
 
@@ -159,7 +163,7 @@ def _entries(name: str, n: int) -> tuple[str, ...]:
 
 
 def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
-    """Return elimination in two parts, for many right-hand sides, and the product of each solution with the slope."""
+    """Return elimination in two kernels, for many right-hand sides; solutions are also multiplied by the ``slope``."""
     n, factor_symbols = len(slope), factors.named("f")
     side = tuple(Symbol("r", i) for i in range(n))
     solution = factor_symbols.solved([symbol(s) for s in side])
@@ -181,7 +185,10 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
 
 
 def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
-    """Return the inverse of a matrix J, and the slope times it, unrolled; if ``centred``, the slope is 2(1 − J)."""
+    """Return the kernel of the inverse of a matrix J and of the slope times it, unrolled.
+
+    If ``centred``, the slope is 2(1 − J).
+    """
     n = len(pattern)
     entries, reciprocals = inversion(pattern)
     if centred:
@@ -199,7 +206,7 @@ def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
 
 
 def generate_kernel(system: System, generating: GeneratingFunction, coefficients: Coefficients) -> Kernel:
-    """Return ∇S_h at the mean m of a path, and 1 − ½ Hess S_h(m) π(m).
+    """Return the kernel of ∇S_h at the mean m of a path, and of the matrix 1 − ½ Hess S_h(m) π(m).
 
     The matrix is the Jacobian of p − ∇S_h(m(p)) up to O(h²).
     """
@@ -220,7 +227,7 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
 
 
 def path_elimination(n: int) -> Kernel | None:
-    """Return elimination for the equation for p, whose matrix is full; None where a loop is faster."""
+    """Return the elimination kernel for the equation for p, whose matrix is full; None if a loop is faster."""
     return _elimination_kernel(full(n)) if n <= UNROLLED_DIMENSION else None
 
 
@@ -233,19 +240,19 @@ def _outputs(values: Sequence[Expression], names: Sequence[str], sizes: Sequence
 
 
 def system_inputs(system: System) -> dict[str, tuple[str, ...]]:
-    """Return the arguments of a function on phase space: parameters, the time if there is one, coordinates."""
+    """Return the arguments of a function on phase space: parameters, the time if H depends on it, coordinates."""
     time = {"t": system.times} if system.time else {}
     return {"params": system.parameter_names, **time, "x": system.coordinates}
 
 
 def step_inputs(system: System) -> dict[str, tuple[str, ...]]:
-    """Return the inputs of a step besides its size: the time and the increments of the noise, where they exist."""
+    """Return the inputs of a step other than its size: the time and the increments of the noise, if there are any."""
     inputs = {"t": system.times, "dw": system.increments}
     return {name: symbols for name, symbols in inputs.items() if symbols}
 
 
 def noise_fields(system: System) -> Kernel:
-    """Return the kernel of σπ∇g for each source of noise."""
+    """Return the kernel of σπ∇g for all sources of noise."""
     fields = [hamiltonian_vector_field(system.poisson, s.impulse(system.coordinates)) for s in system.noise]
     values = tuple(e for field in fields for e in field)
     purpose = "sigma pi(x) grad g(x) of each source of noise"

@@ -1,10 +1,10 @@
-"""The explicit monitor of a splitting in two, H = A + B: K = log(A + e) − log(−B).
+"""The explicit monitor of a splitting in two parts, H = A + B: K = log(A + e) − log(−B).
 
-A is constant along its own flow, so the flow of log(A + e) is that of A over the time τ/(A + e), and the flow of
-−log(−B) is that of B over τ/(−B). The orbits are those of H where K = 0, that is A + e = −B; e = −H(x₀) is held
-fixed. The flow of A takes the physical time ∂K/∂e τ = τ/(A + e), that of B none. Needs A + e > 0 and −B > 0: S.
-Mikkola, K. Tanikawa, Celestial Mechanics and Dynamical Astronomy 74 (1999); M. Preto, S. Tremaine, Astron. J. 118
-(1999).
+A is constant along its own flow, so the flow of log(A + e) is that of A over the time τ/(A + e). Likewise the flow of
+−log(−B) is that of B over τ/(−B). The orbits are those of H where K = 0, that is, where A + e = −B; e = −H(x₀) is held
+fixed. The flow of A takes the physical time ∂K/∂e τ = τ/(A + e), that of B takes none. A + e > 0 and −B > 0 are
+required: S. Mikkola, K. Tanikawa, Celestial Mechanics and Dynamical Astronomy 74 (1999); M. Preto, S. Tremaine, Astron.
+J. 118 (1999).
 """
 
 from __future__ import annotations
@@ -30,28 +30,29 @@ from phigen.symbolic.symbols import LEVEL
 
 @dataclass(frozen=True)
 class Logarithmic:
-    """The parts of H, identified by the expression of the Hamiltonian of their flows: ``negative`` is B."""
+    """The monitor of a splitting. ``negative`` is B, the Hamiltonian of one of the flows."""
 
     negative: Expression
 
     def outputs(self, flow: Flow) -> tuple[Expression, ...]:
         """Return the outputs of the kernel of a flow of K.
 
-        These are the increments, the physical time of the flow, and a root that is no number outside the domain.
+        They are the increments, the physical time of the flow, and the square root of A + e or −B, which is NaN outside
+        the domain.
         """
         argument, time = self._argument(flow), self.time(flow)
         increments = substitute(flow.increment, {TIME: time})
         return (*increments, ZERO if self._is_negative(flow) else time, power(argument, Fraction(1, 2)))
 
     def time(self, flow: Flow) -> Expression:
-        """Return the time over which the flow of the part of H runs, for a flow of K in τ."""
+        """Return the duration of the flow of the part of H that is the flow of K over τ."""
         return symbol(TIME) * power(self._argument(flow), -1)
 
     def _argument(self, flow: Flow) -> Expression:
         return -flow.hamiltonian if self._is_negative(flow) else flow.hamiltonian + symbol(LEVEL)
 
     def monitor(self, system: System) -> Monitor:
-        """Return dt/dτ = 1/(−B)."""
+        """Return the record of the monitor, with dt/dτ = 1/(−B)."""
         return Monitor(rate_kernel(system, power(-self.negative, -1)), None)
 
     def _is_negative(self, flow: Flow) -> bool:
@@ -59,19 +60,19 @@ class Logarithmic:
 
     @property
     def fact(self) -> str:
-        """The line of the header."""
+        """The line about the monitor in the header of generated files."""
         return fact_of(str(self.negative))
 
 
 def fact_of(negative: str) -> str:
-    """Return the line of the header on a monitor with this B."""
+    """Return the header line of a monitor with this B."""
     return f"monitor: log, steps are equal in tau; K = log(A + e) - log(-B) with B = {negative}"
 
 
 def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:
     """Return the monitor of a splitting, or None if the spec has none.
 
-    Raises `SpecError` if H is not split in two parts A and B as the monitor requires.
+    Raises `SpecError` unless H is split into two parts A and B as the monitor requires.
     """
     if spec.monitor is None:
         return None
@@ -101,18 +102,20 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
 
 
 def composition_of(requested: str, order: int) -> str:
-    """Return the composition of a splitting with this monitor: a composition of Strang's, unless the spec names one.
+    """Return the composition of a splitting with this monitor: one of Strang's splitting, unless the spec names
+    another.
 
-    Steps of Strang's splitting of K, of any size, stay on the orbit of a Kepler motion; those of others need not.
+    Steps of Strang's splitting of K, of any size, stay on the orbit of a Kepler motion. Steps of other methods need
+    not.
     """
     composition = find("auto", order + order % 2)
     return composition.name if requested == "auto" and composition else requested
 
 
 def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
-    """Whether an expression is negative: by its form, or at the start of all runs.
+    """Whether an expression is negative, by its form or at the start of all runs.
 
-    Without runs it may be 0 too.
+    Without runs, 0 counts as negative.
     """
     sign = sign_of(-e, system.positive)
     if sign == POSITIVE or (sign == NOT_NEGATIVE and not spec.runs):
@@ -128,6 +131,6 @@ def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
 
 
 def trimmed(kernel: Kernel, count: int) -> Kernel:
-    """Return the kernel of a flow with the increments of the coordinates only."""
+    """Return the kernel of a flow with its first ``count`` outputs only, the increments of the coordinates."""
     (output,) = kernel.outputs
     return replace(kernel, outputs=(replace(output, values=output.values[:count]),))

@@ -15,8 +15,8 @@ from phigen.symbolic.expression import Expression, fold, raw, symbol, topologica
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import TEMPORARY, Symbol
 
-#: Cost of an operation in units of one addition, measured on current x86-64 processors (throughput); a call is a call
-#: of a function of the library.
+#: Cost of an operation in units of one addition: throughput measured on current x86-64 processors. A call is one of a
+#: library function.
 COST = {"add": 1, "sub": 1, "mul": 1, "neg": 0, "reciprocal": 4, "sqrt": 5, "call": 20}
 
 #: Largest number of operations in one printed statement, so that lines remain readable.
@@ -25,14 +25,15 @@ MAX_STATEMENT_OPERATIONS = 14
 
 @dataclass(frozen=True)
 class Assignment:
-    """``target`` = ``value``, where the value is a tree over symbols and temporaries of earlier assignments."""
+    """``target`` = ``value``; the value is a tree over symbols and over temporaries of earlier assignments."""
 
     target: str
     value: Expression
 
 
 def expand_powers(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with these powers only: 2 (a square), −1, ½, ⅓ and powers that need the function."""
+    """Return the roots with powers rewritten: only squares, reciprocals, square roots, cube roots and calls of pow
+    remain."""
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op == "pow":
@@ -44,7 +45,7 @@ def expand_powers(roots: Sequence[Expression]) -> list[Expression]:
 
 def _power(base: Expression, exponent: Fraction) -> Expression:
     if exponent < 0:
-        if exponent.denominator == 1:  # one reciprocal, shared by all negative powers of the base
+        if exponent.denominator == 1:  # one reciprocal, which all negative powers of the base share
             return _integer_power(raw("pow", (base,), Fraction(-1)), -int(exponent))
         # One reciprocal root, then products: r**(-3/2) is (1/sqrt(r))**3.
         root = _root(base, exponent.denominator)
@@ -62,7 +63,10 @@ def _power(base: Expression, exponent: Fraction) -> Expression:
 
 
 def _root(base: Expression, degree: int) -> Expression | None:
-    """Return the root by square roots and at most one cube root, shared by other powers; None for other degrees."""
+    """Return the root of a base by square roots and at most one cube root; None for other degrees.
+
+    Other powers of the base share the roots.
+    """
     if degree in (2, 3):
         return raw("pow", (base,), Fraction(1, degree))
     half = _root(base, degree // 2) if degree % 2 == 0 else None
@@ -93,7 +97,7 @@ def _cost(e: Expression) -> int:
 
 
 def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with ½(ab) and ½(ac) written as (½a)b and (½a)c, if that takes fewer operations."""
+    """Return the roots with ½(ab) and ½(ac) written as (½a)b and (½a)c, if this needs fewer operations."""
     roots = list(roots)
     while True:
         regrouped = _numbers_regrouped(roots)
@@ -103,9 +107,9 @@ def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with numbers first multiplied into a factor.
+    """Return the roots in which a number is first multiplied into one factor of a product.
 
-    In a product of a number and a product, the factor is the one that most products with the same number have.
+    The factor is the one that the most products with the same number contain.
     """
     scaled = [e for e in topological(roots) if e.op == "mul" and e.args[0].is_number and e.args[1].op == "mul"]
     counts = Counter((e.args[0], factor) for e in scaled for factor in e.args[1].args)
@@ -123,7 +127,7 @@ def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:
-    """Return the numbers of additions, multiplications, divisions and function calls of the roots together."""
+    """Return the numbers of additions, multiplications, divisions and function calls of all roots together."""
     counts = {"additions": 0, "multiplications": 0, "divisions": 0, "functions": 0}
     for e in topological(expand_powers(roots)):
         if e.op in ("add", "sub"):
@@ -142,9 +146,9 @@ def assign(
 ) -> tuple[list[Assignment], list[Expression]]:
     """Return assignments of temporaries, and the roots as trees over them.
 
-    These values get a temporary: values used more than once, values named in ``temporaries`` (by ``id`` of the node
-    in the graph of ``roots``), operands of squares, and values whose tree would exceed `MAX_STATEMENT_OPERATIONS`
-    operations. The roots must have passed `expand_powers`.
+    A value gets a temporary if it is used more than once, is named in ``temporaries`` (by ``id`` of the node in the
+    graph of ``roots``), is the operand of a square, or its tree would exceed `MAX_STATEMENT_OPERATIONS` operations. The
+    roots must have passed `expand_powers`.
     """
     temporaries = temporaries or {}
     order = topological(roots)

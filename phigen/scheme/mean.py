@@ -1,8 +1,9 @@
-"""Derivatives along the mean of a path, from those along its middle, about which the path is expanded.
+"""Derivatives with respect to the mean of a path, from those with respect to its middle, about which the path is
+expanded.
 
 Let the path take the time −1 … 1 under p/2, so that it starts at α and ends at β. Let even and odd be the sums of the
 terms of even and odd order of its Taylor series: α = even − odd and β − α = 2 odd, and likewise for derivatives. Each
-sum of derivatives is an n×2n matrix, along the middle m, then along p.
+sum of derivatives is an n×2n matrix: derivatives with respect to the middle m, then to p.
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ from phigen.symbolic.symbols import Symbol
 
 
 def along_mean(n: int) -> Kernel:
-    """Return derivatives of the ends of a path in n coordinates along its mean y, from those along m and p.
+    """Return the kernel of the derivatives of the ends of a path with respect to its mean y, from those along m and p.
 
-    For fixed p, the derivative of m along y is M⁻¹, with M the derivative of the mean along m. With p = ∇S_h(y) it is
-    M⁻¹ (1 − N H), with N the derivative of the mean along p and H the Hessian of S_h.
+    The path has n coordinates. For fixed p, the derivative of m with respect to y is M⁻¹, with M the derivative of the
+    mean with respect to m. With p = ∇S_h(y) it is M⁻¹ (1 − N H), with N the derivative of the mean with respect to p
+    and H the Hessian of S_h.
     """
     inputs = {name: tuple(Symbol(name, i) for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
     inputs["hessian"] = tuple(Symbol("hessian", i) for i in range(n * n))

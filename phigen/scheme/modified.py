@@ -19,7 +19,8 @@ from phigen.symbolic.symbols import STEP
 
 
 def powers(order: Order, count: int, *, symmetric: bool) -> list[int]:
-    """Return the powers of h of the first ``count`` corrections: order, order + 1, …, or every second if symmetric."""
+    """Return the powers of h of the first ``count`` corrections: order, order + 1, …; every second one if
+    ``symmetric``."""
     return [order.order + (2 if symmetric else 1) * k for k in range(count)]
 
 
@@ -31,10 +32,10 @@ def corrections(
     gauge: Gauge | None = None,
     values: Mapping[str, Fraction] | None = None,
 ) -> ModifiedSeries:
-    """Return H_0, H_1, … of H − Σ λC with ``count`` corrections, in a tower that contains the step size.
+    """Return H_0, H_1, … of the modified Hamiltonian of H − Σ λC with ``count`` corrections.
 
-    ``values`` of parameters are substituted, which shortens formulas. Raises `LimitError` if a correction is too
-    large.
+    The tower contains the step size. ``values`` of parameters are substituted, which shortens formulas. Raises
+    `LimitError` if a correction is too large.
     """
     gauge = gauge or Gauge()
     gauged = gauge.applied(system)
@@ -62,7 +63,7 @@ def corrections(
 def modified_hamiltonian(
     system: System, realisation: BiRealisation, order: Order, count: int, gauge: Gauge | None = None
 ) -> Expression:
-    """Return H̃_h as one expression in coordinates, parameters, gauge and step size."""
+    """Return H̃_h as one expression in coordinates, parameters, symbols of the gauge and step size."""
     series = corrections(system, realisation, order, count, gauge)
     h = series.tower.variable(STEP)
     summed = series.tower.expression(series.tower.combine([t * h**j for j, t in enumerate(series.terms)]))
@@ -72,7 +73,7 @@ def modified_hamiltonian(
 
 
 def expect_modified(system: System, realisation: BiRealisation, stages: int) -> None:
-    """Raise `SpecError` for compositions, forces and approximate bi-realisations, for which H̃_h is not computed."""
+    """Raise `SpecError` for compositions, forces and approximate bi-realisations, for which H̃_h is not available."""
     if stages > 1 or not realisation.exact or system.forces:
         obstacle = "a composition" if stages > 1 else "a system with forces"
         obstacle = obstacle if realisation.exact else "an approximate bi-realisation"
@@ -83,7 +84,7 @@ def expect_modified(system: System, realisation: BiRealisation, stages: int) -> 
 def modified_of(
     system: System, realisation: BiRealisation, order: Order, gauge: Gauge, count: int, stages: int
 ) -> Modified:
-    """Return the modified Hamiltonian as a kernel. Raises `SpecError` where `expect_modified` does."""
+    """Return the modified Hamiltonian as a kernel. Raises the errors of `expect_modified`."""
     expect_modified(system, realisation, stages)
     value = modified_hamiltonian(system, realisation, order, count, gauge)
     time = {"t": system.times} if system.time else {}

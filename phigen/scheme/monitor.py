@@ -1,13 +1,13 @@
 """Steps of equal size in τ, dt = g dτ, g > 0, that are Poisson maps: a monitored system.
 
-With a canonical pair (t, e) added to the coordinates, K = g(x)(H(x) + e) has the orbits of H where K = 0, that is for
-e = −H(x₀), and along them dt/dτ = ∂K/∂e = g. K does not depend on t, so e is constant: for the solver, a parameter
-with a value for each trajectory. In the midpoint realisation of the pair, the step in x is that of the series S_τ(x;
-e) of K, and t₁ − t₀ = ∂S_τ/∂e at its point y. The time has the order of the method, since (t, x) is one step of one
+A canonical pair (t, e) is added to the coordinates. K = g(x)(H(x) + e) has the orbits of H where K = 0, that is for e =
+−H(x₀), and along them dt/dτ = ∂K/∂e = g. K does not depend on t, so e is constant: for the solver, e is a parameter
+with a value for each trajectory. In the midpoint realisation of the pair, the step in x is that of the series S_τ(x; e)
+of K, and t₁ − t₀ = ∂S_τ/∂e at its point y. The time has the order of the method, since (t, x) is one step of one
 method.
 
-With forces −H(x) is not constant and no step is a Poisson map, so K is not used. Instead p = τg(∇H + ζ) and the
-impulse τgf at y, with t₁ − t₀ = τg(y), form a symmetric step of order 2 for (t, x).
+With forces −H(x) is not constant and no step is a Poisson map, so K is not used. Instead p = τg(∇H + ζ) and the impulse
+τgf at y, with t₁ − t₀ = τg(y), form a symmetric step of order 2 for (t, x).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.spec.model import Spec
 from phigen.symbolic.expression import Expression
 
-#: Alternative where H depends on the time, so that e is not constant: t and e as coordinates.
+#: Alternative if H depends on the time, so that e is not constant: t and e as coordinates.
 EXTENDED_SYSTEM_HINT = (
     "without time: make t and e coordinates too, a canonical pair; hamiltonian: g*(H + e), with e = -H at the start"
 )
 
 
 def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | None:
-    """Return ∂S_τ/∂e at the point y of a step; None for a system that is not monitored."""
+    """Return the kernel of ∂S_τ/∂e at the point y of a step; None for a system without a monitor."""
     if generating.elapsed is None:
         return None
     (value,) = generating.coefficients.hoist([generating.elapsed])
@@ -41,7 +41,7 @@ def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | N
 
 
 def rate_kernel(system: System, monitor: Expression) -> Kernel:
-    """Return dt/dτ at a state."""
+    """Return the kernel of dt/dτ at a state."""
     return Kernel(
         "monitor",
         "dt/dtau, which has to be positive",
@@ -51,7 +51,7 @@ def rate_kernel(system: System, monitor: Expression) -> Kernel:
 
 
 def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
-    """Yield the line of the header, if there is a monitor."""
+    """Yield the line about the monitor in the header of generated files, if there is a monitor."""
     if monitor and forced:
         yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau; e has no part in them"
     elif monitor:
@@ -59,7 +59,7 @@ def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
 
 
 def monitor_of(spec: Spec) -> Expression | None:
-    """Return g of a spec whose step is that of a series. Raises `SpecError` where g does not apply."""
+    """Return the monitor g of a spec whose steps are those of a series. Raises `SpecError` if g does not apply."""
     if spec.monitor is None:
         return None
     obstacles = {"time:": spec.time, "lattice:": spec.lattice}

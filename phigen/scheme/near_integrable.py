@@ -29,7 +29,7 @@ from phigen.gauss.tableau import gauss_nodes
 from phigen.scheme.alternation import Alternation, Schedule
 from phigen.scheme.corrector import corrector, schedule
 
-# The first halves of a and b with their middles, to 60 digits: zeros of the conditions by Newton's method.
+# The first halves of a and b with their middle values, to 60 digits: solutions of the conditions by Newton's method.
 _8_4 = (
     "0.0753469602698928884165278036834744643726526645540790631409721 "
     "0.517916854688256782300773978496315644323847447821980915025719 "
@@ -65,8 +65,8 @@ _10_6_4 = (
 class NearIntegrable(Alternation):
     """A method for H = A + εB.
 
-    ``generalised`` has the powers of h at which errors in ε, ε², … begin; ``a`` and ``b`` are the fractions of the
-    flows of A and of B.
+    ``generalised`` has the powers of h at which the errors of order ε, ε², … begin. ``a`` and ``b`` are the fractions
+    of the step of the flows of A and of B.
     """
 
     generalised: tuple[int, ...] = ()
@@ -75,23 +75,23 @@ class NearIntegrable(Alternation):
 
     @property
     def errors(self) -> str:
-        """The leading errors, as text: ε h^8 + ε² h^4."""
+        """The leading errors as text, such as ε h^8 + ε² h^4."""
         powers = ("ε", "ε²", "ε³")
         return " + ".join(f"{power} h^{m}" for power, m in zip(powers, self.generalised, strict=False))
 
 
 @dataclass(frozen=True)
 class Corrected(NearIntegrable):
-    """Steps of one flow of B and one of A, between a `corrector`, given by its times, and its inverse.
+    """Steps of one flow of B and one of A, between the inverse of a `corrector` and the corrector, given by its times.
 
-    In a step B has ``multiple`` h² {B, {B, A}} beside it; in the corrector it has not.
+    In a step ``multiple`` h² {B, {B, A}} is added to B; in the corrector it is not.
     """
 
     corrector: tuple[Fraction, ...] = ()
     multiple: Fraction = Fraction(0)
 
     def schedule(self) -> Schedule:
-        """Return the flows of a step, where part 0 is B, and those of the corrector."""
+        """Return the flows of a step, in which part 0 is B, and those of the corrector."""
         flows = schedule(self.corrector)
         if not self.multiple:
             return flows
@@ -99,7 +99,7 @@ class Corrected(NearIntegrable):
 
 
 def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[Fraction]) -> NearIntegrable:
-    """Return the method with these fractions, which sum to 1."""
+    """Return the method with these fractions of the flows of A and B, each of which sum to 1."""
     times = [t for pair in zip(a, b, strict=False) for t in pair]
     alpha = [times[0]]
     for t in times[1:]:
@@ -110,13 +110,13 @@ def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[
 def _method_from_halves(
     name: str, generalised: tuple[int, ...], stages: int, halves: tuple[str, str]
 ) -> NearIntegrable:
-    """Return the method from the first halves of a and b; their middles complete the sums to 1."""
+    """Return the method with these first halves of a and b, including the middle values."""
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     return _method(name, generalised, _mirrored(a, stages + 1), _mirrored(b, stages))
 
 
 def _mirrored(half: list[Fraction], count: int) -> list[Fraction]:
-    """Return all ``count`` fractions; the last one of the first half is adjusted so that the sum is exact."""
+    """Return all ``count`` fractions from the first half; its last one is adjusted so that the sum is exactly 1."""
     outer, odd = half[:-1], count % 2
     last = 1 - 2 * sum(outer, Fraction(0)) if odd else Fraction(1, 2) - sum(outer, Fraction(0))
     return [*outer, last, *([] if odd else [last]), *reversed(outer)]
@@ -132,7 +132,7 @@ def _quadrature(stages: int) -> NearIntegrable:
 
 
 def _weight(nodes: list[Fraction], i: int) -> Fraction:
-    """Return the integral over [0, 1] of the polynomial that is 1 at one node and 0 at the others."""
+    """Return the integral over [0, 1] of the polynomial that is 1 at node i and 0 at the other nodes."""
     p = [Fraction(1)]
     for c in (c for j, c in enumerate(nodes) if j != i):
         p = [(x - c * y) / (nodes[i] - c) for x, y in zip([Fraction(0), *p], [*p, Fraction(0)], strict=True)]
@@ -140,7 +140,7 @@ def _weight(nodes: list[Fraction], i: int) -> Fraction:
 
 
 def _modified(order: int) -> Corrected:
-    """Return the method with a modified flow of B and the corrector of an order: without errors of ε² h²."""
+    """Return the method with a modified flow of B, without errors ε² h², and the corrector of an order."""
     unmodified = _wisdom_holman(order)
     return replace(
         unmodified,
@@ -153,7 +153,7 @@ def _modified(order: int) -> Corrected:
 
 
 def _wisdom_holman(order: int) -> Corrected:
-    """Return the method with the corrector of an order; 1 is that without a corrector."""
+    """Return the method with the corrector of an order; order 1 has no corrector."""
     name = "wisdom-holman" if order == 1 else f"wisdom-holman-{order}"
     half = Fraction(1, 2)
     return Corrected(name, 2, (half, half), (order + 1, 2), (half, half), (Fraction(1),), corrector(order))

@@ -1,8 +1,8 @@
-"""Flows of noise in splittings: half a step before, and half a step after the flows of H; header lines on noise.
+"""Flows of noise in splittings: half a step before, and half a step after the flows of H. Header lines on noise.
 
 The increments of both halves are independent, so the mean of a step is exp(hN/2) exp(hA) exp(hN/2), with A the
-generator of the motion and N = ½ Σ X² that of the noise. The weak order is 2, as the sources are split symmetrically
-too.
+generator of the motion and N = ½ Σ X² that of the noise. Since the sources are also split symmetrically, the weak order
+is 2.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ def expect_no_adjoint(system: System, adjoint: bool) -> None:
 
 
 def noise_facts(system: System, weak: int) -> Iterator[str]:
-    """Yield the lines of the header on noise."""
+    """Yield the lines about noise in the header of generated files."""
     yield from noise_lines([s.name for s in system.noise], weak)
 
 
 def noise_lines(sources: Sequence[str], weak: int) -> Iterator[str]:
-    """Yield the lines of the header on sources of noise with these names."""
+    """Yield the header lines on sources of noise with these names."""
     if not sources:
         return
     names = ", ".join(sources)
@@ -42,7 +42,7 @@ def noise_lines(sources: Sequence[str], weak: int) -> Iterator[str]:
 
 
 def noise_flows(system: System) -> tuple[Flow, ...]:
-    """Return the flow of g of each source. `SpecError` for one whose flow is not elementary."""
+    """Return the flow of g for each source. Raises `SpecError` for a source whose flow is not elementary."""
     return tuple(_flow(system, source) for source in system.noise)
 
 
@@ -61,18 +61,18 @@ def _flow(system: System, source: Source) -> Flow:
 
 
 def driving_times(system: System) -> list[Expression]:
-    """Return the times σ ΔW of the flows of the sources, with one symbol for the increment ΔW of any row."""
+    """Return the durations σ ΔW of the flows of the sources; the increment ΔW is one symbol."""
     return [source.amplitude * symbol(increment(0)) for source in system.noise]
 
 
 def driven(system: System) -> list[Flow]:
-    """Return the flows of the sources for these times. `SpecError` for one whose flow is not elementary."""
+    """Return the flows of the sources over these durations. Raises `SpecError` for a flow that is not elementary."""
     timed_flows = zip(noise_flows(system), driving_times(system), strict=True)
     return [replace(flow, increment=tuple(substitute(flow.increment, {TIME: time}))) for flow, time in timed_flows]
 
 
 def with_noise(schedule: Schedule, sources: int) -> Schedule:
-    """Return the schedule with the sources as the first parts: forwards at the start of a step, backwards at its end.
+    """Return the schedule with the sources as the first parts, in order at the start of a step and reversed at its end.
 
     The first rows of ``times`` belong to the sources at the start, the last rows to those at the end.
     """

@@ -1,8 +1,8 @@
 """Splitting methods for two parts with {V, {V, {V, T}}} = 0: Runge–Kutta–Nyström methods, and modified potentials.
 
 A step alternates flows of T and V, Φ_h = φ_{t_n h} ∘ … ∘ φ_{t_1 h}, with t_i = t_{n+1−i}. The condition leaves fewer
-order conditions than two arbitrary parts have. Where V + κ{V, {V, T}} also has an elementary flow, each kick may have
-a multiple κ_i = m_i h², which adds unknowns to solve them with (`phigen.splitting.kicks`).
+order conditions than two arbitrary parts have. If V + κ{V, {V, T}} also has an elementary flow, each kick may have a
+multiple κ_i = m_i h². These are further unknowns of the order conditions (`phigen.splitting.kicks`).
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from phigen.scheme.alternation import Schedule
 
 @dataclass(frozen=True)
 class Nystrom:
-    """A named method: the times t_i of all flows, in order, and the multiples m_i of modified kicks.
+    """A Nyström method: the times t_i of all flows, in order, and the multiples m_i of modified kicks.
 
-    ``kicks_first`` says that V is followed first. ``error`` is the Euclidean norm of the leading error, in the basis
-    of the Lie algebra of `tests/splitting/nystrom_algebra.py`; methods are compared by it.
+    ``kicks_first`` says whether a step begins with a flow of V. ``error`` is the Euclidean norm of the leading error,
+    in the basis of the Lie algebra of `tests/splitting/nystrom_algebra.py`, by which methods are compared.
     """
 
     name: str
@@ -30,7 +30,7 @@ class Nystrom:
 
     @property
     def stages(self) -> int:
-        """The number of flows of the part that is followed last."""
+        """The number of flows of the part that a step does not begin with."""
         return len(self.times) // 2
 
     @property
@@ -39,7 +39,7 @@ class Nystrom:
         return self.stages + self.kicks_first
 
     def schedule(self) -> Schedule:
-        """Return the flows of a step, where part 0 is the one that is followed first."""
+        """Return the flows of a step; part 0 is the one that a step begins with."""
         multiples = []
         if self.multiples:
             kicks = iter(self.multiples)
@@ -50,16 +50,16 @@ class Nystrom:
 
 
 def _method(name: str, order: int, first: str, half: str, error: float, multiples: str = "") -> Nystrom:
-    """Return the method with these times up to the middle one, and the multiples of the kicks among them."""
+    """Return a method from its times up to the middle one, and the multiples of the kicks among them."""
     times = [Fraction(v) for v in half.split()]
     kicks = [Fraction(v) for v in multiples.split()]
-    middle_kicks = (len(times) - 1) % 2 != (first == "V")  # the middle flow is a kick and occurs once
+    middle_kicks = (len(times) - 1) % 2 != (first == "V")  # the middle flow, which occurs once, is a kick
     mirrored = kicks[-2::-1] if middle_kicks else kicks[::-1]
     return Nystrom(name, order, first == "V", (*times, *times[-2::-1]), (*kicks, *mirrored), error)
 
 
 #: S. Blanes, P. C. Moan, Practical symplectic partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl.
-#: Math. 142 (2002): SRKN_6^b and SRKN_14^a. The published 15 digits are continued by Newton's method.
+#: Math. 142 (2002): SRKN_6^b and SRKN_14^a. Newton's method added digits to the 15 published ones.
 _SRKN6B = """
     0.082984406417404976396007246036789421 0.245298957184271116624067925015978842
     0.396309801498368038617837686730772926 0.604872665711079915617327045447534800
@@ -77,9 +77,10 @@ _SRKN14A = """
     0.207305069056895744169370738047259668
 """
 
-#: Computed for phigen: Newton's method on the order conditions from many random starts; free parameters by least
-#: squares of the leading error, then by a random search for the least energy errors of four systems (Kowalevski top,
-#: Hénon–Heiles, Kepler, two coupled pendulums); all digits by Newton's method again. The tests verify the conditions.
+#: Computed for phigen: Newton's method on the order conditions from many random starts. Free parameters were determined
+#: by least squares of the leading error, then by a random search for the least energy errors of four systems
+#: (Kowalevski top, Hénon–Heiles, Kepler, two coupled pendulums). All digits are from a last Newton iteration. The tests
+#: verify the conditions.
 _GRADIENT_3 = """
     0.080025653215254155070797714594342583 0.272898300356015957781728984549341217
     0.419974346784745844929202285405657417 0.454203399287968084436542030901317567
@@ -143,7 +144,7 @@ _NYSTROM_18 = """
     -0.534650939236408517841131206699073656
 """
 
-#: All methods.
+#: All Nyström methods.
 METHODS = (
     _method("blanes-moan-rkn", 4, "V", _SRKN6B, 3.76e-5),
     _method("blanes-moan-rkn", 6, "T", _SRKN14A, 2.03e-7),
@@ -155,7 +156,7 @@ METHODS = (
     _method("nystrom", 8, "V", _NYSTROM_18, 7.83e-06),
 )
 
-#: The names of these methods.
+#: The names of the Nyström methods.
 NAMES = tuple(dict.fromkeys(m.name for m in METHODS))
 
 

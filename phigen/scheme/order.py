@@ -15,10 +15,10 @@ class Order:
 
 
 def plan_order(order: int | None, terms: int | None, *, symmetric: bool) -> Order:
-    """Return the terms that an order needs, or the order that terms give.
+    """Return the order and the number of terms, from the one of them that is not None.
 
-    In a symmetric bi-realisation the even S_i vanish and the method is symmetric, so its order is even: S_1 … S_k
-    with k odd gives order k + 1. Otherwise S_1 … S_k gives order k.
+    In a symmetric bi-realisation the even S_i vanish and the method is symmetric, so its order is even: S_1 … S_k with
+    k odd result in order k + 1. Otherwise S_1 … S_k result in order k.
     """
     if terms is not None:
         if not symmetric:

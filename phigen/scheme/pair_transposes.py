@@ -1,8 +1,9 @@
-"""Transposes of sums over bonds or pairs of sites, collected at each site from its bonds, as their end a and as b.
+"""Transposes of sums over bonds or pairs of sites: each site collects the contributions of its bonds, as end a and as
+end b.
 
-Often the sums of b are those of a up to a sign, as are forces between two sites. The contribution to the site as b is
-then its contribution as a, for the cotangents of the other site: a product of the Hessian of the pair's energy with
-one vector.
+Often the sums at b are those at a up to a sign, as the forces between two sites are. The contribution to the site as b
+is then the same formula as its contribution as a, applied to the cotangents of the other site: a product of the Hessian
+of the pair's energy with one vector.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 _OTHER = {"a": "b", "b": "a"}
 
 
-#: The bonds of a site at the other end of those that start or end at another site, and how they are selected.
+#: The end, and the selection by colour, of the same bonds as seen from their other sites.
 _OPPOSITE = {"": "", "a": "b", "b": "a"}
 _CHOSEN = {"": "", "here": "there", "there": "here"}
 
@@ -28,12 +29,11 @@ _CHOSEN = {"": "", "here": "there", "there": "here"}
 def transposed_at_ends(
     places: Mapping[str, tuple[str, str]], ends: Ends, opposite: Collection[str], transpose: Kernel, *, summed: bool
 ) -> list[tuple[str, Ends, Kernel]]:
-    """Return the ends at which a site is, with the bonds or pairs of the loop for that end, and the kernels.
+    """Return the loops that collect cotangents at a site: the end of the site, the bonds or pairs, and the kernel.
 
-    Each site collects the cotangents that it receives, so that no two sites write to one place. If bonds are equal
-    at both ends, one loop serves both; its kernel also computes the sums if these are to be ``summed``. Otherwise
-    one loop treats the site as the end b, and reads the cotangents of other sites; a second loop treats it as the
-    end a.
+    Each site collects the cotangents that it receives, so that no two sites write to one place. If bonds are equal at
+    both ends, one loop is sufficient; its kernel also computes the sums if they are to be ``summed``. Otherwise one
+    loop treats the site as the end b, and reads the cotangents of other sites; a second loop treats it as the end a.
     """
     if ends.of_all:
         combined = paired(places, ends.kernel, transpose, opposite)
@@ -48,8 +48,10 @@ def transposed_at_ends(
 
 
 def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Kernel:
-    """Restrict a kernel to the cotangents of the site at an end; the cotangents of bonds and shared values belong to
-    b."""
+    """Return a kernel with only the cotangents of the site at this end.
+
+    Cotangents of bonds and of shared values belong to the end b.
+    """
     outputs = []
     for o in kernel.outputs:
         names = kernel.inputs["site"] if o.name == "site_bar" else ()
@@ -62,10 +64,10 @@ def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Ke
 def paired(
     ends: Mapping[str, tuple[str, str]], kernel: Kernel, transpose: Kernel, opposite: Collection[str] = ()
 ) -> Kernel:
-    """Return the transpose of a kernel of bonds or pairs with all contributions to a site, as a, from one bond or pair.
+    """Return the transpose of a kernel of bonds or pairs, with all contributions of one bond or pair to its site a.
 
-    ``ends`` maps each symbol to the field, or parameter, and the end. Parameters at bonds that are ``opposite`` have
-    the other sign seen from b. For sums over all bonds or pairs, and for parameters at bonds, the outputs are summed
+    ``ends`` maps each symbol to a field or parameter and an end. Parameters at bonds that are ``opposite`` have the
+    other sign as seen from b. Outputs for sums over all bonds or pairs, and for parameters at bonds, are to be summed
     over all sites and their bonds or pairs.
     """
     names = {place: s for s, place in ends.items()}
@@ -99,7 +101,7 @@ def paired(
 
 
 def _signs(sums: Sequence[Expression], exchanged: Mapping[str, Expression]) -> list[int]:
-    """Return the factors, 1 or -1, from the sums of a to those of b if proved for all of them, else an empty list."""
+    """Return the factors, 1 or -1, from the sums at a to those at b; an empty list unless all are proved."""
     signs = []
     for value, other_sum in zip(sums, substitute(sums, exchanged), strict=True):
         proved_signs = (sign for sign in (-1, 1) if decide_zero("", [("", value - sign * other_sum)]).verdict == PROVED)

@@ -21,10 +21,11 @@ from phigen.symbolic.taylor import closure
 
 @dataclass(frozen=True)
 class ConvolutionTerm:
-    """``factor · Σ`` of one kind over the orders j of two series:
+    """A sum over the orders j of products of coefficients of the series ``a`` and ``b``; ``kind`` is one of:
 
-    ``product``: Σ_{j=0}^{k} a_j b_{k−j} · ``chain``: Σ_{j=1}^{k} (j/k) a_j b_{k−j}, for b = ∂f/∂a ·
-    ``power``: Σ_{j=1}^{k} (r j/k − (k−j)/k) a_j b_{k−j}, for b = aʳ.
+    ``product``: Σ_{j=0}^{k} a_j b_{k−j}
+    ``chain``: Σ_{j=1}^{k} (j/k) a_j b_{k−j}, for b = ∂f/∂a
+    ``power``: Σ_{j=1}^{k} (r j/k − (k−j)/k) a_j b_{k−j}, for b = aʳ, r = ``exponent``
     """
 
     kind: str
@@ -35,11 +36,11 @@ class ConvolutionTerm:
 
 @dataclass(frozen=True)
 class NodeSeries:
-    """One node: ``first``, its value at order 0, as an expression, and the rule for orders k ≥ 1.
+    """The series of one node: its value at order 0, ``first``, and the rule for orders k ≥ 1.
 
-    ``linear`` lists pairs (series, factor) that contribute factor · a_k, ``terms`` sums over orders. ``divisor`` is
-    the series whose value at order 0 divides the terms (powers), or None. Symbols ``s:i`` in expressions are the
-    values at order 0 of series i.
+    ``linear`` lists pairs (series, factor), each of which contributes factor · a_k; ``terms`` are sums of products over
+    orders. ``divisor`` is the series whose value at order 0 divides the terms (for powers), or None. Symbols ``s:i`` in
+    expressions are the values at order 0 of series i.
     """
 
     first: Expression
@@ -52,7 +53,7 @@ class NodeSeries:
 class Recurrences:
     """A path as recurrences: series 0 … n−1 are the coordinates m_i, ``slopes[i]`` is the series of ṁ_i.
 
-    ``fixed`` are values that stay constant along a path (functions of p and the coefficients), symbols ``f:i``.
+    ``fixed`` are values that are constant along a path (functions of p and the coefficients), with the symbols ``f:i``.
     """
 
     series: tuple[NodeSeries, ...]
@@ -71,10 +72,11 @@ class SeriesEntry:
 
 @dataclass(frozen=True)
 class PathSlopes:
-    """Recurrences for the derivatives of a path along its start and along p: V̇ = J V + (0, π), for V = (∂m, ∂_p m).
+    """Recurrences for the derivatives of a path with respect to its start and to p.
 
-    ``series`` and ``fixed`` continue those of the path. ``jacobian`` is J = ∂(π(m)p)/∂m, ``tensor`` is π(m), and
-    ``along`` is ∂(π(m)p)/∂c, a column for each differentiated coefficient c: Ẇ = J W + ∂(π(m)p)/∂c.
+    They solve V̇ = J V + (0, π) for V = (∂m, ∂_p m). ``series`` and ``fixed`` continue those of the path. ``jacobian``
+    is J = ∂(π(m)p)/∂m, ``tensor`` is π(m), and ``along`` is ∂(π(m)p)/∂c, a column for each differentiated coefficient
+    c: Ẇ = J W + ∂(π(m)p)/∂c.
     """
 
     series: tuple[NodeSeries, ...]
@@ -85,12 +87,13 @@ class PathSlopes:
 
 
 def build_path(system: System, coefficients: Coefficients) -> Recurrences:
-    """Return the recurrences of ṁ = π(m)p; values that depend on parameters only go to the table."""
+    """Return the recurrences of ṁ = π(m)p. Values that depend on parameters only are added to the table."""
     return path_of(system.coordinates, _flow(system, coefficients))
 
 
 def build_slopes(system: System, coefficients: Coefficients, variables: Sequence[str] = ()) -> PathSlopes:
-    """Return the further recurrences for derivatives of the path of `build_path`, also along some coefficients."""
+    """Return the recurrences for derivatives of the path of `build_path`, also with respect to the coefficients
+    ``variables``."""
     n, flow = system.dimension, _flow(system, coefficients)
     columns = [derivatives(flow, c) for c in system.coordinates]
     jacobian = [columns[j][i] for i in range(n) for j in range(n)]
@@ -112,12 +115,12 @@ def _flow(system: System, coefficients: Coefficients) -> list[Expression]:
 
 
 def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Recurrences:
-    """Return the recurrences of ṁ = flow(m, p), where p stays constant along the path."""
+    """Return the recurrences of ṁ = flow(m, p), where p is constant along the path."""
     return _PathBuilder(coordinates).path(_chains(flow))
 
 
 def _chains(roots: Sequence[Expression]) -> list[Expression]:
-    """Return positive integer powers as products; other powers have a recurrence."""
+    """Return expressions with positive integer powers written as products; other powers have a recurrence."""
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if not e.args:
@@ -141,7 +144,7 @@ class _PathBuilder:
 
     def path(self, flow: Sequence[Expression]) -> Recurrences:
         self._include(flow)
-        slopes = tuple(self._as_series(f) for f in flow)  # may add series
+        slopes = tuple(self._as_series(f) for f in flow)  # adds further series
         return Recurrences(tuple(self.series), slopes, tuple(self.fixed))
 
     def slopes(self, roots: Sequence[Expression]) -> PathSlopes:
@@ -158,7 +161,7 @@ class _PathBuilder:
 
     def _include(self, roots: Sequence[Expression]) -> None:
         order = closure(roots)
-        self._keep += order  # nodes are identified by id, so they must live
+        self._keep += order  # nodes are identified by id, so they must not be deleted
         self._in_motion |= self._moving(order)
         fresh = [e for e in order if id(e) in self._in_motion and id(e) not in self._series_of]
         for e in fresh:
@@ -166,7 +169,8 @@ class _PathBuilder:
                 self._series_of[id(e)] = self.coordinates.index(e.value)
             else:
                 self._series_of[id(e)] = len(self.series)
-                # Functions refer to series of their derivatives, which may come later: filled in below.
+                # The series of a function refers to that of its derivative, which may come later: this place is filled
+                # below.
                 self.series.append(NodeSeries(symbol("pending")))
         for e in fresh:
             if e.args:
@@ -180,7 +184,7 @@ class _PathBuilder:
         return moving
 
     def _as_series(self, e: Expression) -> int:
-        """Return the series of a node; a fixed node becomes a series without further terms."""
+        """Return the series of a node; a constant becomes a series without further terms."""
         if id(e) not in self._series_of:
             value = self._value(e)
             self._series_of[id(e)] = len(self.series)

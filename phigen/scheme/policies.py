@@ -1,7 +1,8 @@
 """Numerical policies of the runtimes: convergence of a solve, range of a predictor, search for a gauge.
 
-Each number is defined here, once, with its reason, and printed as a named constant into C, JavaScript and NumPy
-(`phigen.targets.policies`). Constants of a single runtime, such as blocks of steps in C, are in that runtime.
+Each number is defined here, once, with its reason. It is printed as a named constant into C, JavaScript and NumPy
+(`phigen.targets.policies`). Constants of a single runtime, such as blocks of steps in C, are in the files of that
+runtime.
 """
 
 from __future__ import annotations
@@ -41,14 +42,14 @@ def count(value: int, description: str) -> int:
 
 @dataclass(frozen=True)
 class StartPolicy(Policy):
-    """The first evaluation of coefficients, which checks parameters before a step size is known."""
+    """The first evaluation of coefficients, which checks parameters before the step size is known."""
 
     probe_step: float = number(1e-100, "a step size for which coefficients are finite")
 
 
 @dataclass(frozen=True)
 class MeasurePolicy(Policy):
-    """The scale of a correction of y; 0 for coordinates that keep their sign and may have very different sizes."""
+    """The scale of a correction of y; it is 0 for coordinates that keep their sign and may differ much in size."""
 
     floor: float = number(1e-6, "smaller components of y count as this fraction of the largest")
 
@@ -114,7 +115,7 @@ class PredictorPolicy(Policy):
 
 @dataclass(frozen=True)
 class PlausibilityPolicy(Policy):
-    """Criteria for solutions of an implicit step far from the motion: distant ones at another energy."""
+    """Criteria that reject solutions of an implicit step far from the motion: distant ones, with another energy."""
 
     plausible: float = number(1.5, "accepted length of steps, relative to state and motion")
     max_energy_change: float = number(0.5, "largest relative change of energy in longer steps")
@@ -122,7 +123,7 @@ class PlausibilityPolicy(Policy):
 
 @dataclass(frozen=True)
 class GaugeSearch(Policy):
-    """The search for the multiples of Casimirs whose subtraction from H makes the leading error least."""
+    """The search for the multiples of Casimirs whose subtraction from H minimises the leading error."""
 
     samples: int = count(32, "number of states along a short piece of the trajectory")
     degree: int = count(6, "S_3 is cubic in H, so the square of the error is of degree six in each multiple")
@@ -139,7 +140,7 @@ class GaugeSearch(Policy):
 
 @dataclass(frozen=True)
 class TangentPolicy(Policy):
-    """The second solve of a step, for its derivative: the point to the last bit."""
+    """The additional solve for the point of a step, to the last bit, before its derivative is computed."""
 
     tangent_solved: float = number(1e-15, "a correction below this is rounding;")
     tangent_nearly_solved: float = number(1e-10, "one below this is rounding too ...")
@@ -176,7 +177,7 @@ class PathTangentPolicy(Policy):
 
 @dataclass(frozen=True)
 class LatticeSweepPolicy(Policy):
-    """Sweeps over a lattice that solve the equation of a stage of the series."""
+    """Sweeps over a lattice that solve the equation of a stage of a series."""
 
     differences: int = count(4, "number of differences in the predictor of a stage")
     patience: int = count(10, "sweeps after which slow convergence is left to Newton's method")
@@ -189,7 +190,7 @@ class LatticeSweepPolicy(Policy):
 
 @dataclass(frozen=True)
 class LatticeNewtonPolicy(Policy):
-    """Newton's method for a stage where sweeps do not converge, with linear equations in Krylov spaces."""
+    """Newton's method for a stage for which sweeps do not converge, with linear equations in Krylov spaces."""
 
     directions: int = count(24, "dimension of the Krylov space of a correction")
     solved: float = number(1e-6, "relative residual at which the iteration for a correction ends, ...")

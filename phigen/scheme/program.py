@@ -1,7 +1,7 @@
-"""The program representation, which the scheme passes to the targets.
+"""The program: the representation of a solver that targets print.
 
-A `Program` has a step (`phigen.scheme.steps`), whose kernels are straight-line functions, its description, and
-further kernels such as observables.
+A `Program` has a step (`phigen.scheme.steps`), whose kernels are straight-line functions, a description, and further
+kernels such as observables.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from phigen.symbolic.symbols import LEVEL
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
-#: Single precision where library functions have one name for all types, as on devices.
+#: Precision of single-precision code in which functions of the library have one name for all types, as on devices.
 OVERLOADED = "overloaded float"
 
 
 @dataclass(frozen=True)
 class About:
-    """The contents of the header of a generated file: ``facts`` are its lines, ``operations`` those of the step."""
+    """Content of the header of a generated file: ``facts`` are its lines, ``operations`` the operation counts of a
+    step."""
 
     title: str = ""
     license: str = "0BSD"
@@ -48,8 +49,8 @@ class About:
 class Observables:
     """The Hamiltonian, the Casimirs, the vector field, and the observables of the spec, if there are any.
 
-    For lattices ``named`` has the densities of observables that ``reductions`` turn into numbers; ``at_sites`` has
-    the observables that are fields, whose names are ``fields``.
+    For lattices, ``named`` has the densities of observables that ``reductions`` turn into numbers. ``at_sites`` has the
+    observables that are fields; their names are ``fields``.
     """
 
     energy: Kernel
@@ -79,7 +80,7 @@ class FreeGauge:
 class Monitor:
     """Steps of equal size in τ: ``rate`` is dt/dτ at a state, ``elapsed`` the time of a step (at its point y).
 
-    In a splitting the flows themselves return their time, and ``elapsed`` is None. ``level`` is the gradient of H, on
+    In a splitting the kernels of flows return their time, and ``elapsed`` is None. ``level`` is the gradient of H, on
     which e depends, if the transpose of steps was requested.
     """
 
@@ -88,16 +89,17 @@ class Monitor:
     level: Kernel | None = None
 
 
-#: Normal variates are truncated at this value, so that no rare one makes a step impossible. One pair in 7e7 is larger;
-#: the truncation reduces the variance by 1.5e-8.
+#: Largest normal variate; larger ones are truncated, so that no rare one makes a step impossible. One pair in 7e7 is
+#: larger; the truncation reduces the variance by 1.5e-8.
 MAX_NORMAL_VARIATE = 6.0
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Sources of noise by their names; each has ``parts`` increments in a step, independent and equal in law.
+    """Sources of noise by name. Each source has ``parts`` increments in a step, independent and identically
+    distributed.
 
-    ``fields`` are σπ∇g of each source, one after the other; None for lattices, where each site has its own sources.
+    ``fields`` is the kernel of σπ∇g of all sources; None for lattices, where each site has separate noise.
     """
 
     sources: tuple[str, ...]
@@ -106,13 +108,13 @@ class Noise:
 
     @property
     def draws(self) -> int:
-        """The number of increments of a step."""
+        """The number of increments in a step."""
         return self.parts * len(self.sources)
 
 
 @dataclass(frozen=True)
 class Modified:
-    """The modified Hamiltonian as a kernel, and the first power of h that it omits."""
+    """The modified Hamiltonian as a kernel, and the lowest power of h that it omits."""
 
     kernel: Kernel
     power: int
@@ -120,13 +122,13 @@ class Modified:
 
 @dataclass(frozen=True)
 class Attitude:
-    """The group element of each stage, or of each flow: the stage is its action.
+    """Kernels of the group elements whose action on x is a step: one for each stage, or one for each flow.
 
-    ``turn`` is the element of an implicit stage as a function of the solved y, ``along`` as a function of p. Elements
-    are less 1. Instead of exp(P) for a matrix P they return the covector p of P and a bound for the square of its
-    size; ``exponential`` is exp(P) − 1 for a size of at most 1/2. ``turns`` are the flows of a splitting, each with
-    the product of the elements up to it in a step. ``rate`` is the gradient of the Casimirs that were subtracted from
-    H: they rotate the body too, without moving x.
+    ``turn`` is the element of an implicit stage as a function of the solved y, ``along`` as a function of p. All
+    elements are returned minus 1. For exp(P) of a matrix P, these kernels return the covector p of P and a bound for
+    the square of its size; ``exponential`` is exp(P) − 1 for a size of at most 1/2. ``turns`` are the flows of a
+    splitting, each with the product of the elements of the step up to this flow. ``rate`` is the gradient of the
+    Casimirs that were subtracted from H: they rotate the body, but do not change x.
     """
 
     group: Group
@@ -145,12 +147,12 @@ class Attitude:
 
     @property
     def quaternion(self) -> bool:
-        """Whether an element is a quaternion alone."""
+        """Whether an element is a single quaternion, without matrices and translations."""
         return not (self.group.matrices or self.group.translation)
 
     @property
     def lengthened(self) -> bool:
-        """Whether the quaternion of a step must still be normalised, as must products of the elements of flows."""
+        """Whether the quaternion of a step must be normalised; this is so for products of the elements of flows."""
         return bool(self.turns) and self.quaternion
 
     @property
@@ -161,8 +163,10 @@ class Attitude:
 
 @dataclass(frozen=True)
 class StackBound:
-    """Bytes of stack of the longest chains of calls, as measured with a ``compiler`` and its flags: those that start in
-    ``init`` and in ``step``, and the ``longest`` of all."""
+    """Bytes of stack of the longest chains of calls, measured with a ``compiler`` and its flags.
+
+    The chains start in ``init`` or in ``step``; ``longest`` is the largest value of all functions.
+    """
 
     compiler: str
     init: int
@@ -174,14 +178,14 @@ class StackBound:
 class Program:
     """A solver, ready to be printed.
 
-    A step of size h is the composition of one ``step`` of each of the ``fractions`` of h. ``time`` is the name of t,
-    if H depends on it; ``pushed`` are the Casimirs that forces change. ``extras`` are the requested parts beyond the
-    step; ``observed`` has the names of the observables of the spec.
+    A step of size h is a composition: one ``step`` of size f h for each f in ``fractions``. ``time`` is the name of t
+    if H depends on the time, else "". ``pushed`` are the Casimirs that forces change. ``extras`` are the requested
+    parts of the code other than the step; ``observed`` has the names of the observables of the spec.
 
-    ``lanes`` requests C that makes several steps or members at once; ``profile`` (``fast``, ``small``) says whether
-    the C is optimised for speed or for size. ``compensated`` requests compensated sums over the steps of a lattice
-    that splits. ``truncated`` says that a step is a Poisson map only up to its truncation error. ``stack`` is the
-    measured stack that the header of the C states.
+    ``lanes`` requests C that makes several steps or members at once; ``profile`` (``fast``, ``small``) says whether the
+    C is optimised for speed or for size. ``compensated`` requests compensated sums over the steps of a lattice that is
+    split. ``truncated`` says that a step is a Poisson map only up to its truncation error. ``stack`` is the measured
+    stack that the header of the C states.
     """
 
     name: str
@@ -220,7 +224,7 @@ class Program:
         return len(self.coordinates)
 
     def offers(self, part: str) -> bool:
-        """Whether the code has a part of `phigen.spec.names.PARTS`, where the part applies."""
+        """Whether the code contains a part of `phigen.spec.names.PARTS`, if that part applies to the system."""
         return self.extras.offers(part, self.profile)
 
     @property
@@ -235,7 +239,7 @@ class Program:
 
     @property
     def choice(self) -> tuple[Kernel, ...]:
-        """The kernels for the choice of the gauge of a trajectory."""
+        """The kernels with which the gauge of a trajectory is chosen."""
         guide = (self.gauge.guide,) if self.gauge and self.searches_gauge else ()
         return (*guide, *((self.gauge.products,) if self.gauge else ()))
 
@@ -252,7 +256,7 @@ class Program:
 
     @property
     def held(self) -> tuple[str, ...]:
-        """The quantities with a fixed value for each trajectory: Casimirs, for their multiples, or e."""
+        """The quantities with a constant value for each trajectory: the Casimirs with a chosen multiple, or e."""
         return (LEVEL.kind,) if self.monitor else self.gauge.casimirs if self.gauge else ()
 
     @property

@@ -1,4 +1,4 @@
-"""Sweeps with reordered fields: parts of H that differ in the order of fields only share one loop."""
+"""Sharing of loops between sweeps: parts of H that differ only by a permutation of the fields use one loop."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from phigen.symbolic.expression import natural_key, substitute, symbol
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Most fields of a site whose orders are tried: 3 fields have 6 orders.
+#: Largest number of fields of a site for which permutations are tried: 3 fields have 6 orders.
 MOST_FIELDS = 3
 
 
 def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """Yield other orders of some fields, cyclic ones first, which parts of H often share; none of many fields."""
+    """Yield the other orders of some fields, cyclic ones first; nothing for more than `MOST_FIELDS` fields."""
     original = tuple(fields)
     round_ = [original[k:] + original[:k] for k in range(1, len(original))]
     permuted = dict.fromkeys([*round_, *permutations(original)]) if len(original) <= MOST_FIELDS else ()
@@ -26,7 +26,10 @@ def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
 
 
 def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str]) -> dict[str, str]:
-    """Return the increments of noise in an order of the fields, if each field has one source of its own."""
+    """Return the renaming of noise increments that belongs to an order of the fields.
+
+    It is empty unless each field has exactly one source of noise.
+    """
     if len(sites.increments) != len(order):
         return {}
     increments = dict(zip(fields, sites.increments, strict=False))
@@ -34,10 +37,10 @@ def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str])
 
 
 def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str, ...], float]]:
-    """Return the sums as functions of reordered parameters at bonds, and of bonds in the opposite direction.
+    """Yield other forms of the sums: with permuted parameters at bonds, and with bonds in the opposite direction.
 
-    The direction is reversed only if all contributions are odd in it. Also returns the order, none if unchanged, and
-    1 or -1.
+    The direction is reversed only if all contributions are odd in it. Each item is the sums, the order of the
+    parameters (() if unchanged), and the sign 1 or -1.
     """
     loops = over_ends(gather)
     if len(loops) != 1 or not loops[0][1]:
@@ -60,14 +63,14 @@ def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str
 
 
 def _signed(kernel: Kernel, sign: float) -> Kernel:
-    """Return the kernel, with negated values if the sign is negative."""
+    """Return the kernel, with negated values if ``sign`` is negative."""
     values = tuple(-e if sign < 0 else e for e in kernel.roots)
     return replace(kernel, outputs=(Output(kernel.outputs[0].name, values),))
 
 
 def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Sweep) -> Sweep | None:
-    """Return a sweep as a function of other fields: the fields in an ``order`` are replaced by ``fields``, one by
-    one.
+    """Return a sweep with its fields renamed: each field of ``order`` becomes the field of ``fields`` at the same
+    place.
 
     None if the result would read neighbours that no sweep reads.
     """
@@ -97,7 +100,7 @@ def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Swe
 
 
 def _renamed(kernel: Kernel, names: Mapping[str, str], places: Sequence[int] = ()) -> Kernel:
-    """Return the kernel with other symbols, and its values in the order of ``places``."""
+    """Return the kernel with renamed symbols, and its values in the order of ``places``."""
     values = substitute(kernel.roots, {old_name: symbol(new_name) for old_name, new_name in names.items()})
     inputs = {
         key: tuple(sorted((names.get(s, s) for s in symbols), key=natural_key))

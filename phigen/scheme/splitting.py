@@ -128,7 +128,7 @@ def _step(
     *,
     adjoint: bool,
 ) -> Splitting:
-    """Return the step; the coefficients are all known except those that are computed anew in each flow."""
+    """Return the step. The table of coefficients must be full, except for those that are computed anew in each flow."""
     renewed_inputs = {"t": system.times, "dw": system.increments[:1]}
     refresh = coefficients.refresh(**{name: symbols for name, symbols in renewed_inputs.items() if symbols})
     inputs = {"gauge": constant_symbols, "h": (TIME,), "kick": (KICK,) if schedule.multiples else ()}
@@ -148,7 +148,7 @@ def _step(
 
 
 def facts(choice: ScheduledMethod, step: Splitting, sources: int = 0) -> list[str]:
-    """Return the lines of the header on the method; the first parts are ``sources`` of noise."""
+    """Return the header lines on the method; ``sources`` is the number of noise sources, which are the first parts."""
     count, flows, method = len(step.flows) - sources, len(step.schedule.flows) - 2 * sources, choice.method
     further = f", {len(step.schedule.begin)} more before and after a run" * bool(step.schedule.begin)
     if count == 1 and choice.carrier is None:
@@ -164,7 +164,7 @@ def facts(choice: ScheduledMethod, step: Splitting, sources: int = 0) -> list[st
 
 
 def _clock(choice: ScheduledMethod) -> str:
-    """Return the line of the header on the time; empty without a time."""
+    """Return the header line on the time; "" if H does not depend on the time."""
     if choice.carrier is None:
         return ""
     flows = choice.splitting.flows
@@ -174,7 +174,7 @@ def _clock(choice: ScheduledMethod) -> str:
 
 
 def _named(system: System, flow: Flow, k: int) -> str:
-    """Return the Hamiltonian or force of a flow, in words; flows of the noise come first, and their time is σ ΔW."""
+    """Return the Hamiltonian or force of flow k in words; flows of noise come first, and their duration is σ ΔW."""
     sources = system.noise
     if k <= len(sources):
         return f"{flow.hamiltonian}, for the noise {sources[k - 1].name}"
@@ -194,7 +194,7 @@ def _operations(step: Splitting) -> dict[str, int]:
 
 
 def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic | None) -> None:
-    """Raise `SpecError` for matrix exponentials whose time depends on the state."""
+    """Raise `SpecError` if the duration of a flow with a matrix exponential depends on the state."""
     for flow in flows if monitor else ():
         if flow.exponentials:
             message = "monitor: log: the flow of {} takes a matrix exponential, whose time must not depend on the state"
@@ -207,7 +207,8 @@ def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic |
 
 
 def _expect_correctable(system: System, spec: Spec, method: Corrected) -> None:
-    """Raise `SpecError` for features that need the state at single steps, which a corrector does not have."""
+    """Raise `SpecError` for features that need the state after single steps, which steps with a corrector do not
+    have."""
     refused = {
         "time": (bool(system.time), "the corrector would need its own times"),
         "noise": (bool(system.noise), "the corrector would undo random increments"),

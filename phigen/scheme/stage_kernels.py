@@ -1,4 +1,4 @@
-"""Kernels derived from those of a stage of the series: partial transposes, and diagonal blocks at sites."""
+"""Kernels derived from those of a stage of the series: parts of transposes, and diagonal blocks at sites."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.steps import Sites, Sweeps
 from phigen.symbolic.expression import ZERO, gradient
 
-#: The kernel of the derivatives of a sweep by the fields at the same site.
+#: Name of the kernel of the derivatives of a sweep with respect to the fields at the same site.
 _BLOCK = "own_slope"
 
-#: Whether cotangents of fields at other sites are computed, and all others.
+#: Which cotangents are computed: (those of fields at other sites, all others).
 _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
 
-#: Names of the kernels of a reverse pass, their source kernels, in order: from the end of a stage to y; from y to y at
-#: other sites, repeated until the equation is solved; from y to x and to parameters.
+#: Kernels of a reverse pass, in order, with their source kernels: from the end of a stage to y; from y to y at other
+#: sites, repeated until the equation is solved; from y to x and to parameters.
 KERNELS = (("advance_back", "increment", _ALL), ("slope_back", "relax", _FIELDS), ("relax_back", "relax", _OTHERS))
 
 
 def restricted(sites: Sites, fields: Sequence[str], kernel: Kernel, selection: tuple[bool, bool], name: str) -> Kernel:
-    """Restrict a transposed kernel to the cotangents of fields, or to the others; those of sums are in both."""
+    """Return a transposed kernel with the cotangents of fields only, or of the other values only; both have those of
+    sums."""
     of_fields, of_others = selection
     outputs = []
     for o in kernel.outputs:
@@ -39,7 +40,8 @@ def restricted(sites: Sites, fields: Sequence[str], kernel: Kernel, selection: t
 
 
 def site_block(step: Sweeps, fields: Sequence[str], relax: Kernel) -> Kernel:
-    """Return the kernel of the derivatives of a sweep by y at the same site: for each field, those by all fields."""
+    """Return the kernel of the derivatives of a sweep with respect to y at the same site, as a matrix over the
+    fields."""
     places = step.sites.places
     at_site = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}
     slopes = [gradient(e, [at_site[f]])[0] if f in at_site else ZERO for e in relax.roots for f in fields]

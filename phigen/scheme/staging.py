@@ -3,8 +3,8 @@
 There are three kinds of symbols. *Static* symbols, parameters and the step size, are known before the first step.
 *Inputs* of a step, such as the time in its middle, are new in every step. All other symbols belong to the state and
 change with every evaluation. ``prepare`` computes, once, the values that depend on static symbols only; ``refresh``
-computes, once in every stage of a step, those that depend on inputs too. Both fill one table, that of the
-coefficients ``c:0``, ``c:1``, …, in which the static values come first.
+computes, once in every stage of a step, those that also depend on inputs. Both fill one table of coefficients ``c:0``,
+``c:1``, …, in which the static values come first.
 """
 
 from __future__ import annotations
@@ -23,16 +23,17 @@ T = TypeVar("T")
 #: The inputs of a step, with their description.
 INPUTS = {"t": "the time", "dw": "the increments of the noise"}
 
-#: The argument of kernels that holds the table of coefficients, and the output of ``refresh``, the end of the table.
+#: Name of the argument of kernels with the table of coefficients, and of the output of ``refresh``, the end of the
+#: table.
 TABLE, NOW = "coef", "now"
 
 
 class Coefficients:
-    """The table of state-independent values; `hoist` fills it and is idempotent on equal values.
+    """The table of state-independent values. `hoist` fills it; equal values are added only once.
 
-    ``values`` are those of ``prepare``, ``renewed`` those that depend on ``inputs`` of a step. Between them are the
-    entries of ``exponentials``, exp(tA) − 1. The positions of ``renewed`` and ``exponentials`` are unknown until the
-    table is full: until `settled` they have symbols of other kinds.
+    ``values`` are the values that ``prepare`` computes, ``renewed`` those that depend on ``inputs`` of a step. Between
+    them are the entries of ``exponentials``, exp(tA) − 1. The positions of ``renewed`` and ``exponentials`` are unknown
+    until the table is full: until `settled` they have symbols of other kinds.
     """
 
     def __init__(self, static: Iterable[str], inputs: Iterable[str] = ()) -> None:
@@ -44,18 +45,19 @@ class Coefficients:
 
     @property
     def slots(self) -> tuple[str, ...]:
-        """The symbols of all coefficients of ``prepare`` so far."""
+        """The symbols of the coefficients of ``prepare`` that the table contains so far."""
         return tuple(coefficient(k) for k in range(len(self.values)))
 
     @property
     def table(self) -> tuple[str, ...]:
-        """The symbols of all coefficients so far, those that are renewed in each step last."""
+        """The symbols of all coefficients so far; those that are renewed in each step come last."""
         entries = (name for e in self.exponentials for name in e.symbols)
         return (*self.slots, *entries, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))
 
     @property
     def everything(self) -> list[Expression]:
-        """The expressions of the table; for entries of an exponential, a sum of all values that they depend on."""
+        """The expressions of the table. An entry of an exponential is represented by a sum of all values that it
+        depends on."""
         sums = (total(e.exponents) for e in self.exponentials for _ in e.rates)
         return [*self.values, *sums, *self.renewed]
 
@@ -66,7 +68,7 @@ class Coefficients:
 
     @property
     def blocks(self) -> tuple[tuple[int, int], ...]:
-        """The places of the matrices tA in the table, with their sizes."""
+        """The positions of the matrices tA in the table, with their sizes."""
         blocks, start = [], len(self.values)
         for exponential in self.exponentials:
             blocks.append((start, exponential.size))
@@ -113,7 +115,7 @@ class Coefficients:
         return [self._written_out(e) for e in roots]
 
     def slot(self, e: Expression) -> Expression:
-        """Return the coefficient of a state-independent expression; a number stands for itself."""
+        """Return the coefficient for a state-independent expression; a number is returned unchanged."""
         if e.is_number:
             return e
         name = self._index.get(id(e))
@@ -131,7 +133,7 @@ class Coefficients:
         """
         if not self.renewed:
             return None
-        if not self.values:  # the first part of the table must not be empty, since the second part starts after it
+        if not self.values:  # the first part of the table must not be empty: the second part starts after it
             self.slot(symbol(min(self._static)))
         values = tuple(self._hoisted(self.renewed, self._is_fixed))
         return Kernel(
@@ -189,7 +191,7 @@ def _expressions(tree: Any) -> Iterable[Expression]:
 
 
 def _rebuilt(tree: Any, renamed: dict[int, Expression], slots: tuple[str, ...]) -> Any:
-    """Return the object with other expressions; kernels that read the table receive all of its ``slots``."""
+    """Return the object with renamed symbols; kernels that read the table receive all of its ``slots``."""
     if isinstance(tree, Expression):
         return renamed[id(tree)]
     if isinstance(tree, tuple):

@@ -2,11 +2,11 @@
 
 With a(y) = α(y, ∇S_h(y)) − y and d(y) = (β − α)(y, ∇S_h(y)) a Newton step is
 
-    J(y) δ = (y − x) + a(y),     y ← y − δ,     J = ∂_xα + ∂_pα · Hess S_h = I + a'(y),
+    J(y) δ = (y − x) + a(y),     y ← y − δ,     J = ∂_xα + ∂_pα · Hess S_h = I + a'(y).
 
-and the increment at the corrected y is d − M δ to first order, M = d'(y): the last correction costs no
-second evaluation. Where the equation y = x − a(y) is triangular (a one-sided realisation with a separable
-Hamiltonian), it is solved by substitution and the step is explicit.
+To first order, the increment at the corrected y is d − M δ with M = d'(y), so the last correction needs no second
+evaluation. If the equation y = x − a(y) is triangular (a one-sided realisation with a separable Hamiltonian), it is
+solved by substitution and the step is explicit.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SparseRow = dict[int, Expression]
 
 @dataclass(frozen=True)
 class Linearised:
-    """The values of one Newton iteration at y: a, d (n), J, M (n×n)."""
+    """The values of one Newton iteration at y: a and d (n), J and M (n×n)."""
 
     displacement: list[Expression]
     increment: list[Expression]
@@ -46,7 +46,7 @@ class Linearised:
 def at_momenta(
     expressions: Sequence[Expression], coordinates: Sequence[str], slope: Sequence[Expression]
 ) -> list[Expression]:
-    """Return the expressions with p = ∇S_h."""
+    """Return the expressions with p = ∇S_h (``slope``) inserted."""
     return substitute(expressions, {momentum(c): g for c, g in zip(coordinates, slope, strict=True)})
 
 
@@ -56,9 +56,9 @@ def linearise(
     coordinates: Sequence[str],
     generating: GeneratingFunction,
 ) -> Linearised:
-    """Return a, d and their total derivatives along y, with p = ∇S_h(y)."""
+    """Return a, d and their total derivatives with respect to y, with p = ∇S_h(y)."""
     n = len(coordinates)
-    # Momenta that are 0 are substituted first: H of a large system may depend on few coordinates.
+    # Momenta that are 0 are substituted first: the H of a large system may depend on few coordinates.
     absent: dict[str, Expression] = {
         momentum(c): ZERO for c, g in zip(coordinates, generating.slope, strict=True) if g.is_zero
     }
@@ -80,13 +80,13 @@ def linearise(
 
 
 def _rows(expressions: Sequence[Expression], names: Sequence[str]) -> list[SparseRow]:
-    """Return the derivatives that are not 0, by the index of the name."""
+    """Return the nonzero derivatives of each expression, by the index of the name."""
     index = {name: j for j, name in enumerate(names)}
     return [{index[name]: d for name, d in row.items()} for row in sparse_derivatives(expressions, names)]
 
 
 def _total_derivative_row(x_part: SparseRow, p_part: SparseRow, hessian: Sequence[SparseRow]) -> list[Expression]:
-    """Return a row of ∂_x + ∂_p · Hess S_h."""
+    """Return a row of ∂_x + ∂_p · Hess S_h, from a row of each derivative."""
     n = len(hessian)
     products: list[SparseRow] = [{} for _ in range(n)]
     for k, e in p_part.items():
@@ -111,7 +111,7 @@ def explicit_increment(
     coordinates: Sequence[str],
     order: Sequence[int],
 ) -> list[Expression]:
-    """Return the increment as a function of x, by solving the equation for y in the given order."""
+    """Return the increment as a function of x; the equation for y is solved by substitution in the given order."""
     solutions: dict[str, Expression] = {}
     for i in order:
         (shift,) = substitute([displacement[i]], solutions)

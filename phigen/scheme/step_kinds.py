@@ -1,7 +1,7 @@
 """The kinds of steps: one record for each, with the facts that other rooms need.
 
-A step (`phigen.scheme.steps`) has its kind and its kernels. Rooms that treat kinds differently have a table with an
-entry for each: `phigen.lanes.in_lanes` for the lowering to lanes, and a module of each target for its text.
+A step (`phigen.scheme.steps`) has a kind and kernels. Rooms that treat kinds differently have a table with an entry for
+each kind: `phigen.lanes.in_lanes` for the lowering to lanes, and a module of each target for the text of the step.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from dataclasses import dataclass
 class StepKind:
     """A kind of step.
 
-    ``title`` names the method in a sentence, ``manner`` in the header; ``unit`` is the unit of operation counts.
-    ``implicit`` steps solve an equation for one point by an inner solve; ``predicted`` ones start their iteration
-    with a value extrapolated from earlier steps. Steps by ``flows`` have a schedule, and a row of coefficients for
-    each of its times; a step that ``collocates`` solves for all its stages at once; steps on ``sites`` are those of
-    lattices.
+    ``title`` names the method in a sentence, ``manner`` in the header of generated files; ``unit`` is the unit of
+    operation counts. ``implicit`` steps solve an equation for one point by an inner solve. ``predicted`` steps start
+    their iteration with a value extrapolated from earlier steps. Steps by ``flows`` have a schedule, and a row of
+    coefficients for each of its times. A step that ``collocates`` solves for all its stages at once. Steps on ``sites``
+    are those of lattices.
     """
 
     name: str

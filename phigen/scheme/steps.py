@@ -1,9 +1,10 @@
-"""The kinds of steps, with their kernels: ``Step = Newton Explicit Path Gauss Splitting Sweeps``.
+"""The steps of all kinds, with their kernels: Newton, Explicit, Path, Gauss, Splitting and Sweeps.
 
-Kernels of a step are of three stages. ``prepare`` computes, from parameters and step size, the values that depend
-neither on the state nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … Where H depends on the
-time, or there is noise, ``refresh`` computes further coefficients once in each stage, from these and from the time in
-the middle of the stage or the increments of the noise. All other kernels read the coefficients and the state only.
+The kernels of a step belong to three stages of evaluation. ``prepare`` computes, from parameters and step size, the
+values that depend neither on the state nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … If H
+depends on the time, or there is noise, ``refresh`` computes further coefficients once in each stage, from these and
+from the time in the middle of the stage or the increments of the noise. All other kernels read the coefficients and the
+state only.
 """
 
 from __future__ import annotations
@@ -18,16 +19,16 @@ from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.path import PathSlopes, Recurrences
 from phigen.scheme.step_kinds import EXPLICIT, GAUSS, NEWTON, PATH, SPLITTING, SWEEPS, StepKind
 
-#: The end of the name of a transposed kernel of a lattice.
+#: Suffix of the name of a transposed kernel of a lattice.
 BACK = "_back"
 
 
 @dataclass(frozen=True)
 class PathAdjoint:
-    """The path integrated backward with cotangents (`phigen.scheme.adjoint`).
+    """The path integrated backwards with cotangents (`phigen.scheme.adjoint`).
 
-    ``recurrences`` give the cotangents, those of the ``used`` coefficients last. ``curvature`` is ∇S_h and
-    its Hessian at the mean, ``slope`` the transpose of ∇S_h along coefficients. ``slopes`` are the recurrences for the
+    ``recurrences`` yield the cotangents, those of the ``used`` coefficients last. ``curvature`` is ∇S_h and its Hessian
+    at the mean, ``slope`` the transpose of ∇S_h with respect to coefficients. ``slopes`` are the recurrences for the
     derivatives of a path, for many paths at once.
     """
 
@@ -42,8 +43,8 @@ class PathAdjoint:
 class Adjoint:
     """The transpose of a step.
 
-    It has the transposes of the kernels of ``steps`` (one, or one for each flow), of ``prepare``, of ``refresh``, and
-    of the ``path`` if the step follows one.
+    It has the transposes of the kernels of the step or of its flows (``steps``), of ``prepare``, of ``refresh`` and, if
+    the step follows a path, of the ``path``.
     """
 
     steps: tuple[Kernel, ...]
@@ -53,119 +54,120 @@ class Adjoint:
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once, but for the curvature of a path."""
+        """All kernels, each once, without the curvature of a path."""
         slope = self.path.slope if self.path else None
         return _present((*self.steps, slope, self.prepare, self.refresh))
 
 
 @dataclass(frozen=True)
 class _Staged:
-    """Any step; ``adjoint`` is its transpose, if requested."""
+    """Base class of all steps. ``adjoint`` is the transpose of the step, if it was requested."""
 
     prepare: Kernel
     refresh: Kernel | None = field(default=None, kw_only=True)
     adjoint: Adjoint | None = field(default=None, kw_only=True)
 
-    #: The facts about steps of this kind.
+    #: The properties of steps of this kind.
     kind: ClassVar[StepKind]
 
     @property
     def transposed(self) -> tuple[Kernel, ...]:
-        """The kernels of the transpose."""
+        """The kernels of the transpose; empty if it was not requested."""
         return self.adjoint.kernels if self.adjoint else ()
 
     @property
     def inner_solve(self) -> InnerSolve | None:
-        """Settings of the solve for one point; None for steps without an equation for one point."""
+        """Settings of the solve for one point; None for steps without such a solve."""
         return None
 
     @property
     def eliminate(self) -> Kernel | None:
-        """Kernel that solves with one Newton matrix, if it is unrolled."""
+        """Kernel that solves with one Newton matrix; None if elimination is not unrolled."""
         return None
 
     @property
     def eliminate_transposed(self) -> Kernel | None:
-        """Kernel that solves with the transpose of a Newton matrix, if it is unrolled."""
+        """Kernel that solves with the transpose of a Newton matrix; None if elimination is not unrolled."""
         return None
 
     @property
     def invert(self) -> Kernel | None:
-        """Kernel of the inverse of a Newton matrix, if it is unrolled."""
+        """Kernel of the inverse of a Newton matrix; None if it is not unrolled."""
         return None
 
     @property
     def centred(self) -> bool:
-        """Whether the point of an implicit step is the mean of its ends."""
+        """Whether the point y of an implicit step is the mean of its ends."""
         return False
 
     @property
     def frame(self) -> Kernel | None:
-        """Kernel of the change from the frame of a step to that of the next, if steps have frames."""
+        """Kernel of the change from the frame of a step to that of the next; None if steps have no frames."""
         return None
 
     @property
     def reduced(self) -> ReducedSweeps | None:
-        """Sweeps over some of the unknowns of a step, if the others follow from these."""
+        """Sweeps over some of the unknowns of a step, if the other unknowns follow from them; else None."""
         return None
 
     @property
     def path(self) -> Recurrences | None:
-        """The recurrences of the path that a step follows, if it follows one."""
+        """The recurrences of the path that a step follows; None if it follows none."""
         return None
 
     @property
     def varied_path(self) -> Recurrences | None:
-        """The recurrences of the path with its variation, if the step follows one, for derivatives."""
+        """The recurrences of the path with its variation, for derivatives; None if the step follows no path."""
         return None
 
     @property
     def back(self) -> PathAdjoint | None:
-        """The path integrated backward with cotangents, if the step follows one and its adjoint was requested."""
+        """The path integrated backwards with cotangents, if the step follows a path and its adjoint was requested;
+        else None."""
         return self.adjoint.path if self.adjoint else None
 
     @property
     def flow_schedule(self) -> Schedule | None:
-        """The schedule of the flows of a step; None where it is no sequence of flows."""
+        """The schedule of the flows of a step; None if the step is not a sequence of flows."""
         return None
 
     @property
     def flow_kernels(self) -> tuple[Kernel, ...]:
-        """The flows of a splitting with their derivatives and transposes."""
+        """The flows of a splitting with their derivatives and transposes; empty for other steps."""
         return ()
 
     @property
     def multiples(self) -> tuple[float, ...]:
-        """The multiples of the modified potential in kicks, by rows of the schedule; nothing where there are none."""
+        """The multiples of the modified potential in kicks, by rows of the schedule; empty without modified kicks."""
         return self.flow_schedule.multiples if self.flow_schedule else ()
 
     @property
     def method_name(self) -> str:
-        """The name of the composition of flows or stages, where the step has it."""
+        """The name of the composition of flows or stages; "" if the step has none."""
         return ""
 
     @property
     def swept(self) -> Sweeps | None:
-        """The step, if it is one of a lattice."""
+        """The step itself if it is one of a lattice, else None."""
         return None
 
     def maps(self, stages: int) -> int:
-        """Return the number of maps that a step with this number of stages is composed of."""
+        """Return the number of maps (stages or flows) whose composition is a step with this number of stages."""
         return stages
 
     @property
     def prepared(self) -> int:
-        """The number of values that ``prepare`` computes in one call."""
+        """The number of values that one call of ``prepare`` computes."""
         return len(self.prepare.outputs[0].values)
 
     @property
     def renewed(self) -> int:
-        """The number of values that ``refresh`` computes in one call."""
+        """The number of values that one call of ``refresh`` computes."""
         return len(self.refresh.outputs[0].values) if self.refresh else 0
 
     @property
     def row(self) -> int:
-        """The number of values that one call of each computes."""
+        """The number of values in a row of coefficients: those of ``prepare`` and those of ``refresh``."""
         return self.prepared + self.renewed
 
     @property
@@ -183,8 +185,8 @@ class _Staged:
 class InnerSolve:
     """Settings of the solve of an implicit step.
 
-    ``relative`` says that the coordinates are positive or keep their sign (log-canonical π), so that errors count
-    relative to each coordinate.
+    ``relative`` says that errors count relative to each coordinate, for coordinates that are positive or keep their
+    sign (log-canonical π).
     """
 
     max_iterations: int = 20
@@ -202,11 +204,11 @@ class Factorisation:
 
 @dataclass(frozen=True)
 class Newton(_Staged):
-    """α(y, ∇S_h(y)) = x, solved for y by Newton's method; then x + (β − α)(y, ∇S_h(y)).
+    """Step by Newton's method: α(y, ∇S_h(y)) = x is solved for y; then x' = x + (β − α)(y, ∇S_h(y)).
 
-    ``eliminate`` solves with one matrix, ``eliminate_transposed`` with its transpose, if the adjoint was requested.
-    For many right-hand sides there is ``invert``, ``factors``, or neither. Where a kernel is None, the runtime uses a
-    loop. ``centred`` says that y is the mean of x and x'.
+    ``eliminate`` solves with one matrix, ``eliminate_transposed`` with its transpose, if the adjoint was requested. For
+    many right-hand sides there is ``invert``, ``factors``, or neither. If a kernel is None, the runtime uses a loop.
+    ``centred`` says that y is the mean of x and x'.
     """
 
     linearise: Kernel
@@ -239,7 +241,7 @@ class Newton(_Staged):
 
 @dataclass(frozen=True)
 class Explicit(_Staged):
-    """The increment of a step as a formula; ``tangent`` is its Jacobian, if the tangent map was requested."""
+    """Explicit step: the increment is a formula. ``tangent`` is its Jacobian, if the tangent map was requested."""
 
     increment: Kernel
     tangent: Kernel | None = None
@@ -259,7 +261,8 @@ class Explicit(_Staged):
 
 @dataclass(frozen=True)
 class PathLanes:
-    """Kernels for several paths in lanes: the recurrences of the derivatives of a path, and their use."""
+    """Kernels for several paths in lanes: the recurrences of the derivatives of a path, and kernels that use these
+    derivatives."""
 
     slopes: PathSlopes
     curvature: Kernel
@@ -277,7 +280,7 @@ class PathTangent:
 
 @dataclass(frozen=True)
 class Path(_Staged):
-    """p = ∇S_h at the mean of the path ṁ = π(m)p, solved for p; α and β are the ends of the path."""
+    """Step along a path: p = ∇S_h(mean of the path ṁ = π(m)p) is solved for p; α and β are the ends of the path."""
 
     recurrences: Recurrences
     generate: Kernel
@@ -305,7 +308,7 @@ class Path(_Staged):
 
     @property
     def main(self) -> Kernel:
-        """The kernel that takes most of the time, but for the recurrences."""
+        """The kernel that takes most of the time apart from the recurrences."""
         return self.generate
 
     @property
@@ -318,7 +321,7 @@ class Path(_Staged):
 
     @property
     def curvature(self) -> Kernel | None:
-        """∇S_h and its Hessian, if derivatives of a step were requested."""
+        """Kernel of ∇S_h and its Hessian; None unless derivatives of a step were requested."""
         if self.tangent:
             return self.tangent.curvature
         return self.back.curvature if self.back else None
@@ -326,7 +329,8 @@ class Path(_Staged):
 
 @dataclass(frozen=True)
 class GaussTangent:
-    """The Jacobians of the vector field of a stage, along the start of the step and the unknowns, and of the change."""
+    """The Jacobians of the vector field of a stage, with respect to the start and to the unknowns, and that of
+    ``change``."""
 
     slope: Kernel
     change: Kernel
@@ -334,10 +338,11 @@ class GaussTangent:
 
 @dataclass(frozen=True)
 class ReducedSweeps:
-    """Sweeps over the ``iterated`` unknowns of a Gauss method; all entries are indices of unknowns.
+    """Sweeps over the ``iterated`` unknowns of a Gauss method; the lists contain indices of unknowns.
 
-    These depend on the ``followers`` only, and the followers are linear in the ``integrated`` ones among them. Both
-    kernels read integrals of the moves of the latter: ``slope`` gives the moves, ``follow`` the followers.
+    The iterated unknowns depend on the ``followers`` only. The followers are linear in the ``integrated`` unknowns,
+    some of the iterated ones. Both kernels read integrals of the increments of the integrated unknowns: ``slope``
+    computes the increments, ``follow`` the followers.
     """
 
     slope: Kernel
@@ -349,12 +354,13 @@ class ReducedSweeps:
 
 @dataclass(frozen=True)
 class Gauss(_Staged):
-    """Gauss collocation: Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j), by fixed-point sweeps; then x + D(x, Σ_j L_j).
+    """Step by Gauss collocation.
 
-    The unknowns Z are offsets, 0 at the start of the step. ``slope`` is f; the input x is the point, with the time as
-    the last entry if f depends on it. ``change`` is D. ``frame`` transforms the L_j of a step to the frame of the
-    next step, where that differs. The first ``plain`` unknowns have the scale of the state; the others, of group
-    elements, have the scale 1.
+    Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j) is solved by fixed-point sweeps; then x' = x + D(x, Σ_j L_j). The
+    unknowns Z are offsets, 0 at the start of the step. ``slope`` is f; its input x is the point, with the time as the
+    last entry if f depends on the time. ``change`` is D. ``frame`` transforms the L_j of a step to the frame of the
+    next step, if that differs. The first ``plain`` unknowns have the scale of the state; the others, of group elements,
+    have the scale 1.
     """
 
     slope: Kernel
@@ -409,16 +415,16 @@ class _Scheduled(_Staged):
 
     @property
     def coefficients(self) -> int:
-        """Coefficients of one step, in all rows."""
+        """The number of coefficients of one step, in all rows."""
         return self.row * len(self.schedule.times)
 
 
 @dataclass(frozen=True)
 class Splitting(_Scheduled):
-    """The exact flows of the parts of H, one after another as the ``schedule`` lists them.
+    """Step of a splitting: the exact flows of the parts of H, one after another as the ``schedule`` lists them.
 
-    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the
-    method; ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was requested.
+    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the method;
+    ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was requested.
     """
 
     flows: tuple[Kernel, ...]
@@ -434,7 +440,7 @@ class Splitting(_Scheduled):
         return (*self.flows, *self.tangents, *(self.adjoint.steps if self.adjoint else ()))
 
     def maps(self, stages: int) -> int:
-        """The number of flows, with those of a corrector."""
+        """The number of flows in a step, including those of a corrector."""
         return len(self.schedule.flows_of_run)
 
     @property
@@ -458,17 +464,17 @@ class Seam:
 
     @property
     def least(self) -> int:
-        """The smallest size for any remainder: the seam, and at least the same number of other sites."""
+        """The smallest size for which every remainder is possible: the seam, and at least as many other sites."""
         return 2 * self.wide + self.period - 1
 
 
 @dataclass(frozen=True)
 class Sites:
-    """The sites of a lattice, whose number is an argument of the solver.
+    """The sites of a lattice, whose sizes are arguments of the solver.
 
-    ``places`` maps each symbol of kernels to the field, or parameter at sites, and the offset, with the fastest axis
-    last. A site has the colour Σ ``weights``·position modulo ``colours``; sizes are multiples of ``periods``, at
-    least ``least``.
+    ``places`` maps each symbol of kernels to a field, or parameter at sites, and an offset, with the fastest axis last.
+    The colour of a site is Σ ``weights``·position modulo ``colours``. Sizes are multiples of ``periods``, and at least
+    ``least``.
     """
 
     axes: tuple[str, ...]
@@ -483,20 +489,21 @@ class Sites:
         default_factory=dict
     )  # symbols of kernels of bonds or pairs: field and end
     at_bonds: tuple[str, ...] = ()  # parameters at bonds
-    increments: tuple[str, ...] = ()  # of the noise of a site in a part of a step
+    increments: tuple[str, ...] = ()  # noise increments of a site in one part of a step
     derived: tuple[str, ...] = ()  # values at sites that the solver computes from the parameters
-    seams: tuple[Seam, ...] = ()  # the axes along which the colours fit every size
+    seams: tuple[Seam, ...] = ()  # boundary seams along the axes, with which the colours fit every size
 
 
 @dataclass(frozen=True)
 class Ends:
-    """A ``kernel`` of bonds or pairs between a site, a, and another, b.
+    """A ``kernel`` of bonds or pairs between a site, a, and another site, b.
 
-    Its inputs are ``coef`` or ``params``, ``site`` and ``bonds``, the parameters at bonds. ``end`` says which end of
-    the bond, in the order of the user, the site is: a, b, or "" for either. ``chosen`` says which of the two must
-    have the colour of the sweep: ``here``, ``there``, or "" for neither. ``extremes`` maps numbers of outputs, of
-    which the largest or the least value is kept in place of the sum, to ``max`` or ``min``. Of pairs, b is a site from
-    ``first`` on; the sites after the last one with a mass contribute nothing where the kernel is ``massive``.
+    Its inputs are ``coef`` or ``params``, ``site``, and ``bonds``, the parameters at bonds. ``end`` is the end of the
+    bond at which the site lies, in the order of the user: a, b, or "" for either. ``chosen`` says which of the two must
+    have the colour of the sweep: ``here`` (a), ``there`` (b), or "" for neither. ``extremes`` maps the indices of
+    outputs that are reduced to ``max`` or ``min``; all other outputs are summed. For pairs, b runs over the sites from
+    ``first`` on; if the kernel is ``massive``, the sites after the last one with a mass contribute nothing and are
+    omitted.
     """
 
     kernel: Kernel
@@ -508,13 +515,13 @@ class Ends:
 
     @property
     def of_all(self) -> bool:
-        """Whether both sites of every bond or pair add its contribution."""
+        """Whether both sites of every bond or pair add the contribution of the bond or pair."""
         return not (self.end or self.chosen)
 
 
 @dataclass(frozen=True)
 class Gather:
-    """Sums over the bonds of a site, or over its pairs with other sites: a value for each of the ``names``."""
+    """Sums over the bonds of a site, or over its pairs with other sites: one value for each of the ``names``."""
 
     ends: tuple[Ends, ...]
     names: tuple[str, ...]
@@ -527,11 +534,12 @@ class Gather:
 
 @dataclass(frozen=True)
 class Partners:
-    """Sums over bonds or pairs at a site: half the energies, and the forces or rates, as functions of the parameters.
+    """Sums over bonds or pairs at a site: half of the energies, and the forces or rates.
 
-    ``varied`` has the forces with their derivatives along variations of the fields, where a step solves an
-    `Equation`. ``observed`` are the densities of observables of bonds and pairs, ``of_parts`` the energies of parts of
-    H and their derivatives, by the names of the kernels that read them (`PartRates`).
+    They are functions of the parameters. ``varied`` has the forces with their derivatives along variations of the
+    fields, for steps that solve an `Equation`. ``observed`` are the densities of observables of bonds and pairs,
+    ``of_parts`` the energies of parts of H and their derivatives, by the names of the kernels that read them
+    (`PartRates`).
     """
 
     energy: Gather
@@ -542,7 +550,7 @@ class Partners:
     of_parts: tuple[tuple[str, Gather], ...] = ()
 
     def sums_of(self, kernel: Kernel) -> Gather:
-        """The sums that an observable reads; empty where it reads none."""
+        """Return the sums that an observable reads; no sums if it reads none."""
         sums = {Role.ENERGY: self.energy, Role.VECTOR_FIELD: self.field, Role.OBSERVABLES: self.observed}
         return dict(self.of_parts).get(kernel.name) or sums.get(kernel.role, Gather((), ()))
 
@@ -574,17 +582,16 @@ class PartRates:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Increments of the fields with the indices ``moved`` at all sites of one ``colour``, from values that the sweep
-    does not change.
+    """Increments of the fields with the indices ``moved`` at all sites of one ``colour``.
 
-    Without a colour the sweep updates every site. If it is ``inside``, it omits sites near seams. With a ``window``
-    it updates only sites near seams, by the terms that begin on the seams of these axes (bits), or on none. It updates
-    no sites before the ``first``.
+    A sweep reads no values that it changes. Without a colour, it updates every site. If it is ``inside``, it omits
+    sites near seams. With a ``window``, it updates only sites near seams, by the terms that begin on the seams of these
+    axes (a bit mask), or on none. It updates no sites before the ``first``.
 
-    The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. The symbols of ``present`` are
-    1 if a term of H lies within open ends, or if a site has the colour of the sweep, else 0; ``gathered`` are the
-    sums of ``gather``. ``tangent`` exists if derivatives of a step were requested: the increments of the variations
-    of the fields, from the inputs of this sweep and the variations ``varied``.
+    The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. The symbols of ``present`` are 1
+    if a term of H lies within open ends, or if a site has the colour of the sweep, else 0. ``gathered`` are the sums of
+    ``gather``. ``tangent`` exists if derivatives of a step were requested: it has the increments of the variations of
+    the fields, from the inputs of this sweep and the variations ``varied``.
     """
 
     kernel: Kernel
@@ -598,18 +605,18 @@ class Sweep:
 
     @property
     def is_tangent(self) -> bool:
-        """Whether the sweep updates variations."""
+        """Whether the sweep updates variations of the fields."""
         return self.kernel.role is Role.SWEEP_TANGENT
 
 
 @dataclass(frozen=True)
 class Equation:
-    """y = x − (α − x)(y, h∇H(y)) at all sites of a lattice, solved for y; x is then updated by (β − α)(y, h∇H(y)).
+    """The equation of a stage on a lattice: y = x − (α − x)(y, h∇H(y)); x is then updated by (β − α)(y, h∇H(y)).
 
     The inputs of the kernels are those of sweeps, with values of y as ``site``. ``relax``, the right-hand side at a
     site, also reads ``start``, the x of the site. ``advance`` is the increment of x. ``slope`` is the derivative of
-    ``relax`` along a variation of y, for Newton's method. ``tangents`` exist if derivatives of a step were
-    requested: those of ``relax`` along a variation of x, and of ``advance`` along one of y.
+    ``relax`` along a variation of y, for Newton's method. ``tangents`` exist if derivatives of a step were requested:
+    those of ``relax`` along a variation of x, and of ``advance`` along one of y.
     """
 
     relax: Kernel
@@ -626,10 +633,11 @@ class Equation:
 
 @dataclass(frozen=True)
 class RelativeSites:
-    """The relative coordinates in which a lattice of bodies makes its steps (`phigen.lattice.relative_bodies`).
+    """The relative coordinates in which steps of a lattice of bodies are made (`phigen.lattice.relative_bodies`).
 
-    ``axes`` pairs the indices of each position and of its momentum or velocity. ``remainder`` is the part B; its sums
-    over pairs read positions, and ``shifts`` further sums read velocities. ``mass`` is a parameter at sites.
+    ``axes`` pairs the index of each position with that of its momentum or velocity. ``remainder`` is the index of the
+    part B. The sums over pairs in B read positions; its ``shifts`` further sums read velocities. ``mass`` is a
+    parameter at sites.
     """
 
     jacobi: bool
@@ -644,15 +652,15 @@ class RelativeSites:
 class Sweeps(_Scheduled):
     """A step of a lattice, by sweeps over its sites.
 
-    In a splitting each of the ``parts`` is a list of sweeps, which may run in any order, and the ``schedule`` lists
-    the parts.
+    In a splitting each of the ``parts`` is a list of sweeps, which may run in any order; the ``schedule`` lists the
+    parts.
 
-    If some parts belong to one colour of a graph (``by_colour``), the flows of a step are those of all parts,
-    repeated for each colour. The ``schedule`` then has these numbers in place of parts: 0 the first flow, 1 the flows
-    in the middle, 2 the last, 3 the flows in the middle backwards. If H depends on the time, which advances in place
-    of the last flow, the last flow is in the middle too.
+    If some parts belong to one colour of a graph (``by_colour``), the flows of a step are those of all parts, repeated
+    for each colour. The ``schedule`` then contains these numbers instead of parts: 0 the first flow, 1 the flows in the
+    middle, 2 the last flow, 3 the flows in the middle in reverse order. If H depends on the time, the advance of the
+    time takes the place of the last flow, and the last flow is in the middle.
 
-    In the series there is an ``equation`` in place of parts, and the schedule lists its stages.
+    In the series there is an ``equation`` instead of parts, and the schedule lists its stages.
 
     Bodies in ``relative`` coordinates are transformed to these before the flows, and back afterwards.
     """
@@ -672,15 +680,15 @@ class Sweeps(_Scheduled):
 
     @property
     def swept(self) -> Sweeps:
-        """This step, since it consists of sweeps over sites."""
+        """The step itself, since it consists of sweeps over sites."""
         return self
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether a caller can drive the sweeps of a step one by one over planes: in grids that are split.
+        """Whether a caller can make the sweeps of a step one by one, plane by plane: splittings on grids.
 
-        Noise is drawn with the sweep that reads it, so no sweep may read the noise of neighbours. A seam lies at the
-        end of the lattice, which a caller with a part of the lattice does not have.
+        Noise is drawn in the sweep that reads it, so no sweep may read the noise of neighbours. A seam lies at the end
+        of the whole lattice, which a caller with a part of the lattice does not have.
         """
         reads_neighbour_increments = any(
             base in self.sites.increments and any(offset) for base, offset in self.sites.places.values()
@@ -690,9 +698,10 @@ class Sweeps(_Scheduled):
         )
 
     def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
-        """Return the access of a part on a grid: its extent behind and ahead along the first axis, and two sets.
+        """Return the access of a part on a grid: its extent behind and ahead along the first axis, and two bit masks of
+        fields.
 
-        The sets, as bits of numbers, are the fields that it reads at these distances, and the fields that it updates.
+        The masks are the fields that it reads at these distances, and the fields that it updates.
         """
         places = [self.sites.places[s] for sweep in self.parts[part] for s in sweep.kernel.inputs["site"]]
         distant = [(f, offset[0]) for f, offset in places if offset[0]]
@@ -721,7 +730,7 @@ class Sweeps(_Scheduled):
 
     @property
     def sums(self) -> int:
-        """The largest number of sums over other sites that a site stores."""
+        """The largest number of sums over other sites that are stored for each site."""
         swept = [sweep.gather for sweep in self.sweeps if sweep.gather]
         return max(len(g.names) for g in (*swept, *self.others.gathers))
 

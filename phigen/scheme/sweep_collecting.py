@@ -1,8 +1,8 @@
 """Transposed sweeps of lattices that collect: each site computes the contributions of its neighbours itself.
 
-This pays where these contributions are cheap, as those of springs: the site reads the same values anyway, and only
-the cotangents of neighbours are new. Expensive contributions, such as sines of sums over neighbours, are computed
-once, at the neighbour, which stores them for the site.
+This is faster if the contributions are cheap, such as those of springs: the site reads the same values anyway, and only
+the cotangents of neighbours are additional. Expensive contributions, such as sines of sums over neighbours, are
+computed once, at the neighbour, which stores them for the site.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, s
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import AROUND, Symbol
 
-#: Cost in additions of a value that a site stores for a neighbour: it is written, and read again by another loop.
+#: Cost, in additions, of a value that a site stores for a neighbour: one loop writes it, another reads it.
 STORED_VALUE_COST = 10
 
 
 def collecting(fields: Sequence[str], step: Sweeps, sweep: Sweep, transpose: Kernel) -> Kernel | None:
-    """Return the transpose of a sweep that collects; None if nothing is stored for neighbours, or that is cheaper."""
+    """Return the collecting form of the transpose of a sweep; None if nothing is stored for neighbours, or storing
+    is cheaper."""
     sites, contributions = step.sites, transpose.along("site")
     neighbour_terms = [
         (name, value) for name, value in contributions if any(sites.places[name][1]) and not value.is_zero
@@ -68,9 +69,9 @@ def _from_receiver(
     offset: Sequence[int],
     value: Expression,
 ) -> Expression | None:
-    """Return the contribution to the site at an offset, in terms of that site.
+    """Return the contribution to the site at ``offset``, in symbols of that site.
 
-    None if the site does not read the values that the contribution needs.
+    None if that site does not read the values that the contribution needs.
     """
     renamed: dict[str, Expression] = {}
     for s in symbols_of(value):
@@ -88,9 +89,9 @@ def _from_receiver(
 
 
 def _by_cotangents(value: Expression) -> Expression:
-    """Return a sum over cotangents, each times its factor.
+    """Return a value as a sum over cotangents, each times its factor.
 
-    The contributions of both ends of a spring have the same factor.
+    The contributions of both ends of a spring then have the same factor.
     """
     cotangents = [s for s in symbols_of(value) if isinstance(s, Symbol) and s.kind in ("change_bar", AROUND)]
     return total(e * symbol(s) for s, e in zip(cotangents, gradient(value, cotangents), strict=True))

@@ -1,4 +1,4 @@
-"""Facts about the sweeps of a lattice that select its code: elimination, blocking, reverse passes."""
+"""Properties of the sweeps of a lattice that select its code: elimination, blocking, reverse passes."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ MAX_DIAGONALS = 64
 
 
 def reach(step: Sweeps) -> int:
-    """Return the distance of the farthest neighbour in the equation of a stage, on a lattice with one axis."""
+    """Return the largest distance of a neighbour in the equation of a stage, on a lattice with one axis."""
     relax = step.equation.relax if step.equation else None
     places = [step.sites.places[s] for s in relax.inputs["site"]] if relax else []
     return max((abs(offset[-1]) for f, offset in places if f not in step.sites.parameters), default=0)
 
 
 def band(step: Sweeps) -> int:
-    """Return the number of off-diagonals of the matrix of a stage, site by site; 0 if elimination does not apply."""
+    """Return the number of off-diagonals of the matrix of a stage, in units of sites; 0 if band elimination does not
+    apply."""
     if not step.equation or step.partners or len(step.sites.axes) > 1:
         return 0
     diagonals = (reach(step) + 1) * len(step.equation.relax.roots) - 1
@@ -30,40 +31,40 @@ def band(step: Sweeps) -> int:
 
 
 def beside_seams(sweep: Sweep) -> bool:
-    """Whether a sweep has separate loops for sites away from boundary seams, or only near them."""
+    """Whether a sweep has a separate loop because of boundary seams: away from them, or only near them."""
     return sweep.inside or sweep.window is not None
 
 
 def first_kind(sites: Sites, sweep: Sweep) -> int | None:
-    """Return the first of the kinds of sites on the seams that a sweep is for."""
+    """Return the number of the first kind of sites near seams that a sweep updates; None for other sweeps."""
     return None if sweep.window is None else sweep.window * sites.colours
 
 
 def wide(sites: Sites, sweep: Sweep) -> bool:
-    """Whether a sweep over a row may round up to whole vectors, since the halo beside it is updated afterwards."""
+    """Whether a sweep over a row may write whole SIMD vectors beyond its end: the halo there is updated afterwards."""
     return len(sites.axes) > 1 and sites.colours == 1 and not sweep.gather and not sweep.is_tangent
 
 
 def chosen_ends(step: Sweeps) -> set[str]:
-    """Return the ends of bonds in the sums of sweeps whose sites may have the colour of the sweep."""
+    """Return the values of ``chosen`` that occur in the sums of sweeps over bonds."""
     gathers = (sweep.gather for part in step.parts for sweep in part if sweep.gather)
     return {ends.chosen for gather in gathers for ends in gather.ends}
 
 
 def site_blocks(program: Program, step: Sweeps) -> bool:
-    """Whether Krylov methods are preconditioned with the diagonal blocks of the matrix at sites: for grids."""
+    """Whether Krylov methods are preconditioned with the diagonal blocks of the matrix at sites; only on grids."""
     return step.equation is not None and step.partners is None and not band(step) and program.profile == "fast"
 
 
 def waves(program: Program, step: Sweeps) -> bool:
-    """Whether wavefront blocking applies: for grids, whose flows read neighbours only."""
+    """Whether wavefront blocking applies: to splittings on grids, whose flows read neighbours only."""
     is_splitting = step.equation is None and step.partners is None and not step.sites.seams
     return is_splitting and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
 
 
 @once
 def hands(program: Program, step: Sweeps) -> list[bool]:
-    """Tell for each part of H whether its transpose passes cotangents to other sites."""
+    """Return for each part of H whether its transpose passes cotangents to other sites."""
     passes: list[bool] = []
     if step.equation and step.adjoint:
         kernels = [kernel for kernel in step.adjoint.steps if "sums_bar" not in kernel.inputs]
@@ -78,7 +79,10 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 
 
 def takes(program: Program, step: Sweeps) -> bool:
-    """Whether the loop of the next flow adds the cotangents that a flow passes to sites of a grid: in long code."""
+    """Whether the loop of the next flow adds the cotangents that a flow passes to other sites of a grid.
+
+    This is so in the ``fast`` profile only, since the code is long.
+    """
     if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
     kernels = [kernel for part in transposes(program, step) for kernel in part]
@@ -88,9 +92,10 @@ def takes(program: Program, step: Sweeps) -> bool:
 
 
 def handed_apart(program: Program, step: Sweeps) -> list[bool]:
-    """Tell for each part of H whether separate loops add the cotangents that its sweeps pass to other sites.
+    """Return for each part of H whether separate loops add the cotangents that its sweeps pass to other sites.
 
-    Where the loop of the next flow adds them, that is the first flow only, which is the last in the reverse pass."""
+    If the loop of the next flow adds them, this is only so for the first flow, which is the last of the reverse pass.
+    """
     first = step.schedule.flows[0][0] if takes(program, step) else None
     return [passes and first in (None, k) for k, passes in enumerate(hands(program, step))]
 
@@ -98,14 +103,16 @@ def handed_apart(program: Program, step: Sweeps) -> list[bool]:
 def ways(step: Sweeps) -> list[tuple[int, int]]:
     """Return for each flow of a step its part and the part of the flow after it.
 
-    The first flow is listed once more, for where it is merged with the last flow of the step before."""
+    A last entry is for the first flow when it is merged with the last flow of the step before.
+    """
     parts = [part for part, _ in step.schedule.flows]
     next_parts = [*parts[1:], parts[1 % len(parts)]]
     return [*zip(parts, next_parts, strict=True), (parts[0], parts[1 % len(parts)])]
 
 
 def shares(step: Sweeps) -> bool:
-    """Whether loops over sites contribute to sums over all sites: the cotangents of coefficients, or parameters."""
+    """Whether loops over sites contribute to sums over all sites: to the cotangents of coefficients or of
+    parameters."""
     kernels = step.adjoint.steps if step.adjoint else ()
     kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
     summed = [kernel.along(array) for kernel in kernels for array in (TABLE, "params") if array in kernel.inputs]
@@ -113,16 +120,16 @@ def shares(step: Sweeps) -> bool:
 
 
 def givers(step: Sweeps) -> bool:
-    """Whether rows that contribute cotangents to a row differ from those that it reads, because of open ends."""
+    """Whether the rows that pass cotangents to a row may differ from the rows that it reads, because of open ends."""
     return any(step.sites.open[:-1])
 
 
 def starts_are_read(step: Sweeps) -> bool:
-    """Whether the transpose of a stage reads x at its start, beside y."""
+    """Whether the transpose of a stage reads x at the start of the stage, in addition to y."""
     relax = next((k for k in step.adjoint.steps if k.role is Role.TRANSPOSED_RELAX), None) if step.adjoint else None
     return relax is not None and not {*relax.inputs.get("start", ())}.isdisjoint(symbols_of(*relax.roots))
 
 
 def reads_sums(kernel: Kernel) -> bool:
-    """Whether a transposed kernel reads sums over bonds or pairs, and not only their cotangents."""
+    """Whether a transposed kernel reads sums over bonds or pairs, and not only the cotangents of these sums."""
     return not set(kernel.inputs["gathered"]).isdisjoint(symbols_of(*kernel.roots))

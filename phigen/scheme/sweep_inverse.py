@@ -1,7 +1,7 @@
 """Inverse sweeps of lattices: the fields before a flow, computed from those after it by the flow over the time −h.
 
-Sums over bonds or pairs are computed once: they read no field that the sweep updates. A damping force
-that adds a multiple of a field to the field itself is inverted by division; for other damping there is no inverse.
+Sums over bonds or pairs are the same before and after, since they read no field that the sweep updates. A damping force
+that adds a multiple of a field to the field itself is inverted by division; there is no inverse for other damping.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps], T]:
-    """Cache of one result: a printer makes dozens of calls for each pair of objects."""
+    """Decorator that stores the last result: a printer makes dozens of calls for each pair of objects."""
     last: list[tuple[Program, Sweeps, T]] = []
 
     @wraps(function)
@@ -39,7 +39,7 @@ def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps]
 
 @once
 def can_recompute_fields(program: Program, step: Sweeps) -> bool:
-    """Whether the transpose of a step can recompute the fields before its sweeps by the inverse flow."""
+    """Whether the transpose of a step can recompute the fields before its sweeps by the inverse flows."""
     if not step.adjoint or step.equation:
         return False
     parities, sweeps = of_coefficients(step), [sweep for part in step.parts for sweep in part]
@@ -50,7 +50,8 @@ def can_recompute_fields(program: Program, step: Sweeps) -> bool:
 
 @once
 def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
-    """Return the transposes of the sweeps of each part, which recompute the fields and collect where possible."""
+    """Return the transposes of the sweeps of each part, which recompute the fields and collect contributions if
+    possible."""
     kernels = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
     invertible = can_recompute_fields(program, step)
     transposes_of_parts = []
@@ -65,7 +66,7 @@ def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
 
 
 def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
-    """Return the transpose without weights of open ends in values for neighbours.
+    """Return the transpose without weights of open ends in values that are stored for neighbours.
 
     Each value is then the same for many neighbours. A neighbour that reads a value is on the lattice, and so is the
     term, unless the term reaches further.
@@ -82,7 +83,7 @@ def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
 
 
 def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
-    """Return a product without the weights that are 1 at every site that has a neighbour at the offset."""
+    """Return a product without the weights that are 1 at every site that has a neighbour at ``offset``."""
     if value.op in ("mul", "neg"):
         return rebuild(value, [_without_factors(e, offset) for e in value.args])
     if value.op != "symbol" or not isinstance(value.value, Symbol) or value.value.kind != PRESENT:
@@ -93,7 +94,8 @@ def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
 
 
 def recomputing_transpose(program: Program, step: Sweeps, sweep: Sweep, transpose: Kernel) -> Kernel:
-    """Return the transpose of a sweep, which reads the fields after it and recomputes those before, `STATE_BEFORE`."""
+    """Return the transpose of a sweep that reads the fields after the sweep and recomputes those before,
+    `STATE_BEFORE`."""
     updated = [program.coordinates[f] for f in sweep.moved]
     changes = _changes(program, sweep, of_coefficients(step))
     values = iter(before(transpose.roots, changes))
@@ -107,7 +109,7 @@ def recomputing_transpose(program: Program, step: Sweeps, sweep: Sweep, transpos
 
 
 def _changes(program: Program, sweep: Sweep, parities: Mapping[str, int]) -> dict[str, Expression]:
-    """Return the increments of the inverse of a sweep, by field; empty where there is no inverse."""
+    """Return the increments of the inverse of a sweep, by field; empty if there is no inverse."""
     updated, changes = [program.coordinates[f] for f in sweep.moved], sweep.kernel.roots
     if all(parities.get(s, EVEN) for s in symbols_of(*changes)):
         return dict(zip(updated, over_negative_time(changes, parities), strict=True))
@@ -116,9 +118,10 @@ def _changes(program: Program, sweep: Sweep, parities: Mapping[str, int]) -> dic
 
 
 def _inverse_of_multiple(field: str, updated: Sequence[str], change: Expression) -> Expression | None:
-    """Return the increment of the inverse where a field gains a multiple of itself, and terms without updated fields.
+    """Return the increment of the inverse for a ``change`` that is a multiple of the field plus terms without updated
+    fields.
 
-    None where the increment is of another form.
+    None for a change of another form.
     """
     (factor,), (constant_part,) = gradient(change, [field]), substitute([change], {field: ZERO})
     if not {*updated}.isdisjoint(symbols_of(factor, constant_part)):

@@ -1,9 +1,9 @@
 """The tangent map of a step, Dx_{n+1}/Dx_n, by implicit differentiation: its kernels for each kind of step.
 
-*newton*: α(y, ∇S_h(y)) = x gives Dy = J⁻¹, and x' = x + d(y) gives DΦ = 1 + M J⁻¹ with J and M of
-`phigen.scheme.step`, so ``linearise`` suffices. *explicit*: the Jacobian of the increment. *path*: the equation p =
-∇S_h(μ(x, p)) for p, with μ the mean of the path, gives (1 − Hess S_h μ_p) Dp = Hess S_h μ_x; the end m of the path
-gives DΦ = m_x + m_p Dp. Derivatives of end and mean come from the path of the tangent structure.
+*newton*: α(y, ∇S_h(y)) = x yields Dy = J⁻¹, and x' = x + d(y) yields DΦ = 1 + M J⁻¹ with J and M of
+`phigen.scheme.step`, so ``linearise`` is sufficient. *explicit*: the Jacobian of the increment. *path*: the equation p
+= ∇S_h(μ(x, p)) for p, with μ the mean of the path, yields (1 − Hess S_h μ_p) Dp = Hess S_h μ_x; the end m of the path
+yields DΦ = m_x + m_p Dp. Derivatives of end and mean come from the path of the tangent structure.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from phigen.symbolic.symbols import momentum, variation
 def explicit_jacobian(
     explicit: Kernel, coordinates: Sequence[str], coefficients: Coefficients, name: str = "explicit_tangent"
 ) -> Kernel:
-    """Return the Jacobian (n×n) of the increment of an explicit step, or of a flow."""
+    """Return the kernel of the Jacobian (n×n) of the increment of an explicit step, or of a flow."""
     columns = [derivatives(explicit.roots, c) for c in coordinates]
     n = len(coordinates)
     flat = coefficients.hoist([columns[j][i] for i in range(n) for j in range(n)])
@@ -47,10 +47,10 @@ def curvature(system: System, generating: GeneratingFunction, coefficients: Coef
 
 
 def tangent_path(system: System, coefficients: Coefficients) -> Recurrences:
-    """Return the path together with its variation v under variations of its start and of p.
+    """Return the recurrences of the path with its variation v under variations of its start and of p.
 
     (m, v) is the path of the tangent Poisson structure under the covector (p, w): v̇ = ∂_m(π(m)p) v + π(m) w.
-    Coordinates are the x, then ``v:x``; w is the momentum of the latter.
+    Coordinates are the x, then ``v:x``; w is the momentum of v.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]

@@ -58,7 +58,8 @@ class CUDADevice:
         return self._checked_call(lambda: self._cupy.empty(max(1, size), dtype=np.uint8))
 
     def constants(self, array: Any) -> Any:
-        """See `phigen.runtime.devices.device.Device`; a struct that CuPy passes by value, in constant memory."""
+        """See `phigen.runtime.devices.device.Device`. CuPy passes the numbers as a struct by value, in constant
+        memory."""
         return array.reshape(-1).view(np.dtype([("values", array.dtype, (array.size,))]))
 
     def write(self, buffer: Any, array: Any) -> None:
@@ -73,7 +74,7 @@ class CUDADevice:
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
         """See `phigen.runtime.devices.device.Device`."""
-        group = self._checked_call(lambda: kernel.max_threads_per_block)  # at most the launch bounds of the kernel
+        group = self._checked_call(lambda: kernel.max_threads_per_block)  # at most the launch bound of the kernel
         launch_arguments = tuple(
             np.uint64(0) if argument is None else argument for argument in arguments
         )  # a null pointer
@@ -97,7 +98,7 @@ _OPENED: Opened = {}
 
 
 def device(index: int | None = None) -> CUDADevice:
-    """Return a card in this process, the default one without an index.
+    """Return a card for this process; the default card if ``index`` is None.
 
     Raises `MissingPackageError` without CuPy, `DeviceError` without a driver.
     """
@@ -115,7 +116,7 @@ def count() -> int:
 
 
 def _cards() -> tuple[Any, list[str]]:
-    """Return the package CuPy, and the names of all cards."""
+    """Return the package CuPy, and the names of all cards. Raises as `device`."""
     try:
         import cupy
     except ImportError as error:
@@ -134,7 +135,7 @@ _HINT = "install NVIDIA's driver, or use target opencl, which also runs on CPUs"
 
 
 def load(files: Mapping[str, str], interface: Interface, device: int | None = None) -> Any:
-    """Return the back end of generated files on a card; see `phigen.registry`."""
+    """Return the back end of generated files on a card, as `phigen.registry` requires."""
     from phigen.runtime.devices.loading import backend
 
     return backend(files, interface, "cuda", device)

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from phigen.errors import DeviceError
 
-#: Environment variable that chooses a device: its number, or a part of its name.
+#: Environment variable that chooses a device, by its number or by a part of its name.
 CHOICE = "PHIGEN_DEVICE"
 
 
@@ -17,10 +17,10 @@ class OutOfMemoryError(Exception):
 
 
 class Device(Protocol):
-    """A device with its own memory. All methods but ``read`` may return before they are done.
+    """A device with its own memory. All methods except ``read`` may return before their work is done.
 
-    Kernels receive numbers as NumPy scalars, buffers, and None for absent arrays. Methods raise `OutOfMemoryError`, or
-    `DeviceError` where a driver fails.
+    Arguments of kernels are NumPy scalars, buffers, and None for absent arrays. Methods raise `OutOfMemoryError`, or
+    `DeviceError` if a driver fails.
     """
 
     target: str
@@ -30,7 +30,7 @@ class Device(Protocol):
     shared: int  # bytes of shared memory of a work group
     units: int  # compute units, each of which runs many work items
     double: bool  # whether double precision is supported
-    is_card: bool  # whether it is no processor: values beyond its registers lie in slow memory
+    is_card: bool  # whether it is a graphics card: values beyond its registers lie in slow memory
 
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
         """Return the program of a source text, with ``defined`` macros.
@@ -48,7 +48,8 @@ class Device(Protocol):
         ...
 
     def local_bytes(self, kernel: Any) -> int:
-        """Return the bytes of memory of the device that a work item of a kernel uses, as registers are too few."""
+        """Return the number of bytes of device memory that each work item of a kernel uses for values beyond its
+        registers."""
         ...
 
     def constants(self, array: Any) -> Any:
@@ -68,12 +69,15 @@ class Device(Protocol):
         ...
 
 
-#: Devices by the number of the process, since contexts do not survive a fork, and their own, None for the default.
+#: Open devices, by process number and device index (None for the default). Contexts do not survive a fork.
 Opened = dict[tuple[int, int | None], Any]
 
 
 def choose(names: Sequence[str], target: str, index: int | None) -> int:
-    """Return the index of a device: as passed, or that which `CHOICE` names, or 0. Raises `DeviceError`."""
+    """Return the index of a device: ``index``, or that of the device named in the variable `CHOICE`, or 0.
+
+    Raises `DeviceError` if there is no such device.
+    """
     if index is not None and not 0 <= index < len(names):
         raise DeviceError(f"device is {index}, but {target} has the devices {_listed(names)}")
     requested_device = os.environ.get(CHOICE, "")

@@ -1,4 +1,4 @@
-"""Arrays on a device with the arithmetic of NumPy that implicit steps of lattices use."""
+"""Arrays on a device with the operations of NumPy that implicit steps of lattices use."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ _OPERATIONS = {"add": 0, "subtract": 1, "multiply": 2, "divide": 3, "absolute": 
 
 
 class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
-    """Fields (coordinates, *sizes) on a device; no operation changes them.
+    """Fields (coordinates, *sizes) on a device, immutable.
 
-    The other operand is an array of the same shape on the device, one number, or one number for each field.
+    The second operand of an operation is an array of the same shape on the device, one number, or one number for each
+    field.
     """
 
     def __init__(self, launcher: Launcher, buffer: Any, shape: tuple[int, ...]) -> None:
@@ -58,11 +59,11 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
         return DeviceArray(self.launcher, result, self.shape)
 
     def max(self, axis: Any = None) -> Any:
-        """Return the largest entry, or that of each field if ``axis`` lists all other axes."""
+        """Return the largest entry, or that of each field if ``axis`` lists all axes but the first."""
         return self._reduced("max", axis)
 
     def sum(self, axis: Any = None) -> Any:
-        """Return the sum, or that of each field."""
+        """Return the sum of all entries, or that of each field if ``axis`` lists all axes but the first."""
         return self._reduced("sum", axis)
 
     def all(self) -> bool:

@@ -1,4 +1,5 @@
-"""Solvers of ordinary systems on devices: ensembles run there, single trajectories and observables on the host."""
+"""Solvers of ordinary systems on devices: ensembles run on the device, single trajectories and observables on the
+host."""
 
 from __future__ import annotations
 
@@ -20,25 +21,25 @@ from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface, stat
 from phigen.runtime.members import Members
 from phigen.runtime.session import Session
 
-#: Share of the device memory for a batch of members; the rest is for other programs and for register spills.
+#: Share of the device memory for a batch of members; the rest is left for other programs and for register spills.
 _SHARE = 0.5
 
-#: Steps of members in one launch for each compute unit: about a second. Between launches Python delivers keyboard
-#: interrupts, and systems with a watchdog for kernels do not stop them.
+#: Number of steps of members in one launch for each compute unit: about a second. Between launches Python delivers
+#: keyboard interrupts. Systems that stop long kernels do not stop these.
 _STEPS_PER_UNIT = 1 << 24
 
 #: Smallest number of members in a launch for each compute unit: enough to hide the latency of memory.
 _MEMBERS_PER_UNIT = 2048
 
-#: Bytes of local memory of a member that stay in the cache of a card: 128 kB for the 256 members, with 255 registers
-#: each, that run at once on a multiprocessor.
+#: Number of bytes of local memory of a member that stay in the cache of a card: 128 kB for the 256 members that run at
+#: once on a multiprocessor with 255 registers each.
 _LOCAL_BYTES = 512
 
 
 class DeviceSolver:
-    """Back end over a generated header for devices, and over a back end for the host.
+    """Back end over a generated header for devices, and over another back end for computations on the host.
 
-    ``defined`` are macros of the generated code: NAME_GROUP, the number of work items in a group, which does not
+    ``defined`` are macros of the generated code: NAME_GROUP is the number of work items in a group, which does not
     affect results.
     """
 
@@ -78,10 +79,10 @@ class DeviceSolver:
         return DeviceSolver(self._files, self.interface, self.target, host, np.ascontiguousarray(gauge), self._index)
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`; ``threads`` has no effect.
+        """See `phigen.runtime.backend.Backend`. ``threads`` has no effect.
 
-        Members are integrated in batches that fit into the memory of the device. Raises `DeviceError` if it fails; the
-        ``trajectory`` of the error holds the results so far, NaN for other members.
+        Members are integrated in batches that fit into the memory of the device. Raises `DeviceError` if the device
+        fails; the ``trajectory`` of the error contains the results so far, NaN for other members.
         """
         if attitudes is not None:
             raise TypeError(f"target {self.target} computes no attitudes of ensembles; compile for target c")
@@ -143,9 +144,9 @@ class DeviceSolver:
         part: slice,
         coefficients: Sequence[Any],
     ) -> None:
-        """Integrate the members of one launch, and store their results.
+        """Integrate the members of one launch, and store their results in ``final``, ``status`` and ``frames``.
 
-        ``coefficients`` is empty, or has the coefficients of all members as an argument of the kernel.
+        ``coefficients`` has the common coefficients of all members as a kernel argument, or is empty.
         """
         device, count, size = self.device, len(members), np.dtype(self._real).itemsize
         x = np.ascontiguousarray(members.x0.T, dtype=self._real)
@@ -173,7 +174,7 @@ class DeviceSolver:
             frames[1 : rows + 1, part] = stored_rows.transpose(0, 2, 1)
 
     def _kernels(self, *, common: bool) -> Kernels:
-        """Return the kernels for members with ``common`` coefficients, or with coefficients of their own."""
+        """Return the kernels for members with ``common`` coefficients, or for members with different coefficients."""
         if common not in self._compiled:
             defined = {**self._group(), **self.defined, **({f"{self.interface.name}_COMMON": 1} if common else {})}
             self._compiled[common] = Kernels(self.device, self._header, self.interface.name, defined)
@@ -181,7 +182,8 @@ class DeviceSolver:
         return self._compiled[common]
 
     def _group(self) -> dict[str, int]:
-        """Return the definition of a smaller group, if predictors need more shared memory than the device has."""
+        """Return the macro for a smaller group of work items, if predictors need more shared memory than the device
+        has; else {}."""
         launch = self.interface.ensemble
         if not launch.predictors:
             return {}
@@ -190,20 +192,23 @@ class DeviceSolver:
         return smaller if fitting < launch.group else {}
 
     def _warn_of_local_memory(self, kernel: Any) -> None:
-        """Warn of steps that are slow because the registers of a card are too few for their values."""
+        """Warn that steps are slow if the values of a member do not fit into the registers of the card."""
         if self.device.is_card and (size := self.device.local_bytes(kernel)) > _LOCAL_BYTES:
             message = f"{self.interface.name}: besides registers, each member uses {size} bytes of {self.device.name}"
             hint = "members with the same parameters and step need less, as do a lower order and scheme: splitting"
             warnings.warn(f"{message}, which is slow; {hint}", PhigenWarning, stacklevel=2)
 
     def _has_common_coefficients(self, members: Members) -> bool:
-        """Whether all members have the same parameters, step and gauge, and their kernel can share coefficients."""
+        """Whether one kernel argument can hold the coefficients of all members.
+
+        They must have the same parameters, step and gauge.
+        """
         same = np.ndim(members.h) == 0 and not any(np.ndim(v) for v in members.parameters.values())
         has_chosen_gauge = self._holds_gauge and self._gauge is None
         return bool(same and not has_chosen_gauge and self.interface.ensemble.coefficients)
 
     def _coefficients(self, members: Members) -> Any:
-        """Return the coefficients of all members as an argument of their kernel."""
+        """Return the common coefficients of all members as an argument of their kernel."""
         coefficients = np.empty(self.interface.ensemble.coefficients, self._real)
         buffer = self.device.empty(coefficients.nbytes)
         parameters, h = (self._shared_or_each(v)[0] for v in (self._parameters(members), np.atleast_1d(members.h)))
@@ -213,7 +218,7 @@ class DeviceSolver:
         return self.device.constants(coefficients)
 
     def _gauge_argument(self) -> Any:
-        """Return a buffer of the gauge of all members, None for gauges chosen at their starts."""
+        """Return a buffer with the fixed gauge; None if gauges are chosen from the initial states."""
         return None if self._gauge is None else self._written(np.array(self._gauge, self._real))
 
     @property
@@ -221,13 +226,14 @@ class DeviceSolver:
         return self.interface.ensemble.gauges > 0
 
     def _parameters(self, members: Members) -> Floats:
-        """Return the parameters (members or 1, parameters); a system without any has one unused number."""
+        """Return the parameters, (members, parameters) or (1, parameters). A system without parameters has one
+        unused number."""
         values = list(members.parameters.values()) or [np.zeros(())]
         count = len(members) if any(np.ndim(v) for v in values) else 1
         return np.stack([np.broadcast_to(v, (count,)) for v in values], axis=-1)
 
     def _shared_or_each(self, values: Floats) -> list[Any]:
-        """Return a buffer of values, one for all members or one for each, and 1 if there is one for each."""
+        """Return a buffer of values, and whether it has one value for each member (1) or one for all (0)."""
         return [self._written(np.ascontiguousarray(values, dtype=self._real)), np.int32(len(values) > 1)]
 
     def _written(self, array: NDArray[Any]) -> Any:
@@ -287,6 +293,6 @@ class DeviceSolver:
 def _loaded_again(
     files: Mapping[str, str], interface: Interface, target: str, gauge: Floats | None, index: int | None
 ) -> DeviceSolver:
-    """Return a solver that was pickled, on the device of this process."""
+    """Return a solver that was pickled, on the device of the present process."""
     solver = cast(DeviceSolver, registry.find(target).load(files, interface, device=index))
     return solver if gauge is None else solver.with_gauge(gauge)

@@ -1,4 +1,4 @@
-"""Implicit steps of lattices on devices: the NumPy module makes them, with arrays on the device."""
+"""Implicit steps of lattices on devices: the NumPy module makes the steps, with arrays that lie on the device."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class ImplicitSession(DeviceLatticeSession):
         self._tell_time()
 
     def evaluated(self, name: str, coefficients: Any, start: Any, x: Any, varied: Any = None) -> DeviceArray:
-        """Return the result of a kernel of a stage with solution ``x`` (fields)."""
+        """Return the result of a kernel of a stage at the iterate ``x`` (fields)."""
         if self._written is not coefficients:
             self._write_coefficients([coefficients])
             self._written = coefficients
@@ -59,9 +59,9 @@ class ImplicitSession(DeviceLatticeSession):
 
 
 def stepping_module(text: str, name: str, *, single: bool) -> Any:
-    """Return the NumPy module of a lattice with kernels of stages that run on a device.
+    """Return the NumPy module of a lattice with its kernels of stages replaced by those on a device.
 
-    In ``single`` precision, thresholds are those of C.
+    In ``single`` precision, thresholds are those of the C.
     """
     module: Any = load_module(text, name)
     module._relax = lambda coef, start, x, sites: sites.on_device.evaluated("relax", coef, start, x)

@@ -1,4 +1,5 @@
-"""Sessions of lattices on devices: fields stay there; energies and observables are transferred as numbers."""
+"""Sessions of lattices on devices: the fields stay on the device; energies and observables are transferred as
+numbers."""
 
 from __future__ import annotations
 
@@ -14,13 +15,15 @@ from phigen.runtime.devices.launching import Launcher
 from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.numpy_lattice import NumpyLatticeSession
 
-#: Steps between checks that all fields are finite; after a failed check, these steps are repeated one by one.
+#: Number of steps between checks that all fields are finite. After a failed check, these steps are repeated one by one.
 _STEPS_PER_LOOK = 64
 
 
 class DeviceLatticeSession(NumpyLatticeSession):
-    """A session whose state is on a device, and is copied to the host when it is read. The module is that of the
-    host."""
+    """A session whose state is on a device, and is copied to the host when it is read.
+
+    The generated module is that of the host.
+    """
 
     def __init__(self, backend: Any, *arguments: Any, timed: bool) -> None:
         self._interface, self._device = backend.interface, backend.device
@@ -37,13 +40,13 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._stored = stored_count
         self._flag = self._device.empty(4)
         self._increments = self._launcher.empty(self._launcher.tables.count * max(1, len(self._interface.noise)))
-        self._parameters: list[float] = []  # those on the device
+        self._parameters: list[float] = []  # the values that the device has
         self._coefficients: Any = None
         self._row = 0
 
     @property
     def _x(self) -> Floats:
-        """The state on the host."""
+        """The state as an array on the host."""
         if self._host is None:
             self._host = self._launcher.read(self._fields, self._shape)
         return self._host
@@ -53,7 +56,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._host, self._on_device = np.ascontiguousarray(value), False
 
     def _upload(self, compensation: Floats | None = None) -> None:
-        """Copy a state that was set on the host to the device, with its compensation terms, 0 by default."""
+        """Copy the state from the host to the device, with its compensation terms, 0 by default."""
         if self._on_device:
             return
         state = self._x.ravel()
@@ -75,7 +78,8 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._upload(arrays.get("compensation"))
 
     def advance(self, h: float, steps: int) -> None:
-        """See `phigen.runtime.lattice.LatticeSession`. Raises `DeviceError` if the device fails; the state stays."""
+        """See `phigen.runtime.lattice.LatticeSession`. Raises `DeviceError` if the device fails; the state is then
+        unchanged."""
         self.prepare(h)
         left = steps
         while left:
@@ -96,7 +100,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._host = None
 
     def _make_until_failure(self) -> None:
-        """Make steps one by one until one fails. Raises `BackendError` with the state before it."""
+        """Make steps one by one until a step fails. Raises `BackendError`, which has the state before that step."""
         while True:
             self._launcher.copy(self._fields, self._before, self._stored)
             self._make(1)
@@ -107,7 +111,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
                 raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
 
     def _make(self, steps: int) -> None:
-        """Make steps without a check of the results."""
+        """Make steps without checking that the results are finite."""
         self._host = None
         module, rows = self._module, self._rows
         constant = not (hasattr(module, "_renewed") or hasattr(module, "_draw"))
@@ -154,7 +158,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
     # --- functions of the state
 
     def _evaluated(self, name: str) -> tuple[Any, int]:
-        """Return a buffer of the outputs of a kernel at all sites, and the number of outputs."""
+        """Return a buffer with the outputs of a kernel at all sites, and the number of outputs."""
         launch = self._interface.launches.others.get(name)
         if launch is None:
             return None, 0
@@ -165,7 +169,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         return result, launch.outputs
 
     def _write_parameters(self) -> None:
-        """Copy the parameters that are numbers, and the time, to the device, if they changed."""
+        """Copy the scalar parameters and the time to the device, if they have changed."""
         values = [float(self._sites.parameters[name]) for name in self._interface.launches.numbers]
         values.append(float(self._sites.t) if self._timed else 0.0)
         if values != self._parameters:
@@ -180,7 +184,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
             return self._launcher.read(result, (outputs, *sizes)) if outputs else np.empty((0, *sizes))
 
     def _numbers_of(self, name: str, kinds: Sequence[str]) -> Floats:
-        """Return the outputs of a kernel, reduced over the sites by the kind of each."""
+        """Return the outputs of a kernel, each reduced over the sites by its kind, such as ``sum``."""
         with resumable(self.steps):
             result, _ = self._evaluated(name)
             return self._launcher.reduced(result, kinds, self._launcher.tables.count)
@@ -194,7 +198,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         return self._fields_of("energy").reshape(self._shape[1:])
 
     def casimirs(self) -> Any:
-        """Return the densities of the Casimirs of sites, and numbers for sums and products."""
+        """Return the Casimirs: densities for Casimirs of sites, numbers for sums and products."""
         kinds = self._interface.casimir_kinds
         if "sites" in kinds:
             fields = self._fields_of("casimirs")
@@ -224,7 +228,8 @@ class DeviceLatticeSession(NumpyLatticeSession):
 
 @contextmanager
 def resumable(steps: int) -> Iterator[None]:
-    """Raise `DeviceError` with a hint if a device fails after a number of steps."""
+    """Return a context in which errors of a device become `DeviceError`, with the step number and a hint at
+    checkpoints."""
     try:
         yield
     except (DeviceError, OutOfMemoryError) as error:

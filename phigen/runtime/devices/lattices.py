@@ -62,11 +62,11 @@ class DeviceLattice(NumpyLattice):
 
     @cached_property
     def monitoring(self) -> Any:
-        """The module that computes the times of flows of steps that are equal in τ."""
+        """The module that computes the durations of flows, for steps that are equal in τ."""
         return monitoring_module(self._text, self.interface.name)
 
     def launcher(self, sites: Any, sizes: tuple[int, ...]) -> Launcher:
-        """Return the launches for a lattice of some size. Raises `DeviceError` if it is too large."""
+        """Return the launcher for a lattice of these sizes. Raises `DeviceError` if the lattice is too large."""
         launches, interface = self.interface.launches, self.interface
         rows = [len(launches.neighbours), interface.dimension * (2 if interface.compensated else 1)]
         rows += [launch.outputs for launch in launches.others.values()]

@@ -12,15 +12,15 @@ from phigen.runtime.devices.device import Device
 from phigen.runtime.devices.site_tables import SiteTables
 from phigen.runtime.interface import Floats
 
-#: Numbers that a work item reduces in one pass. It alone determines the order of sums.
+#: Number of values that a work item reduces in one pass. The order of sums depends on this number only.
 _REDUCED = 64
 
-#: Codes of reductions in kernels; a mean starts as a sum.
+#: Codes of reductions in kernels; a mean is a sum that is divided afterwards.
 _KINDS = {"sum": 0, "mean": 0, "product": 1, "max": 2, "min": 3}
 
 
 class Kernels:
-    """The kernels of a compiled file by their names."""
+    """The kernels of a compiled program by name; each is created on first use."""
 
     def __init__(self, device: Device, text: str, name: str, defined: Mapping[str, int]) -> None:
         self._device, self._name = device, name
@@ -34,7 +34,7 @@ class Kernels:
 
 
 class Launcher:
-    """Launches for one lattice, in the precision of its tables."""
+    """Launches of kernels for one lattice, in the precision of its tables."""
 
     def __init__(self, kernels: Kernels, tables: SiteTables) -> None:
         self.device, self.kernels, self.tables, self.real = tables.device, kernels, tables, tables.real
@@ -57,7 +57,8 @@ class Launcher:
         return values.astype(np.float64, copy=False)
 
     def run(self, launch: SiteLaunch, coefficients: Any, first: int = 0, colour: int = 0, **buffers: Any) -> None:
-        """Compute the sums that a kernel reads, and launch it; ``buffers`` are its arrays besides the tables."""
+        """Compute the sums that a kernel reads, then launch the kernel; ``buffers`` are its arrays besides the
+        tables."""
         for k, sums in enumerate(launch.sums):
             source = (self.parameters, 0) if sums.of_parameters else (coefficients, first)
             self._launch(sums, (None, self.tables.count), *source, colour, adds=np.int32(k > 0), **buffers)
@@ -81,7 +82,7 @@ class Launcher:
         self.device.launch(self.kernels[launch.kernel], items, [*numbers, *table_arguments])
 
     def _summed(self, launch: SiteLaunch | SumLaunch) -> Any:
-        """Return the buffer of sums over bonds or pairs; one for all kernels."""
+        """Return the buffer of sums over bonds or pairs, which all kernels share."""
         if self._sums is None and "sums" in self._names:
             launches = self.tables.interface.launches
             all_launches = [*launches.others.values(), *(sweep for part in launches.parts for sweep in part)]
@@ -94,9 +95,9 @@ class Launcher:
         self.device.launch(self.kernels["copy"], numbers, [np.int32(numbers), source, target])
 
     def reduced(self, buffer: Any, kinds: Sequence[str], length: int) -> Floats:
-        """Return one number for each row of ``length`` numbers, by the kind of each row; NaN propagates.
+        """Reduce each row of ``length`` numbers in a buffer to one number, by the kind of the row; NaN propagates.
 
-        The order of the operations depends on the length only.
+        The order of the operations depends on the length only, so results have the same bits in every run.
         """
         rows = len(kinds)
         if not rows or not length:

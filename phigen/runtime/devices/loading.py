@@ -1,4 +1,4 @@
-"""Back ends of generated files for devices, which contain a back end for the host."""
+"""Construction of back ends on devices, each of which contains a back end for the host."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from phigen.runtime.interface import Interface, LatticeInterface
 
 
 def backend(files: Mapping[str, str], interface: Interface, target: str, index: int | None = None) -> Any:
-    """Return the back end of generated files; another target among the files serves computations on the host."""
+    """Return the back end of generated files on a device; code of another target among the files is used on the
+    host."""
     from phigen.runtime.devices.ensembles import DeviceSolver
     from phigen.runtime.devices.lattices import DeviceLattice
 

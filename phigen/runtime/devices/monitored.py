@@ -1,4 +1,5 @@
-"""Lattices on devices with a monitor: the time of each flow follows from the energy of a part of H, summed there."""
+"""Lattices on devices with a monitor: the duration of each flow follows from the energy of a part of H, which the
+device sums up."""
 
 from __future__ import annotations
 
@@ -22,10 +23,10 @@ class MonitoredSession(DeviceLatticeSession):
         self._hold_level()
 
     def _begin(self) -> None:
-        """The level is computed on the device, which is not open yet."""
+        """Do nothing: the energy level is computed on the device, which is not open yet."""
 
     def _hold_level(self) -> None:
-        """Hold the energy level of the state."""
+        """Set the energy level to −H of the state."""
         with np.errstate(all="ignore"):
             try:
                 self._sites.level = self._monitoring._level(self._sites, None)
@@ -71,7 +72,7 @@ class MonitoredSession(DeviceLatticeSession):
             raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
 
     def _make(self, steps: int) -> None:
-        """Make steps without a check of the results."""
+        """Make steps without checking that the results are finite."""
         self._host = None
         module, sites = self._monitoring, self._sites
         correction_times = [[0.0]] if hasattr(module, "_late") else []
@@ -85,7 +86,7 @@ class MonitoredSession(DeviceLatticeSession):
 
 
 def monitoring_module(text: str, name: str) -> Any:
-    """Return the NumPy module of a lattice with energies of parts of H that are summed on a device."""
+    """Return the NumPy module of a lattice with the energies of parts of H replaced by those that a device computes."""
     module: Any = load_module(text, name)
     module._part_energy = lambda sites, part, x: sites.on_device.part_energy(part)
     return module

@@ -13,8 +13,8 @@ from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
 
-#: Without relaxed arithmetic, results have the same bits as those of C. Warnings of drivers about unrolled loops are
-#: suppressed.
+#: Options of the compiler. Relaxed arithmetic is off, so results have the same bits as those of the C. -w suppresses
+#: warnings of drivers about unrolled loops.
 _OPTIONS = ["-w"]
 
 _MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY", "INVALID_BUFFER_SIZE")
@@ -58,11 +58,11 @@ class OpenCLDevice:
         return self._checked_call(lambda: self._cl.Buffer(self._context, self._cl.mem_flags.READ_WRITE, max(1, size)))
 
     def local_bytes(self, kernel: Any) -> int:
-        """See `phigen.runtime.devices.device.Device`; 0 where a driver does not know."""
+        """See `phigen.runtime.devices.device.Device`; 0 if the driver does not report it."""
         return int(kernel.get_work_group_info(self._cl.kernel_work_group_info.PRIVATE_MEM_SIZE, self._device))
 
     def constants(self, array: Any) -> Any:
-        """See `phigen.runtime.devices.device.Device`; a buffer in the address space of constants."""
+        """See `phigen.runtime.devices.device.Device`. The argument is a buffer in the constant address space."""
         buffer = self.empty(array.nbytes)
         self.write(buffer, array)
         return buffer
@@ -100,7 +100,7 @@ _OPENED: Opened = {}
 
 
 def device(index: int | None = None) -> OpenCLDevice:
-    """Return a device in this process, the default one without an index.
+    """Return a device for this process; the default device if ``index`` is None.
 
     Raises `MissingPackageError` without pyopencl, `DeviceError` without a driver.
     """
@@ -114,7 +114,8 @@ def device(index: int | None = None) -> OpenCLDevice:
 
 
 def count() -> int:
-    """Return the number of devices of the kind of the first: workers share these. Raises as `device`."""
+    """Return the number of devices of the same kind as the first, among which workers are distributed. Raises as
+    `device`."""
     kinds = [d.type for d in _listed(_library())]
     return kinds.count(kinds[0])
 
@@ -142,7 +143,7 @@ def _listed(cl: Any) -> list[Any]:
 
 
 def load(files: Mapping[str, str], interface: Interface, device: int | None = None) -> Any:
-    """Return the back end of generated files on a device; see `phigen.registry`."""
+    """Return the back end of generated files on a device, as `phigen.registry` requires."""
     from phigen.runtime.devices.loading import backend
 
     return backend(files, interface, "opencl", device)

@@ -1,4 +1,5 @@
-"""Arrays of a lattice on a device, besides its fields: neighbours, bonds, parameters at sites, selections of sites."""
+"""Arrays of a lattice on a device other than its fields: neighbours, bonds, parameters at sites, selections of
+sites."""
 
 from __future__ import annotations
 
@@ -17,10 +18,10 @@ from phigen.runtime.interface import LatticeInterface
 
 @dataclass
 class SiteTables:
-    """The tables of one lattice; ``sites`` is that of its NumPy module, and ``real`` is the type of its numbers.
+    """The tables of one lattice. ``sites`` is the site object of its NumPy module, ``real`` the type of numbers.
 
-    A table is written when a kernel first reads it. ``of_sizes`` has the tables that depend on the sizes alone,
-    which lattices of equal sizes share.
+    A table is written when a kernel first reads it. ``of_sizes`` has the tables that depend on the sizes alone, which
+    lattices of equal sizes share.
     """
 
     device: Device
@@ -37,7 +38,7 @@ class SiteTables:
         return int(np.prod(self.sizes))
 
     def selected(self, launch: SiteLaunch) -> tuple[Any, int]:
-        """Return the numbers of the sites of a launch, None for all, and the number of these sites."""
+        """Return the numbers of the sites of a launch (None: all sites), and the number of these sites."""
         if launch.colour is None and not launch.inside and launch.window is None:
             return None, self.count
         key = "sites", launch.colour, launch.inside, launch.window is not None
@@ -58,8 +59,7 @@ class SiteTables:
         return buffer, count
 
     def arrays(self, launch: SiteLaunch | SumLaunch, colour: int) -> Mapping[str, Any]:
-        """Return the tables that a kernel reads, by the names of its arguments; None for tables that it does not
-        read."""
+        """Return the tables that a kernel reads, by the names of its arguments; the other arguments are None."""
         starts, other_sites, at_bonds = None, None, None
         if isinstance(launch, SumLaunch) and self.interface.graph:
             starts, other_sites, at_bonds = self._bonds(launch, colour)
@@ -80,7 +80,7 @@ class SiteTables:
         return self._of_sizes(("kinds", numbers), np.int32, lambda: [np.array(numbers)])
 
     def written(self, values: Any, kind: Any) -> Any:
-        """Return a buffer of values, which is never empty."""
+        """Return a buffer that contains the values; its size is never 0."""
         array = np.ascontiguousarray(np.append(np.ravel(values), 0), dtype=kind)
         buffer = self.device.empty(array.nbytes)
         self.device.write(buffer, array)
@@ -104,7 +104,7 @@ class SiteTables:
         return [np.broadcast_to(self.sites.parameters[name], self.sizes) for name in self.interface.at_sites]
 
     def _on_seams(self, window: int | None) -> Any:
-        """Return the conditions on boundary seams of a selection of sites, None without one."""
+        """Return the conditions on boundary seams in a selection of sites; None without seams."""
         if window is None:
             return None
         seams = self.interface.launches.seams
@@ -117,7 +117,8 @@ class SiteTables:
         )
 
     def _bonds(self, launch: SumLaunch, colour: int) -> tuple[Any, Any, Any]:
-        """Return the bonds of each site: where they start in the list, their other sites, and their parameters."""
+        """Return the bonds of each site as three buffers: first index in the list of bonds, partner sites, and
+        parameters."""
         key = "bonds", launch.end, launch.chosen, colour if launch.chosen else 0
         if key not in self._stored:
             self.sites.colour = colour
