@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 618c4a02fe7bafd00c2c55e9bb66df2f04e8853b140375c3ad8d2cd9fd822d53
+ * body-sha256: e9dc88b1cc0ecdac5736e0ec222903cf0ffd4c70460976bb32c4993a912e5e60
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -615,8 +615,8 @@ export class Solver {
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
-   * @param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map
-   *   for each
+   * @param {ArrayLike<number>} [options.gauge] factors of the Casimirs in place of those at x0; for fixed factors
+   *   the step is an exact Poisson map
    */
   constructor(options = {}) {
     expectOptions(options, OPTIONS);

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c0c0aa25bf64807fa2ff4bf6c20c9a0556be642f577e4af91de940bc2ef5552a
+ * body-sha256: d437df491f9f760d30fcc7f2169c2b9bd1f814c7c7512d770bd02c132106f3fe
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -245,7 +245,7 @@ export class Solver {
    * @param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES
    * @param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default
    * @param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number
-   * for all
+   *   for all
    */
   constructor(options = {}) {
     expectOptions(options, OPTIONS);

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from phigen.ir import nodes as ir
-from phigen.ir.passes.unread import typed_function
+from phigen.ir.passes.function_parameters import typed_function
 from phigen.scheme.alternation import Schedule
 
 X, START, COEF, ROW, DISTINCT_COEF, PART, PACK, GROUP, BAR, K = (

@@ -200,6 +200,11 @@ class LatticeLoops:
         return (*self.program.coordinates, *sites.parameters, *sites.increments, *sites.derived)
 
     @cached_property
+    def derived(self) -> dict[str, str]:
+        """The members that store values which solvers compute for each site, by the names of their arrays."""
+        return {symbol: symbol.kind for symbol in self.step.sites.derived}
+
+    @cached_property
     def numbers(self) -> tuple[str, ...]:
         """The parameters with one value for all sites."""
         arrays = {*self.step.sites.parameters, *self.step.sites.at_bonds}

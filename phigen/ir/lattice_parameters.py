@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from phigen.ir import nodes as ir
-from phigen.ir.passes.unread import typed_function
+from phigen.ir.passes.function_parameters import typed_function
 from phigen.spec.model import Parameter
 
 S, PARAMS, K, NULL = (ir.fixed(name) for name in ("s", "params", "k", "NULL"))

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from phigen.ir import nodes as ir
-from phigen.ir.passes.unread import typed_function
+from phigen.ir.passes.function_parameters import typed_function
 from phigen.ir.walk import names_in
 from phigen.scheme.kernel import Role
 from phigen.scheme.lowering import expand_powers

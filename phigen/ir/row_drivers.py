@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import bounds
 from phigen.ir.passes.by_rows import FROM, ROW, TO, RowLayout
-from phigen.ir.passes.unread import discard_unread
+from phigen.ir.passes.function_parameters import discard_unread
 from phigen.ir.walk import names_in, statements, values
 from phigen.scheme.kernel import Role
 

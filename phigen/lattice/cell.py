@@ -15,7 +15,7 @@ from functools import cached_property
 from phigen.spec.model import NO_FORCES, Parameter, Reduction, SpecForces, SpecNoise
 from phigen.symbolic.expression import ZERO, Expression, gradient, mul, neg, symbol, total
 from phigen.symbolic.neighbours import ENDS, Neighbours, Offset, Place, minus, plus, steps
-from phigen.symbolic.symbols import increment
+from phigen.symbolic.symbols import Symbol, increment
 
 GRID, GRAPH, PAIRS = "grid", "graph", "pairs"
 PERIODIC, OPEN = "periodic", "open"
@@ -57,7 +57,7 @@ class Cell:
     noise: Mapping[str, SpecNoise] = field(default_factory=dict)
     observables: Mapping[str, Expression] = field(default_factory=dict)
     reductions: Mapping[str, Reduction] = field(default_factory=dict)
-    derived: tuple[str, ...] = ()
+    derived: tuple[Symbol, ...] = ()
 
     @property
     def driven(self) -> bool:

@@ -18,6 +18,7 @@ from phigen.scheme.alternation import Schedule
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.path import PathSlopes, Recurrences
 from phigen.scheme.step_kinds import EXPLICIT, GAUSS, NEWTON, PATH, SPLITTING, SWEEPS, StepKind
+from phigen.symbolic.symbols import Symbol
 
 #: Suffix of the name of a transposed kernel of a lattice.
 BACK = "_back"
@@ -490,7 +491,7 @@ class Sites:
     )  # symbols of kernels of bonds or pairs: field and end
     at_bonds: tuple[str, ...] = ()  # parameters at bonds
     increments: tuple[str, ...] = ()  # noise increments of a site in one part of a step
-    derived: tuple[str, ...] = ()  # values at sites that the solver computes from the parameters
+    derived: tuple[Symbol, ...] = ()  # values at sites that the solver computes from the parameters
     seams: tuple[Seam, ...] = ()  # boundary seams along the axes, with which the colours fit every size
 
 

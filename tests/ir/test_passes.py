@@ -10,11 +10,11 @@ from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes.by_tables import by_tables
 from phigen.ir.passes.forms import FULL_RANGE, IN_LANES, calling, forms_of
+from phigen.ir.passes.function_parameters import discard_unread
 from phigen.ir.passes.loop_invariant import loop_invariant
 from phigen.ir.passes.open_ends import divided_at_ends
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries
-from phigen.ir.passes.unread import discard_unread
 from phigen.ir.passes.whole_arrays import WholeArrays, identical
 from phigen.scheme.kernel import Role
 from phigen.scheme.steps import Sweeps

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
-from phigen.ir.passes.extremes import limit, updates
+from phigen.ir.passes.sites import COUNT, OTHER, SITE, SITES, of_array, over_pairs
+from phigen.ir.passes.sums import limit, updates
 from phigen.ir.walk import names_in, statements
 from phigen.scheme.kernel import Role
 from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
 
-SITE, OTHER, NUMBER, SITES, COUNT, COLOUR = (ir.fixed(name) for name in ("i", "j", "k", "sites", "count", "colour"))
+NUMBER, COLOUR = (ir.fixed(name) for name in ("k", "colour"))
 
 #: The names of the arrays of each kind of storage, and of parameters of functions, where JavaScript has other names.
 _ARRAYS = {ir.Storage.STATE: "x", ir.Storage.VARIATION: "v", ir.Storage.START: "start", ir.Storage.SUM: "sums"}
@@ -139,8 +140,7 @@ class _Tables:
         if array.name in increments:
             increments_array = self._hoisted(Symbol("at", "dw"), ir.Member(SITES, "dw"))
             return ir.Entry(increments_array, of_array(site, increments.index(array.name)))
-        if array.name in self.lattice.step.sites.derived:
-            name = str(getattr(array.name, "kind", array.name))
+        if name := self.lattice.derived.get(array.name):
             return ir.Entry(self._hoisted(Symbol("at", name), ir.Member(SITES, name)), site)
         return ir.Entry(self._parameter(array.name), site)
 
@@ -173,26 +173,12 @@ def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
     return ir.Loop("plain", body, variable, ir.Constant(0), end)
 
 
-def over_pairs(body: Iterable[ir.Statement], selection: ir.Selection = ir.ALL_SITES) -> ir.Loop:
-    """Return the loop over all other sites of a selection."""
-    other = ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),))
-    high = ir.Member(SITES, "massive") if selection.massive else COUNT
-    return ir.Loop("plain", (other, *body), "j", ir.Constant(selection.first), high)
-
-
 def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
     """Yield the calls that set extremes to their initial values; callers set sums to 0."""
     for s in loop.stores:
         if s.extreme:
             ends = of_array(ir.Constant(0), s.array.number), of_array(ir.Constant(0), s.array.number + 1)
             yield ir.Call("fill", (limit(s.extreme, "Infinity"), *ends), ir.fixed("sums"))
-
-
-def of_array(site: ir.Value, number: int) -> ir.Value:
-    """Return the index of a site in one of several consecutive arrays."""
-    if number == 0:
-        return site
-    return ir.Binary("+", site, COUNT if number == 1 else ir.Binary("*", ir.Constant(number), COUNT))
 
 
 def _sites_of(selection: ir.Selection) -> ir.Value | None:

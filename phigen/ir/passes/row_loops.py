@@ -27,8 +27,8 @@ from phigen.ir.passes.by_rows import (
     rows_of,
     together,
 )  # fmt: skip
-from phigen.ir.passes.extremes import limit, updates
-from phigen.ir.passes.unread import discard_unread
+from phigen.ir.passes.function_parameters import discard_unread
+from phigen.ir.passes.sums import compensated_sum, limit, updates
 from phigen.ir.walk import names_in
 from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import ZERO as NOTHING
@@ -93,15 +93,6 @@ def of_colour(
 def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Statement]) -> ir.Function:
     """Return a function with other parameters and statements, which marks the parameters that it does not read."""
     return discard_unread(replace(function, parameters=parameters, body=tuple(body)))
-
-
-def compensated_sum(k: int, field: ir.Value, compensation: ir.Value, increment: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statements of compensated sum number k; the rounding error goes into the compensation term."""
-    add, total = ir.fixed(f"add{k}"), ir.fixed(f"sum{k}")
-    items = ((add.symbol, ir.Accumulated(compensation, increment)), (total.symbol, ir.Binary("+", field, add)))
-    yield ir.Declare(ir.Type.REAL, items)
-    yield ir.Assign(compensation, ir.Binary("-", add, ir.Binary("-", total, field)))
-    yield ir.Assign(field, total)
 
 
 def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Function:

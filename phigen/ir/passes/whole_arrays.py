@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.nodes import Storage
-from phigen.ir.passes.extremes import limit
+from phigen.ir.passes.sums import limit
 from phigen.scheme.kernel import Role
 from phigen.symbolic.symbols import HERE
 
@@ -260,8 +260,8 @@ class WholeArrays:
         whole: ir.Value = ir.Entry(storage, number)
         if array.storage is Storage.STATE and array.name in increments:
             whole = ir.entry(ir.Member(SITES, "dw"), increments.index(array.name))
-        elif array.storage is Storage.STATE and array.name in self.lattice.step.sites.derived:
-            whole = ir.Member(SITES, str(getattr(array.name, "kind", array.name)))
+        elif array.storage is Storage.STATE and array.name in self.lattice.derived:
+            whole = ir.Member(SITES, self.lattice.derived[array.name])
         elif array.storage is Storage.STATE and array.name not in fields:
             whole = ir.entry(ir.Member(SITES, "parameters"), array.name)
         if end and self.lattice.step.others.graph and array.storage is not Storage.SEED:

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
 from phigen.ir.lattice_loops import LatticeLoops
-from phigen.ir.passes.by_tables import COUNT, OTHER, SITE, of_array, over_pairs
-from phigen.ir.passes.extremes import limit, updates
-from phigen.ir.passes.row_loops import compensated_sum
+from phigen.ir.passes.sites import COUNT, OTHER, SITE, of_array, over_pairs
+from phigen.ir.passes.sums import compensated_sum, limit, updates
 from phigen.symbolic.symbols import Symbol
 
 #: Index of the bond among those of a site.

@@ -9,9 +9,9 @@ from phigen.ir import nodes as ir
 from phigen.ir.kernel_functions import kernel_function
 from phigen.ir.passes.cutting import cut, workspace
 from phigen.ir.passes.forms import SIMD, calling
+from phigen.ir.passes.function_parameters import discard_unread
 from phigen.ir.passes.output_order import in_output_order
 from phigen.ir.passes.simd_lanes import in_lanes
-from phigen.ir.passes.unread import discard_unread
 from phigen.ir.passes.zeros import without_zeros, zeros_first
 from phigen.scheme.kernel import EXPONENTS, SCALARS, Kernel, Role
 from phigen.scheme.program import Program

@@ -11,17 +11,35 @@ from phigen.targets.features import holds
 
 
 @dataclass(frozen=True)
+class Option:
+    """An option of the constructor: its name, its type in JSDoc, and its description, whose lines are separated."""
+
+    name: str
+    type: str
+    description: str
+    required: bool = False
+
+    @property
+    def lines(self) -> Iterator[str]:
+        """The lines of JSDoc that describe the option."""
+        name = f"options.{self.name}" if self.required else f"[options.{self.name}]"
+        first, *others = self.description.split("\n")
+        yield f"@param {{{self.type}}} {name} {first}"
+        yield from (f"  {line}" for line in others)
+
+
+@dataclass(frozen=True)
 class StateFields:
     """Fields of a solver that belong together; ``when`` is a condition on switches, empty for all solvers.
 
-    ``fields`` are lines of the class, ``saved`` the names of those that a failing step restores. ``options`` are lines
-    that describe options of the constructor, ``arguments`` those of a step.
+    ``fields`` are lines of the class, ``saved`` the names of those that a failing step restores. ``options`` are those
+    of the constructor; ``arguments`` are lines that describe arguments of a step.
     """
 
     when: str = ""
     fields: tuple[str, ...] = ()
     saved: tuple[str, ...] = ()
-    options: tuple[str, ...] = ()
+    options: tuple[Option, ...] = ()
     arguments: tuple[str, ...] = ()
 
 
@@ -29,9 +47,9 @@ class StateFields:
 SOLVER = (
     StateFields(
         options=(
-            "@param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES",
-            "@param {Partial<Parameters>} [options.params] parameters that differ from the defaults",
-        )
+            Option("x0", "ArrayLike<number>", "the coordinates, in the order of COORDINATES", required=True),
+            Option("params", "Partial<Parameters>", "parameters that differ from the defaults"),
+        ),
     ),
     StateFields(
         fields=(
@@ -49,12 +67,12 @@ SOLVER = (
             "tCarry = 0;",
         ),
         ("tCarry",),
-        ("@param {ArrayLike<number>} [options.gauge] energy level e: steps with one e follow one Hamiltonian",),
+        (Option("gauge", "ArrayLike<number>", "energy level e: steps with one e follow one Hamiltonian"),),
     ),
     StateFields(
         "TIMED",
         ("/** The time of x. */", "t;"),
-        options=("@param {number} [options.t0] the time of x0, 0 by default",),
+        options=(Option("t0", "number", "the time of x0, 0 by default"),),
     ),
     StateFields("!TIMED", ("/** Time since the start. */", "t = 0;")),
     StateFields(saved=("t",)),
@@ -69,9 +87,9 @@ SOLVER = (
             "dw = new Float64Array(DRAWS);",
         ),
         options=(
-            "@param {number | bigint} [options.seed] seed of the random numbers, 64 bits, 0 by default",
-            "@param {number} [options.member] member of an ensemble, 32 bits, 0 by default",
-            "@param {number} [options.step0] number of steps made before x0, 0 by default",
+            Option("seed", "number | bigint", "seed of the random numbers, 64 bits, 0 by default"),
+            Option("member", "number", "member of an ensemble, 32 bits, 0 by default"),
+            Option("step0", "number", "number of steps made before x0, 0 by default"),
         ),
         arguments=("@param {ArrayLike<number>} [dw] increments of the noise; random ones by default",),
     ),
@@ -92,8 +110,11 @@ SOLVER = (
         "GAUGE && !MONITOR",
         ("/** Factors of the Casimirs in GAUGE that are subtracted from H. */", "gauge;"),
         options=(
-            "@param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map",
-            "  for each",
+            Option(
+                "gauge",
+                "ArrayLike<number>",
+                "factors of the Casimirs in place of those at x0; for fixed factors\nthe step is an exact Poisson map",
+            ),
         ),
     ),
     StateFields(
@@ -113,13 +134,17 @@ SOLVER = (
         ),
         ("turned", "turnedCarry"),
         (
-            "@param {ArrayLike<number>} [options.attitude0] the attitude at x0, a quaternion (w, x, y, z) of any",
-            "  length, or a matrix row by row; the identity by default",
+            Option(
+                "attitude0",
+                "ArrayLike<number>",
+                "the attitude at x0, a quaternion (w, x, y, z) of any\n"
+                "length, or a matrix row by row; the identity by default",
+            ),
         ),
     ),
     StateFields(
         "POSITION",
-        options=("@param {ArrayLike<number>} [options.position0] the position, the origin by default",),
+        options=(Option("position0", "ArrayLike<number>", "the position, the origin by default"),),
     ),
     StateFields(
         "RATE_OF_GAUGE",
@@ -136,35 +161,37 @@ SOLVER = (
 LATTICE = (
     StateFields(
         options=(
-            "@param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES",
-            "@param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default",
-            "@param {object} [options.params] parameters; those at sites and at bonds are arrays, or one number",
-            "for all",
-        )
+            Option("x0", "ArrayLike<number>", "one field after the other, in the order of COORDINATES", required=True),
+            Option("sizes", "number[]", "sites along each axis; with one axis those of x0 by default"),
+            Option("params", "object", "parameters; those at sites and at bonds are arrays, or one number\nfor all"),
+        ),
     ),
-    StateFields("TIMED", options=("@param {number} [options.t0] the time of x0, 0 by default",)),
+    StateFields("TIMED", options=(Option("t0", "number", "the time of x0, 0 by default"),)),
     StateFields(
         "NOISE",
         options=(
-            "@param {number | bigint} [options.seed] seed of the random numbers, 64 bits, 0 by default",
-            "@param {number} [options.member] member of an ensemble, 32 bits, 0 by default",
-            "@param {number} [options.step0] number of steps made before x0, below 2^48, 0 by default",
+            Option("seed", "number | bigint", "seed of the random numbers, 64 bits, 0 by default"),
+            Option("member", "number", "member of an ensemble, 32 bits, 0 by default"),
+            Option("step0", "number", "number of steps made before x0, below 2^48, 0 by default"),
         ),
     ),
     StateFields(
         "GRAPH",
         options=(
-            "@param {ArrayLike<number>} options.bonds the ends of all bonds, counted from 0: a, b of the first, …",
+            Option(
+                "bonds",
+                "ArrayLike<number>",
+                "the ends of all bonds, counted from 0: a, b of the first, …",
+                required=True,
+            ),
         ),
     ),
 )
 
 
-def _names(blocks: list[StateFields]) -> Iterator[str]:
+def _names(blocks: list[StateFields], switches: Mapping[str, bool]) -> Iterator[str]:
     """Yield the line with the names of the options."""
-    described = [line for block in blocks for line in block.options if line.startswith("@param")]
-    names = [line.partition(" options.")[2] or line.partition("[options.")[2] for line in described]
-    yield f'const OPTIONS = "{" ".join(name.split()[0].rstrip("]") for name in names)}".split(" ");'
+    yield f'const OPTIONS = "{" ".join(option.name for b in blocks for option in b.options)}".split(" ");'
 
 
 def _saved(blocks: list[StateFields], switches: Mapping[str, bool]) -> Iterator[str]:
@@ -176,8 +203,8 @@ def _saved(blocks: list[StateFields], switches: Mapping[str, bool]) -> Iterator[
 PARTS: Mapping[str, Callable[[list[StateFields], Mapping[str, bool]], Iterator[str]]] = {
     "fields": lambda blocks, _: (line for b in blocks for line in b.fields),
     "saved": _saved,
-    "options": lambda blocks, _: (line for b in blocks for line in b.options),
-    "names": lambda blocks, _: _names(blocks),
+    "options": lambda blocks, _: (line for b in blocks for option in b.options for line in option.lines),
+    "names": _names,
     "arguments": lambda blocks, _: (line for b in blocks for line in b.arguments),
     "copied": lambda _, switches: iter(state.copied(switches)),
 }

@@ -1,4 +1,4 @@
-"""Statements that compute the largest or smallest of several values; NaN propagates."""
+"""Statements that add values up, also with compensation, or find the largest or smallest; NaN propagates."""
 
 from __future__ import annotations
 
@@ -26,3 +26,12 @@ def updates(s: ir.Store, place: ir.Value, value: ir.Value) -> Iterator[ir.Statem
     beyond = ir.Binary(_COMPARISONS[s.extreme], following, place)
     no_number = ir.Binary("!=", following, following)
     yield ir.Assign(place, ir.Select(ir.Binary("or", beyond, no_number), following, place))
+
+
+def compensated_sum(k: int, field: ir.Value, compensation: ir.Value, increment: ir.Value) -> Iterator[ir.Statement]:
+    """Yield the statements of compensated sum number k; the rounding error goes into the compensation term."""
+    add, total = ir.fixed(f"add{k}"), ir.fixed(f"sum{k}")
+    items = ((add.symbol, ir.Accumulated(compensation, increment)), (total.symbol, ir.Binary("+", field, add)))
+    yield ir.Declare(ir.Type.REAL, items)
+    yield ir.Assign(compensation, ir.Binary("-", add, ir.Binary("-", total, field)))
+    yield ir.Assign(field, total)

@@ -1,4 +1,4 @@
-"""Unread parameters: functions that share a signature mark those that they do not read, for the compiler."""
+"""Parameters of functions: their types, and statements that mark the ones that a function does not read."""
 
 from __future__ import annotations
 
