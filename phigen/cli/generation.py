@@ -62,8 +62,17 @@ class Options:
             adjoint=self.adjoint,
             without=self.without,
         )
-        compilation = compilation.including("parameters") if self.bindings else compilation
+        compilation = self._with_changeable_parameters(compilation) if self.bindings else compilation
         return compilation if self.stack is None else self._measured(compilation, self.stack)
+
+    def _with_changeable_parameters(self, compilation: Compilation) -> Compilation:
+        """The compilation whose C has the function that bindings call to change parameters."""
+        spec, part = compilation.spec, "parameters"
+        if part in spec.extras.without and spec.parameters and not spec.lattice:
+            message = f"--binding {self.bindings[0]} needs {spec.name}_set_parameters, which `without` leaves out"
+            hint = f"leave out --binding, or the {part} of `without`"
+            raise SpecError([spec.diagnostic(("without",), message, hint)])
+        return compilation.including(part)
 
     def _measured(self, compilation: Compilation, flags: str) -> Compilation:
         """The compilation whose header states the stack of its C, compiled with these flags."""
@@ -73,7 +82,8 @@ class Options:
         spec = compilation.spec
         if spec.lattice or "c" not in self.targets_of(compilation):
             message = f"--stack of {spec.name}: " + ("not for lattices" if spec.lattice else "there is no target c")
-            raise SpecError([spec.diagnostic(("lattice" if spec.lattice else "targets",), message)])
+            hint = "build the lattice without --stack" if spec.lattice else "add -t c, or leave out --stack"
+            raise SpecError([spec.diagnostic(("lattice" if spec.lattice else "targets",), message, hint)])
         files = emit(compilation.program, "c", "", single_file=self.single_file)
         return compilation.with_stack(stack_bound(files, spec.name, flags))
 

@@ -391,6 +391,16 @@ def test_hand_edits_stay_and_lattices_are_refused(tumbler):
     assert "not for lattices" in refused.output
 
 
+def test_bindings_are_refused_without_the_function_that_they_call(tmp_path):
+    (tmp_path / "div.yaml").write_text(AWKWARD + "without: [parameters]\n", encoding="utf-8")
+    command = ["build", str(tmp_path / "div.yaml"), "-o", str(tmp_path), "-t", "c", "--binding", "rust"]
+    refused = CliRunner().invoke(group, command)
+    assert refused.exit_code == 1
+    assert "div.yaml:11:1: error: --binding rust needs div_set_parameters, which `without` leaves out" in refused.output
+    assert "hint: leave out --binding, or the parameters of `without`" in refused.output
+    assert not (tmp_path / "div").exists()
+
+
 def test_check_is_about_bindings_and_the_function_that_they_call(tmp_path):
     """The C of the profile small has set_parameters for a binding; the command in its header says so."""
     (tmp_path / "swing.yaml").write_text(SWING, encoding="utf-8")

@@ -142,6 +142,8 @@ def test_stack_needs_c_of_an_ordinary_system(phigen):
     done = phigen("build", "body.yaml", "-t", "numpy", "--stack=-O2")
     assert done.exit_code == 1
     assert "--stack of body: there is no target c" in done.output
+    assert "hint: add -t c, or leave out --stack" in done.output
     done = phigen("build", "toda", "-t", "c", "--stack=-O2")
     assert done.exit_code == 1
     assert "--stack of toda: not for lattices" in done.output
+    assert "hint: build the lattice without --stack" in done.output
