@@ -46,11 +46,11 @@ _SHORT = 40
 
 
 def differences(
-    job: store.Job, plan: Plan, beside: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
+    job: store.Job, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> list[str]:
     """Return how the sweep in a store differs from a plan: one phrase for each entry that determines results.
 
-    ``beside`` are the solver and the other data for workers, ``listed`` the values from a file of members.
+    ``solver`` describes the solver (see `store.solver_data`), ``listed`` the values from a file of members.
     """
     ours, theirs = plan.as_json(), job.plan.as_json()
     entries = _ENTRIES | (_AVERAGED if any("(" in word for word in plan.keep) else {})
@@ -58,7 +58,7 @@ def differences(
     before, now = _facts(theirs["about"]), _facts(ours["about"])
     phrases += [phrase for key, name in _FACTS.items() for phrase in _phrases(name, before.get(key), now.get(key))]
     if not phrases:
-        phrases += _differences_of_solver(job, beside)
+        phrases += _differences_of_solver(job, solver)
         phrases += _differences_of_run(job, plan, spec)
         if any(not np.array_equal(job.root[name][:], values, equal_nan=True) for name, values in listed.items()):
             phrases.append("other values in the file of members")
@@ -82,11 +82,11 @@ def _phrases(name: str, stored: Any, requested: Any) -> list[str]:
     return [f"{name} {stored}, not {requested}"]
 
 
-def _differences_of_solver(job: store.Job, beside: Mapping[str, Any]) -> list[str]:
+def _differences_of_solver(job: store.Job, solver: Mapping[str, Any]) -> list[str]:
     """Return differences of the solver, apart from the comments and the digest of the spec in its files."""
-    stored = store.made_by(job.interface, job.files, job.functions, job.spec)
-    stored_texts, texts = ([*about["files"].values(), about["functions"]] for about in (stored, beside))
-    same = stored["interface"] == beside["interface"] and [*map(_body, stored_texts)] == [*map(_body, texts)]
+    stored = store.solver_data(job.interface, job.files, job.functions, job.spec)
+    stored_texts, texts = ([*about["files"].values(), about["functions"]] for about in (stored, solver))
+    same = stored["interface"] == solver["interface"] and [*map(_body, stored_texts)] == [*map(_body, texts)]
     return [] if same else ["another solver: other equations, observables, order, scheme or profile"]
 
 

@@ -30,10 +30,10 @@ from phigen.sweeping.plan import Plan, values_of
 #: Status of a member that is not computed yet.
 WAITING = 255
 
-_BESIDE = "made_by"
+_SOLVER_DATA = "made_by"
 
-#: Reserved names of a store, beside results and varied quantities.
-OWN = ("status", "coordinate", "frame", "frames", _BESIDE)
+#: Reserved names of a store, in addition to results and varied quantities.
+OWN = ("status", "coordinate", "frame", "frames", _SOLVER_DATA)
 
 
 def imported(name: str) -> Any:
@@ -85,26 +85,26 @@ class Job:
         return g, spec.time, SIGNS[run.direction]
 
 
-def digest_of(plan: Plan, made_by: Mapping[str, Any]) -> str:
+def digest_of(plan: Plan, solver: Mapping[str, Any]) -> str:
     """Return a hash of all that determines the results; the division into chunks does not count."""
     facts = {**plan.as_json(), "chunk": None}
-    return hashlib.sha256(json.dumps([facts, made_by], sort_keys=True).encode()).hexdigest()[:16]
+    return hashlib.sha256(json.dumps([facts, solver], sort_keys=True).encode()).hexdigest()[:16]
 
 
-def made_by(interface: Interface, files: Mapping[str, str], functions: str, spec: str) -> dict[str, Any]:
-    """Return the attributes stored with the plan."""
+def solver_data(interface: Interface, files: Mapping[str, str], functions: str, spec: str) -> dict[str, Any]:
+    """Return what a store says of its solver: the interface, generated files, the NumPy functions and the spec."""
     about = {key: sorted(v) if isinstance(v, frozenset) else v for key, v in asdict(interface).items()}
     return json.loads(json.dumps({"interface": about, "files": dict(files), "functions": functions, "spec": spec}))  # type: ignore[no-any-return]
 
 
-def create(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats]) -> bool:
+def create(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str, Floats]) -> bool:
     """Create a store without members; return false if another process has created one meanwhile. Raises `OSError`.
 
     The store is written to a temporary path and renamed, so that an existing store is always complete.
     """
     temporary = path.with_name(f".phigen-{uuid.uuid4().hex}.zarr")
     try:
-        _fill(temporary, plan, beside, listed)
+        _fill(temporary, plan, solver, listed)
         temporary.rename(path)
     except OSError:
         if path.is_dir():
@@ -115,7 +115,7 @@ def create(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[st
     return True
 
 
-def _fill(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats]) -> None:
+def _fill(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str, Floats]) -> None:
     """Write the arrays of a store and the data that workers need."""
     zarr = imported("zarr")
     root = zarr.open_group(str(path), mode="w-", zarr_format=2)
@@ -142,7 +142,7 @@ def _fill(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str
     for name in plan.keep:
         if name != "final":
             array(name, (), "<f8", np.nan)
-    n, axes = len(plan.coordinates), tuple(beside["interface"].get("axes", ()))
+    n, axes = len(plan.coordinates), tuple(solver["interface"].get("axes", ()))
     if "final" in plan.keep or plan.frames:
         along("coordinate", plan.coordinates)
     if "final" in plan.keep:
@@ -153,8 +153,8 @@ def _fill(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str
     meanings = " ".join([*STATUSES, "WAITING"])
     flags = [*range(len(STATUSES)), WAITING]
     array("status", (), "u1", WAITING, flag_values=flags, flag_meanings=meanings)
-    root.attrs.update({"system": beside["interface"]["name"], "steps": plan.steps, "h": plan.h, **plan.about})
-    root.create_group(_BESIDE).attrs.update({"plan": plan.as_json(), **beside})
+    root.attrs.update({"system": solver["interface"]["name"], "steps": plan.steps, "h": plan.h, **plan.about})
+    root.create_group(_SOLVER_DATA).attrs.update({"plan": plan.as_json(), **solver})
 
 
 def open_job(path: str) -> Job:
@@ -162,7 +162,7 @@ def open_job(path: str) -> Job:
     zarr = imported("zarr")
     try:
         root = zarr.open_group(path, mode="r+")
-        attributes = dict(root[_BESIDE].attrs)
+        attributes = dict(root[_SOLVER_DATA].attrs)
         plan = Plan.from_json(attributes.pop("plan"))
     except (KeyError, ValueError, OSError, TypeError) as error:
         raise FileError(f"{path} is not a sweep of phigen: {error}") from None

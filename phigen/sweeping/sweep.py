@@ -96,23 +96,23 @@ def made(
     _expect_names([*(axis.name for axis in sweep.over), *listed], spec, sweep)
     plan = _plan(spec, sweep, run, {name: len(values) for name, values in listed.items()}, target)
     _expect_room_for_axes(sweep, spec)
-    beside = _worker_data(compilation, target, spec)
+    solver = _solver_data(compilation, target, spec)
     counts = np.zeros(2, dtype=np.int64)
 
     def count(members: int, failed: int) -> None:
         counts[:] += members, failed
         tell(members, failed)
 
-    job = _gone_on_with(setting.output, plan, beside, spec, listed) if setting.output.exists() else None
+    job = _gone_on_with(setting.output, plan, solver, spec, listed) if setting.output.exists() else None
     if job is None or store.waiting(job):
         with cluster.connected(setting.scheduler, workers) as (client, slots):
-            job = job or _created(setting.output, plan, beside, spec, listed, slots)
+            job = job or _created(setting.output, plan, solver, spec, listed, slots)
             chunks = store.waiting(job)
             if setting.scheduler is None:  # workers on another machine check the memory of that machine
                 running, held = min(slots, len(chunks)), prod(job.plan.chunk) * job.plan.bytes_of_member
                 expect_room(f"{running} chunks of a sweep at a time", running * held)
             started(sum(_members_of(job.plan, number) for number in chunks))
-            place = str(setting.output.resolve()), store.digest_of(job.plan, beside)
+            place = str(setting.output.resolve()), store.digest_of(job.plan, solver)
             cluster.make_all(client, slots, *place, chunks, count)
         store.imported("zarr").consolidate_metadata(str(setting.output))
     dims = dict(zip(plan.dims, plan.shape, strict=True))
@@ -198,39 +198,39 @@ def _files(spec: Spec, run: Run) -> dict[str, Any]:
     return {"file": str(path), "contents": digests}
 
 
-def _worker_data(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:
+def _solver_data(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:
     """Return the source of the solver and the other data that workers need."""
     program, command = compilation.program, f"phigen build {compilation.program.name}.yaml"
     (functions,) = emit(program, "numpy", command).values()
-    return store.made_by(interface_of(program), files_of(program, target, command), functions, spec.source)
+    return store.solver_data(interface_of(program), files_of(program, target, command), functions, spec.source)
 
 
 def _gone_on_with(
-    output: Path, plan: Plan, beside: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
+    output: Path, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> store.Job:
     """Return the store of an earlier call if it belongs to this sweep. Raises `FileError`."""
     job = store.open_job(str(output))
-    if phrases := differences(job, plan, beside, spec, listed):
+    if phrases := differences(job, plan, solver, spec, listed):
         message = f"{output} holds another sweep: {'; '.join(phrases)}"
         raise FileError(f"{message}\n  hint: choose another name by -o, or remove the store")
     return job
 
 
 def _created(
-    output: Path, plan: Plan, beside: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats], slots: int
+    output: Path, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats], slots: int
 ) -> store.Job:
     """Return a new store with chunks that keep all workers busy, or the store that another process has created
     meanwhile.
     """
     job = store.Job(
-        None, plan, store.interface_of(beside["interface"]), beside["files"], beside["functions"], beside["spec"]
+        None, plan, store.interface_of(solver["interface"]), solver["files"], solver["functions"], solver["spec"]
     )
     seconds = _seconds_of_a_member(job)
     least = 1 if plan.sizes else _LEAST
     members = int(min(max(_SECONDS / seconds, least), _MOST, max(least, plan.size // (4 * slots))))
-    if store.create(output, replace(plan, chunk=chunk_of(plan, members)), beside, listed):
+    if store.create(output, replace(plan, chunk=chunk_of(plan, members)), solver, listed):
         return store.open_job(str(output))
-    return _gone_on_with(output, plan, beside, spec, listed)
+    return _gone_on_with(output, plan, solver, spec, listed)
 
 
 def _seconds_of_a_member(job: store.Job) -> float:

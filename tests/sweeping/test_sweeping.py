@@ -651,7 +651,7 @@ def test_interfaces_come_back_from_a_store():
     """With the launches of the kernels of devices, which are records within records."""
     for source in (BODY, SPRINGS):
         about = interface_of(compilation_of(specs.loads(source)).program)
-        stored = store.made_by(about, {}, "", "")["interface"]
+        stored = store.solver_data(about, {}, "", "")["interface"]
         assert store.interface_of(stored) == about
 
 
