@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 06105c61908bdcf37251fb009fb59225d6afcdcfd72a161902155cc71c12adaf
+ * body-sha256: ff4d0a870391bed3258107151c72ca1826bcf9a3100e8b81bf4dc1c6bc6e867f
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -219,7 +219,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for options that are not known, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 83d55a7535cbfa9954d8a8d133e9317de0d1e2add014f4013ff0c3aa38e61183
+ * body-sha256: ae5d7351d5ea4488b66e0812736207f173748c922d17b4d51e50164e484286e0
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -105,7 +105,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for options that are not known, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e9dc88b1cc0ecdac5736e0ec222903cf0ffd4c70460976bb32c4993a912e5e60
+ * body-sha256: d7d59cdcf204fa5c20c4dfc7abd2c14f8ccecc5e873a30fde70afd09cabd9bc0
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -517,7 +517,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for options that are not known, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e97ee2a3c2fc3bd5fb48a3c32f4e155864408e2c8b71e3c078e9e9c2dcebbd26
+ * body-sha256: 3ce1bc6fcdb6c461de15da47082e9c9bc432303959ce4d7f17acd80c8bb2a3eb
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -314,7 +314,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for options that are not known, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d437df491f9f760d30fcc7f2169c2b9bd1f814c7c7512d770bd02c132106f3fe
+ * body-sha256: 53811b88bb9c48dc9b59fae9e59d379f5515cc2d3a210ce3ffdb76892ea1f04b
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -166,7 +166,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for options that are not known, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
 function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));

@@ -23,7 +23,7 @@ export class StepError extends Error {
   }
 }
 
-/** Throw StepError for options that are not known, such as misspelled ones, unless their value is undefined or null. */
+/** Throw StepError for unknown options, such as misspelled ones, unless their value is undefined or null. */
 export function expectOptions(options, known) {
   const given = Object.keys(options).filter((name) => (options[name] ?? null) !== null);
   const unknown = given.find((name) => !known.includes(name));
