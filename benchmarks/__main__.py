@@ -1,4 +1,4 @@
-"""``python -m benchmarks``: all tables of docs/benchmarks.md and docs/gradients.md, or some of them."""
+"""``python -m benchmarks``: tables of docs/benchmarks.md, docs/gradients.md and docs/devices.md."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from benchmarks import document, eccentric, ensembles, lattices, planets, plots, pullbacks, studies, tables
+from benchmarks import devices, document, eccentric, ensembles, lattices, planets, plots, pullbacks, studies, tables
 from benchmarks.problems import PROBLEMS, Problem
 from benchmarks.studies import Effort
+from phigen.errors import PhigenError
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLES = (
     "work", "steps", "ensembles", "growth", "build", "lattices", "eccentric", "planets",
-    "pullbacks", "gradients", "sharing",
+    "pullbacks", "gradients", "sharing", "devices",
 )  # fmt: skip
+#: Of a graphics card, made if it is named: other tables need none.
+CARDS = ("devices",)
 #: Of a table that is made alone, in a process of its own: what it imports reads variables of the environment.
 ALONE = ("gradients", "sharing")
 
@@ -35,6 +38,7 @@ class Session:
     effort: Effort
     folder: Path
     docs: bool
+    target: str | None
     say: Callable[[str], None]
 
     def save(self, name: str, data: object, text: str) -> None:
@@ -56,7 +60,7 @@ def main() -> int:
     effort = studies.QUICK if options.quick else Effort()
     options.output.mkdir(parents=True, exist_ok=True)
     os.environ["PHIGEN_CACHE_DIR"] = str((options.output / "cache").resolve())
-    session = Session(problems, effort, options.output, options.write_docs, say)
+    session = Session(problems, effort, options.output, options.write_docs, options.target, say)
     if options.prepare:
         prepare(problems, say)
         return 0
@@ -77,7 +81,9 @@ def main() -> int:
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="less of everything, for a trial")
-    parser.add_argument("--only", nargs="+", choices=TABLES, default=TABLES, help="tables; all by default")
+    parser.add_argument("--only", nargs="+", choices=TABLES, help="tables; by default all but devices",
+                        default=[t for t in TABLES if t not in CARDS])  # fmt: skip
+    parser.add_argument("--target", choices=("cuda", "opencl"), help="of the table devices; by default that of a card")
     names = [p.name for p in PROBLEMS]
     parser.add_argument("--problem", nargs="+", choices=names, default=names, help="problems of work and steps")
     parser.add_argument("--output", type=Path, default=Path("benchmark-results"), help="folder for tables and data")
@@ -175,6 +181,18 @@ def passes(session: Session) -> list[str]:
     return []
 
 
+def cards(session: Session) -> list[str]:
+    """The tables of docs/devices.md; each is saved at once, as a card may fail."""
+    parts: list[str] = []
+    try:
+        for part in devices.measured(session.target, session.effort.quick, session.say):
+            parts.append(part)
+            session.save("devices", {}, "\n\n".join(parts) + "\n")
+    except PhigenError as error:
+        return [f"devices: {error}"]
+    return [line for line in "\n".join(parts).splitlines() if "failed: " in line]
+
+
 def alone(name: str) -> Callable[[Session], list[str]]:
     """A table by the module of its name, in another process."""
 
@@ -193,7 +211,8 @@ def alone(name: str) -> Callable[[Session], list[str]]:
 
 MAKERS: dict[str, Callable[[Session], list[str]]] = {
     "work": work, "steps": steps, "ensembles": members, "growth": growth, "build": build, "lattices": sites,
-    "eccentric": orbit, "planets": bodies, "pullbacks": passes, **{name: alone(name) for name in ALONE},
+    "eccentric": orbit, "planets": bodies, "pullbacks": passes, "devices": cards,
+    **{name: alone(name) for name in ALONE},
 }  # fmt: skip
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 DOCUMENT = DOCS / "benchmarks.md"
 FIGURES = DOCS / "figures"
 #: Pages with tables, beside the one of the benchmarks.
-PAGES = {"pullbacks": DOCS / "gradients.md"}
+PAGES = {"pullbacks": DOCS / "gradients.md", "devices": DOCS / "devices.md"}
 
 
 def markers(name: str) -> tuple[str, str]:

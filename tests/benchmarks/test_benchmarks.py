@@ -249,7 +249,8 @@ def test_a_table_replaces_what_stands_between_its_markers():
 def test_the_document_has_a_place_for_every_table():
     names = [f"work-{p.name}" for p in PROBLEMS]
     for name in (*names, "summary", "machine", "steps", "ensembles", "growth", "build", "lattices", "eccentric",
-                 "gradients", "sharing", "pullbacks", "pullbacks-members", "pullbacks-lattices"):  # fmt: skip
+                 "gradients", "sharing", "devices", "pullbacks", "pullbacks-members",
+                 "pullbacks-lattices"):  # fmt: skip
         document.replaced(document.page(name).read_text(encoding="utf-8"), name, "")
 
 

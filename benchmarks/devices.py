@@ -1,0 +1,320 @@
+"""A graphics card beside one core: ensembles, spins on a cube, and diffrax on the same card.
+
+``python -m benchmarks --only devices`` takes the card that CuPy finds, else the first device of OpenCL; ``--target``
+and the variable PHIGEN_DEVICE choose another. A processor with an OpenCL driver runs all of it too, with fewer members.
+
+Times are those of `ensemble` and `integrate` in Python. A time for each step is the difference of a long and a short
+run over that of their steps, so that copies and launches which both have do not count; that of a whole run is beside
+it. Nothing is timed before some members, or spins, have been compared with those of C.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+import phigen
+from benchmarks.lattices import CUBE
+from benchmarks.problems import PROBLEMS
+from benchmarks.tables import machine, table
+from phigen import spec as specs
+from phigen.api import compilation_of
+from phigen.errors import DeviceError, MissingPackageError, PhigenError
+from phigen.runtime.devices.opening import device_of
+
+BODY, STEP = PROBLEMS[0], 0.1
+OSCILLATORS = (
+    "phigen: 1\nname: bench\ncoordinates: [x, y, px, py]\npoisson: {canonical: {q: [x, y], p: [px, py]}}\n"
+    "hamiltonian: (px**2 + py**2 + x**2 + y**2)/2 + x**2*y - y**3/3\norder: 4\nscheme: splitting\n"
+)
+#: Steps of a short run; a long one has three times as many.
+STEPS, LONGER = 200, 3
+#: Largest number of members: a card has its full throughput with fewer.
+MOST_MEMBERS = 10_000_000
+#: Numbers of blocks that a multiprocessor of CUDA shall run at once; 1 leaves all registers to a thread.
+BLOCKS = (1, 3, 4, 5)
+
+Run = Callable[[int, int], float]
+"""Seconds of a run, from a number of members and one of steps."""
+
+
+def bodies(members: int) -> np.ndarray:
+    """Random points of a sphere, on which the energy of a rigid body varies by a factor of three."""
+    x = np.random.default_rng(1).normal(size=(members, 3))
+    return np.asarray(x * np.sqrt(3 / (x**2).sum(1, keepdims=True)))
+
+
+def oscillators(members: int) -> np.ndarray:
+    """Random states of Hénon and Heiles with energies from 0 to 1/10, which stay bounded."""
+    x = np.random.default_rng(1).uniform(-1, 1, size=(members, 4))
+    return np.asarray(0.2 * x)
+
+
+@dataclass(frozen=True)
+class Case:
+    """An ensemble: its title, its spec, its starts, and the picoseconds for a member and step expected of an H200."""
+
+    title: str
+    spec: str
+    starts: Callable[[int], np.ndarray]
+    expected: str = ""
+
+
+SPLITTING = Case("Hénon–Heiles, splitting, order 4", OSCILLATORS, oscillators, "25")
+CASES = (
+    Case("rigid body, series, order 4", BODY.spec(4), bodies, "60"),
+    Case("rigid body, series, order 4, gauge of each member", BODY.spec(4, "gauge auto"), bodies),
+    Case("rigid body, exact flow", BODY.spec(4, "splitting"), bodies),
+    SPLITTING,
+    Case("rigid body, series, order 4, single precision", BODY.spec(4) + "real: float\n", bodies),
+    Case("Hénon–Heiles, splitting, order 4, single precision", OSCILLATORS + "real: float\n", oscillators),
+)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Seconds of a short run that is timed, its rounds, and sites on an edge of the cube."""
+
+    seconds: float
+    rounds: int
+    edge: int
+
+
+def measured(target: str | None, quick: bool, say: Callable[[str], None]) -> Iterator[str]:
+    """The parts of the page, one by one. Raises `DeviceError` or `MissingPackageError` where there is no device."""
+    target = target or default_target()
+    device = device_of(target)
+    effort = Effort(0.1, 1, 16) if quick else Effort(1.0, 5, 128 if device.is_card else 32)
+    say(f"{target}: {device.name}")
+    yield f"{device!r}, target {target}, beside one core of {machine()}; phigen {phigen.__version__}."
+    for part in (_ensembles, _spins, _peers):
+        yield part(target, effort, say)
+
+
+def default_target() -> str:
+    """The target of the first card: cuda if CuPy has one, else opencl."""
+    try:
+        device_of("cuda")
+    except (DeviceError, MissingPackageError):
+        return "opencl"
+    return "cuda"
+
+
+# times -------------------------------------------------------------------------------------------------------------
+
+
+def members_of(run: Run, seconds: float) -> int:
+    """A number of members, up to `MOST_MEMBERS`, whose short run takes about the given time."""
+    members = 1024
+    run(members, 1)  # compiles
+    while members < MOST_MEMBERS:
+        spent = run(members, STEPS)
+        if spent > seconds / 2:
+            return min(MOST_MEMBERS, max(256, round(members * seconds / spent)))
+        members = min(MOST_MEMBERS, 4 * members)
+    return MOST_MEMBERS
+
+
+def per_step(run: Run, members: int, rounds: int) -> tuple[float, float]:
+    """Picoseconds for a member and step, medians: by the difference of two runs, and in all of the longer one."""
+    steps, differences, whole = LONGER * STEPS, [], []
+    for _ in range(rounds):
+        short, long = run(members, STEPS), run(members, steps)
+        differences.append(1e12 * (long - short) / members / (steps - STEPS))
+        whole.append(1e12 * long / members / steps)
+    return median(differences), median(whole)
+
+
+def ensemble_run(solver: Any, starts: Callable[[int], np.ndarray], **more: Any) -> Run:
+    """Runs of an ensemble."""
+    prepared: dict[int, np.ndarray] = {}
+
+    def run(members: int, steps: int) -> float:
+        if members not in prepared:
+            prepared.clear()
+            prepared[members] = starts(members)
+        begun = time.perf_counter()
+        solver.ensemble(prepared[members], STEP, steps, **more)
+        return time.perf_counter() - begun
+
+    return run
+
+
+# ensembles ---------------------------------------------------------------------------------------------------------
+
+
+def _ensembles(target: str, effort: Effort, say: Callable[[str], None]) -> str:
+    head = ("ensemble", "blocks", "members", "ps a member and step", "of the whole run", "expected of an H200",
+            "one core, ps", "core / device", "difference from C")  # fmt: skip
+    rows = [row for case in CASES for row in _rows(case, target, effort, say)]
+    return f"### Ensembles, h = {STEP}\n\n{table(head, rows)}"
+
+
+def _rows(case: Case, target: str, effort: Effort, say: Callable[[str], None]) -> Iterator[list[str]]:
+    say(case.title)
+    compilation = compilation_of(specs.loads(case.spec, "bench.yaml"))
+    core = phigen.compile(compilation, "c")
+    alone = ensemble_run(core, case.starts, threads=1)
+    core_ps = per_step(alone, members_of(alone, effort.seconds / 2), effort.rounds)[0]
+    for blocks in BLOCKS if target == "cuda" else (1,):
+        try:
+            solver = phigen.compile(compilation, target)
+            if target == "cuda":
+                solver.backend.defined[f"{solver.interface.name}_BLOCKS"] = blocks
+            same = difference(solver, compilation, case.starts(1000))
+            run = ensemble_run(solver, case.starts)
+            members = members_of(run, effort.seconds)
+            ps, whole = per_step(run, members, effort.rounds)
+        except PhigenError as error:
+            yield [case.title, str(blocks), "", f"failed: {_one_line(error)}", *[""] * 5]
+            continue
+        yield [case.title, str(blocks), f"{members:,}", f"{ps:.3g}", f"{whole:.3g}", case.expected, f"{core_ps:.3g}",
+               f"{core_ps / ps:.3g}", f"{same:.1e}"]  # fmt: skip
+
+
+def difference(solver: Any, compilation: Any, x0: np.ndarray) -> float:
+    """The largest difference after 100 steps from C of the profile small, which may contract products and sums.
+
+    Raises `DifferentStepsError` if it is more than roundings make: then no time means anything.
+    """
+    exact = phigen.compile(compilation_of(compilation.spec, profile="small"), "c", profile="small")
+    largest = float(np.abs(solver.ensemble(x0, STEP, 100) - exact.ensemble(x0, STEP, 100)).max())
+    return checked(largest, 1e-4 if solver.interface.single else 1e-12)
+
+
+class DifferentStepsError(PhigenError):
+    """A device makes other steps than C."""
+
+
+def checked(difference: float, bound: float) -> float:
+    if not difference < bound:
+        raise DifferentStepsError(f"steps differ from those of C by {difference:.1e}")
+    return difference
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:120].replace("|", "/")
+
+
+# spins -------------------------------------------------------------------------------------------------------------
+
+
+def _spins(target: str, effort: Effort, say: Callable[[str], None]) -> str:
+    """Steps of spins a second on a cube, with fields that stay on the device between the ends of a run."""
+    head = ("order", "spins", "steps of spins a second", "expected of an H200", "one core", "device / core",
+            "difference from C")  # fmt: skip
+    rows = []
+    for order, expected in ((2, "1.5e+10"), (4, "")):
+        say(f"spins, order {order}")
+        row = [str(order), f"{effort.edge**3:,}"]
+        try:
+            rates, same = _spin_rates(target, order, effort)
+        except PhigenError as error:
+            rows.append([*row, f"failed: {_one_line(error)}", *[""] * 4])
+            continue
+        ratio = rates[0] / rates[1]
+        rows.append([*row, f"{rates[0]:.3g}", expected, f"{rates[1]:.3g}", f"{ratio:.3g}", f"{same:.1e}"])
+    return f"### Cubic Heisenberg lattice, double precision\n\n{table(head, rows)}"
+
+
+def _spin_rates(target: str, order: int, effort: Effort) -> tuple[list[float], float]:
+    """The rates of the device and of one core, and the difference of their states after ten steps."""
+    x, compilation = CUBE.start(effort.edge), compilation_of(specs.loads(_cube(order), "bench.yaml"))
+    solvers = [phigen.compile(compilation, name) for name in (target, "c")]
+    ours, theirs = (s.integrate(x, STEP, 10, 10).x[-1] for s in solvers)
+    same = checked(float(np.abs(ours - theirs).max()), 1e-12)
+    return [_spin_rate(s, x, effort) for s in solvers], same
+
+
+def _cube(order: int) -> str:
+    return f"phigen: 1\nname: bench\n{CUBE.spec}order: {order}\nscheme: splitting\n"
+
+
+def _spin_rate(solver: Any, x: np.ndarray, effort: Effort) -> float:
+    def run(steps: int) -> float:
+        begun = time.perf_counter()
+        solver.integrate(x, STEP, steps, steps)
+        return time.perf_counter() - begun
+
+    run(1)
+    steps = 4
+    while run(steps) < effort.seconds / 2:
+        steps *= 2
+    seconds = median(run(LONGER * steps) - run(steps) for _ in range(effort.rounds))
+    return x[0].size * steps * (LONGER - 1) / seconds
+
+
+# diffrax -----------------------------------------------------------------------------------------------------------
+
+
+def _peers(target: str, effort: Effort, say: Callable[[str], None]) -> str:
+    """diffrax on the device that JAX has, beside the splitting; steps are equal, errors of the energy are not."""
+    title = "### diffrax"
+    try:
+        import diffrax
+        import jax
+    except ImportError as error:
+        return f"{title}\n\nNot measured: {error.name} is not installed (`pip install diffrax 'jax[cuda12]'`)."
+    kind = jax.default_backend()
+    if (kind == "gpu") != device_of(target).is_card:
+        return f"{title}\n\nNot measured: JAX runs on {kind}, the target {target} on {device_of(target).name}."
+    say("diffrax")
+    jax.config.update("jax_enable_x64", True)
+    ours = phigen.compile(specs.loads(SPLITTING.spec, "bench.yaml"), target)
+    solve = diffrax_run(diffrax, jax)
+
+    def peer_run(members: int, steps: int) -> float:
+        return solve(SPLITTING.starts(members), steps)[1]
+
+    x0, rows = SPLITTING.starts(1000), []
+    runs = [("phigen, splitting, order 4", ensemble_run(ours, SPLITTING.starts), ours.ensemble(x0, STEP, 100))]
+    runs += [("diffrax, Dopri5", peer_run, solve(x0, 100)[0])]
+    times = [per_step(run, members_of(run, effort.seconds), effort.rounds)[0] for _, run, _ in runs]
+    for (name, _, ends), ps in zip(runs, times, strict=True):
+        rows.append([name, f"{ps:.3g}", f"{ps / times[0]:.3g}", f"{energy_error(x0, ends):.1e}"])
+    head = ("Hénon–Heiles", "ps a member and step", "over phigen", f"energy error at t = {100 * STEP:g}")
+    about = f"{diffrax.__version__}, constant steps of {STEP}, double precision, on {kind}"
+    return f"{title} {about}\n\n{table(head, rows)}"
+
+
+def energy_error(starts: np.ndarray, ends: np.ndarray) -> float:
+    """The largest error of the energy of Hénon and Heiles, relative to its largest value."""
+
+    def energy(x: np.ndarray) -> np.ndarray:
+        q, p, px, py = x.T
+        return np.asarray((px**2 + py**2 + q**2 + p**2) / 2 + q**2 * p - p**3 / 3)
+
+    return float(np.abs(energy(ends) - energy(starts)).max() / energy(starts).max())
+
+
+def diffrax_run(diffrax: Any, jax: Any) -> Callable[[np.ndarray, int], tuple[np.ndarray, float]]:
+    """A function of starts and steps, with the ends and the seconds that they take without their compilation."""
+
+    def field(t: Any, x: Any, args: Any) -> Any:
+        q, p, px, py = x
+        return jax.numpy.array([px, py, -q - 2 * q * p, -p - q * q + p * p])
+
+    @jax.jit
+    def solve(x0: Any, duration: Any) -> Any:
+        term, controller = diffrax.ODETerm(field), diffrax.ConstantStepSize()
+
+        def one(x: Any) -> Any:
+            solved = diffrax.diffeqsolve(
+                term, diffrax.Dopri5(), 0.0, duration, STEP, x, max_steps=None, stepsize_controller=controller
+            )
+            return solved.ys[-1]
+
+        return jax.vmap(one)(x0)
+
+    def run(x0: np.ndarray, steps: int) -> tuple[np.ndarray, float]:
+        solve(x0, STEP).block_until_ready()  # compiles for this number of members
+        begun = time.perf_counter()
+        ends = np.asarray(solve(x0, STEP * steps))
+        return ends, time.perf_counter() - begun
+
+    return run

@@ -1,0 +1,88 @@
+"""The measurement of graphics cards, without one: by OpenCL on the processor, and by a module in place of CuPy."""
+
+import sys
+
+import numpy as np
+import pytest
+from devices import cupy_by_hand
+
+pytest.importorskip("scipy")
+
+from benchmarks import __main__ as command
+from benchmarks import devices
+from phigen.runtime.devices import cuda, ensembles
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """A minute's measurement in some seconds."""
+    monkeypatch.setattr(devices, "CASES", devices.CASES[:1])
+    monkeypatch.setattr(devices, "STEPS", 3)
+    monkeypatch.setattr(devices, "members_of", lambda run, seconds: 300)
+    monkeypatch.setattr(devices, "Effort", lambda *settings: Effort(1e-4, 1, 4))
+    monkeypatch.setattr(devices, "BLOCKS", (1, 4))
+
+
+Effort = devices.Effort
+
+
+def cells(text, title):
+    """The rows of the table below a title, by columns."""
+    lines = text.split(title, 1)[1].split("\n\n")[1].splitlines()
+    table = [[cell.strip() for cell in line[1:-1].split("|")] for line in lines]
+    return [dict(zip(table[0], row, strict=True)) for row in table[2:]]
+
+
+def test_times_of_steps_leave_out_what_all_runs_have():
+    """Half a second of copies, and 70 ps for a member and step."""
+    steps, whole = devices.per_step(lambda members, steps: 0.5 + 70e-12 * members * steps, 10**6, 3)
+    assert steps == pytest.approx(70)
+    assert whole == pytest.approx(70 + 0.5e12 / 1e6 / (devices.LONGER * devices.STEPS))
+
+
+@pytest.mark.parametrize(("cost", "members"), [(1e-9, 1_000_000), (1e-13, devices.MOST_MEMBERS), (1e-3, 256)])
+def test_ensembles_are_as_large_as_seconds_allow(cost, members):
+    seconds = 1e-9 * 1_000_000 * devices.STEPS
+    assert devices.members_of(lambda m, steps: cost * m * steps, seconds) == pytest.approx(members, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_card_is_measured_by_one_command(small, monkeypatch, tmp_path):
+    """For each number of blocks, which the compiler receives; rows that fail leave the others."""
+    cupy = cupy_by_hand.module()
+    monkeypatch.setitem(sys.modules, "cupy", cupy)
+    monkeypatch.setattr(cuda, "_OPENED", {})
+    options = ["benchmarks", "--only", "devices", "--quick", "--output", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", options)
+    monkeypatch.setenv("PHIGEN_CACHE_DIR", str(tmp_path / "cache"))
+    compiled, compile_text = [], cuda.CUDADevice.compiled
+    monkeypatch.setattr(cuda.CUDADevice, "compiled", lambda self, *a: compiled.append(a[1]) or compile_text(self, *a))
+    assert command.main() == 0
+    text = (tmp_path / "devices.md").read_text()
+    assert "target cuda, beside one core of" in text
+    assert [row["blocks"] for row in cells(text, "### Ensembles")] == ["1", "4"]
+    assert {d["bench_BLOCKS"] for d in compiled if "bench_BLOCKS" in d} == {1, 4}
+    for row in (*cells(text, "### Ensembles"), *cells(text, "### Cubic")):
+        assert all(float(row[column].replace(",", "")) for column in row if column in ("members", "one core"))
+        assert float(row["difference from C"]) < 1e-12
+
+
+@pytest.mark.slow
+def test_steps_that_differ_from_those_of_c_are_not_timed(small, monkeypatch, tmp_path):
+    pytest.importorskip("pyopencl")
+    ensemble = ensembles.DeviceSolver.ensemble
+    monkeypatch.setattr(ensembles.DeviceSolver, "ensemble", lambda *a: ensemble(*a) + 1e-9)
+    monkeypatch.setattr(
+        sys, "argv", ["benchmarks", "--only", "devices", "--target", "opencl", "--output", str(tmp_path)]
+    )
+    monkeypatch.setenv("PHIGEN_CACHE_DIR", str(tmp_path / "cache"))
+    assert command.main() == 1
+    (row,) = cells((tmp_path / "devices.md").read_text(), "### Ensembles")
+    assert row["ps a member and step"] == "failed: steps differ from those of C by 1.0e-09"
+    assert not row["core / device"]
+
+
+def test_errors_of_the_energy_are_relative_to_the_largest():
+    starts = devices.oscillators(50)
+    assert devices.energy_error(starts, starts) == 0
+    assert devices.energy_error(starts, np.zeros((50, 4))) == 1
