@@ -345,6 +345,8 @@ def _collocated(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
     plan = plan_gauss(spec)
     realisation = clock.timed("momentum maps", lambda: realise_gauss(spec, source))
     group = _group(spec, source, "")
+    if group is not None and group.translation:
+        realisation = realisation.with_elements
     monitor = monitor_of(spec)
     if isinstance(spec.gauge, str):
         gauge_of_spec = slowest(source, realisation) if spec.gauge == "auto" and not monitor else Gauge()

@@ -4,12 +4,12 @@
  *   scheme: Gauss collocation, 8 stages
  *   structure: exact; quadratic momentum maps for P1, P2, P3, G1, G2, G3
  *   step: implicit, all stages by fixed-point sweeps to round-off
- *   one evaluation at a stage: 72 additions, 93 multiplications
+ *   one evaluation at a stage: 41 additions, 57 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 21ad5b6b7d2b2eef66ed80cacab257a9fda6ef45772288d9fb0cbbd41206e849
+ * body-sha256: 67767d5d841b47568d253e43d247abe4980429bd4c2fad91b99635911924a78b
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -25,7 +25,7 @@
 const kowalevski_gauss_params kowalevski_gauss_default_params = { 0 };
 
 /* unknowns that are offsets of coordinates; others are those of group elements */
-enum { kowalevski_gauss_PLAIN = 0 };
+enum { kowalevski_gauss_PLAIN = 4 };
 /* numbers that define the start of a step: coordinates, and the time if H depends on it */
 enum { kowalevski_gauss_POINT = 6 };
 enum { kowalevski_gauss_MAX_SWEEPS = 100 }; /* largest number of sweeps over the stages of a step */
@@ -42,27 +42,16 @@ static void kowalevski_gauss_stage_change(const double coef[1], const double x[6
 {
     (void)coef;
     const double P1 = x[0], P2 = x[1], P3 = x[2], G1 = x[3], G2 = x[4], G3 = x[5];
-    const double t1 = G3 * z[6] - G2 * z[7] + (P3 * z[3] - P2 * z[4] + (G1 * z[1] + P1 * z[0]));
-    const double t2 = G2 * z[2] + G3 * z[0], t3 = G1 * z[3], t4 = t2 - t3;
-    const double t5 = G1 * z[4] + (G2 * z[0] - G3 * z[2]), t6 = G3 * z[4] + (G2 * z[3] + G1 * z[2]);
-    const double t7 = G1 * z[7] - G3 * z[5] + (G2 * z[1] + P2 * z[0] + (P1 * z[4] - P3 * z[2]));
-    const double t8 = G1 * z[0] + G3 * z[3], t9 = G2 * z[4], t10 = t8 - t9;
-    const double t11 = G2 * z[5] - G1 * z[6] + (P2 * z[2] - P1 * z[3] + (P3 * z[0] + G3 * z[1]));
-    const double t12 = G3 * z[7] + G2 * z[6] + (P2 * z[3] + P1 * z[2] + (P3 * z[4] + G1 * z[5]));
-    const double t13 = z[6] * t4 - z[7] * t5 + (z[5] * t6 - z[4] * t7) + (z[1] * t10 + z[0] * t1
-        + (z[3] * t11 + z[2] * t12));
-    const double t14 = t3 - t2;
-    const double t15 = z[3] * t12 - z[2] * t11 + (z[1] * t5 + z[0] * t7) + (z[6] * t6 + z[7] * t10
-        + (z[5] * t14 + z[4] * t1));
-    const double t16 = t9 - t8;
-    const double t17 = z[7] * t6 + z[6] * t16 + (z[5] * t5 + z[4] * t12) + (z[1] * t4 + z[0] * t11
-        + (z[2] * t7 - z[3] * t1));
-    change[0] = 2.0 * t1 + t13;
-    change[1] = 2.0 * t7 + t15;
-    change[2] = 2.0 * t11 + t17;
-    change[3] = 2.0 * t10 + (z[0] * t10 + z[2] * t6 + (z[3] * t4 - z[4] * t5));
-    change[4] = 2.0 * t5 + (z[2] * t14 + z[0] * t5 + (z[4] * t10 + z[3] * t6));
-    change[5] = 2.0 * t4 + (z[3] * t16 + z[4] * t6 + (z[2] * t5 + z[0] * t4));
+    const double t1 = P1 + z[1], t2 = P3 + z[3], t3 = P2 + z[2], t4 = G3 * z[6] + G1 * z[4];
+    const double t5 = G2 * z[7], t6 = t4 - t5, t7 = G3 * z[7] + (G1 * z[5] + G2 * z[6]);
+    const double t8 = G3 * z[4] + G2 * z[5], t9 = G1 * z[6], t10 = t8 - t9;
+    const double t11 = G1 * z[7] + (G2 * z[4] - G3 * z[5]);
+    change[0] = z[1] + (z[4] * t1 + (z[0] * z[5] + z[6] * t2) - z[7] * t3);
+    change[1] = z[2] + (z[7] * t1 + (z[4] * t3 + (z[0] * z[6] - z[5] * t2)));
+    change[2] = z[3] + (z[0] * z[7] + (z[4] * t2 + (z[5] * t3 - z[6] * t1)));
+    change[3] = 2.0 * t6 + (z[5] * t7 + z[4] * t6 + (z[6] * t10 - z[7] * t11));
+    change[4] = 2.0 * t11 + (z[6] * t7 + z[7] * t6 + (z[5] * (t9 - t8) + z[4] * t11));
+    change[5] = 2.0 * t10 + (z[7] * t7 + z[6] * (t5 - t4) + (z[4] * t10 + z[5] * t11));
 }
 
 double kowalevski_gauss_hamiltonian(const kowalevski_gauss_params *params, const double x[6])
@@ -325,65 +314,58 @@ static void kowalevski_gauss_stage_field_lanes(const double coef[1], const doubl
     kowalevski_gauss_EACH_LANE
     for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
         const double P1 = x[0], P2 = x[1], P3 = x[2], G1 = x[3], G2 = x[4], G3 = x[5];
-        const double t1 = (-0.5) * w[0][lane], t2 = G3 * z[4][lane] + (G2 * z[3][lane] + G1 * z[2][lane]);
-        const double t3 = G2 * z[4][lane], t4 = 1.0 + z[0][lane], t5 = G3 * z[3][lane] + G1 * t4;
-        const double t6 = G1 * z[4][lane] + (G2 * t4 - G3 * z[2][lane]);
-        const double t7 = G3 * z[7][lane] + G2 * z[6][lane] + (P2 * z[3][lane] + P1 * z[2][lane]
-            + (P3 * z[4][lane] + G1 * z[5][lane]));
-        const double t8 = G1 * z[7][lane] - G3 * z[5][lane] + (P1 * z[4][lane] - P3 * z[2][lane]
-            + (G2 * z[1][lane] + P2 * t4));
-        const double t9 = G3 * z[6][lane] - G2 * z[7][lane] + (P3 * z[3][lane] - P2 * z[4][lane]
-            + (G1 * z[1][lane] + P1 * t4));
-        const double t10 = G2 * z[2][lane] + G3 * t4, t11 = G1 * z[3][lane], t12 = t10 - t11;
-        const double t13 = G2 * z[5][lane] - G1 * z[6][lane] + (P2 * z[2][lane] - P1 * z[3][lane]
-            + (G3 * z[1][lane] + P3 * t4));
-        const double t14 = z[7][lane] * t2 + z[6][lane] * (t3 - t5) + (z[5][lane] * t6 + z[4][lane] * t7)
-            + (z[2][lane] * t8 - z[3][lane] * t9 + (z[1][lane] * t12 + t4 * t13));
-        const double t15 = t1 * t14, t16 = (-0.25) * w[0][lane], t17 = t5 - t3;
-        const double t18 = z[6][lane] * t12 - z[7][lane] * t6 + (z[5][lane] * t2 - z[4][lane] * t8)
-            + (z[2][lane] * t7 + z[3][lane] * t13 + (z[1][lane] * t17 + t4 * t9));
-        const double t19 = t16 * t18;
-        const double t20 = z[6][lane] * t2 + z[7][lane] * t17 + (z[5][lane] * (t11 - t10) + z[4][lane] * t9)
-            + (z[1][lane] * t6 + t4 * t8 + (z[3][lane] * t7 - z[2][lane] * t13));
-        const double t21 = t16 * t20;
-        move[0][lane] = -(t15 * z[4][lane] + (t19 * z[2][lane] + t21 * z[3][lane]));
-        move[1][lane] = -(t21 * z[6][lane] + t15 * z[7][lane] + (t1 * z[2][lane] + t19 * z[5][lane]));
-        move[2][lane] = t21 * z[4][lane] + (t19 * t4 - t15 * z[3][lane]);
-        move[3][lane] = t15 * z[2][lane] + t21 * t4 - t19 * z[4][lane];
-        move[4][lane] = t19 * z[3][lane] + (t15 * t4 - t21 * z[2][lane]);
-        move[5][lane] = t21 * z[7][lane] - t15 * z[6][lane] + (t19 * z[1][lane] + t1 * t4);
-        move[6][lane] = t21 * z[1][lane] - t1 * z[4][lane] + (t15 * z[5][lane] - t19 * z[7][lane]);
-        move[7][lane] = t19 * z[6][lane] - t21 * z[5][lane] + (t1 * z[3][lane] + t15 * z[1][lane]);
+        const double t1 = (-0.25) * w[0][lane], t2 = P1 + z[1][lane], t3 = P2 + z[2][lane];
+        const double t4 = 1.0 + z[4][lane], t5 = P3 + z[3][lane];
+        const double t6 = t1 * (z[7][lane] * t2 + (t3 * t4 + (z[0][lane] * z[6][lane] - z[5][lane] * t5)));
+        const double t7 = t1 * (t4 * t2 + (z[0][lane] * z[5][lane] + z[6][lane] * t5) - z[7][lane] * t3);
+        const double t8 = (-0.5) * w[0][lane] * (z[0][lane] * z[7][lane]
+            + (t5 * t4 + (z[5][lane] * t3 - z[6][lane] * t2)));
+        move[0][lane] = t6 * t3 + t7 * t2 + (t8 * t5 + (-w[0][lane]) * (G3 * z[6][lane] + G1 * t4
+            - G2 * z[7][lane]));
+        move[1][lane] = t6 * t5 - t7 * z[0][lane] - (t8 * t3 + (-w[0][lane]) * (G3 * z[7][lane]
+            + (G1 * z[5][lane] + G2 * z[6][lane])));
+        move[2][lane] = t8 * t2 + (-w[0][lane]) * (G1 * z[6][lane] - (G2 * z[5][lane] + G3 * t4))
+            - (t6 * z[0][lane] + t7 * t5);
+        move[3][lane] = t7 * t3 - t6 * t2 + ((-w[0][lane]) * (G1 * z[7][lane] + (G2 * t4 - G3 * z[5][lane]))
+            - t8 * z[0][lane]);
+        move[4][lane] = -(t8 * z[7][lane] + (t6 * z[6][lane] + t7 * z[5][lane]));
+        move[5][lane] = t6 * z[7][lane] + (t7 * t4 - t8 * z[6][lane]);
+        move[6][lane] = t8 * z[5][lane] + t6 * t4 - t7 * z[7][lane];
+        move[7][lane] = t7 * z[6][lane] + (t8 * t4 - t6 * z[5][lane]);
     }
 }
 
 /* kowalevski_gauss_next_frame in all lanes. */
-static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double z[8],
+static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double x[6], const double z[8],
     kowalevski_gauss_lanes k[restrict 8], kowalevski_gauss_lanes seen[restrict 8])
 {
     (void)coef;
     kowalevski_gauss_EACH_LANE
     for (int lane = 0; lane < kowalevski_gauss_LANES; ++lane) {
-        const double t1 = k[2][lane] * z[5] + k[7][lane] * z[4] + (k[4][lane] * z[7] + k[3][lane] * z[6])
-            + (k[1][lane] * z[0] + k[0][lane] * z[1] + (k[5][lane] * z[2] + k[6][lane] * z[3]));
-        const double t2 = k[7][lane] * z[3] - k[1][lane] * z[2] + (k[2][lane] * z[1] + k[5][lane] * z[0])
-            + (k[4][lane] * z[6] - k[3][lane] * z[7] - (k[0][lane] * z[5] + k[6][lane] * z[4]));
-        const double t3 = k[3][lane] * z[1] + k[6][lane] * z[0] - (k[7][lane] * z[2] + k[1][lane] * z[3])
-            + (k[2][lane] * z[7] - k[0][lane] * z[6] + (k[5][lane] * z[4] - k[4][lane] * z[5]));
-        const double t4 = k[7][lane] * z[0] + k[4][lane] * z[1] + (k[6][lane] * z[2] - k[5][lane] * z[3])
-            + (k[3][lane] * z[5] - k[1][lane] * z[4] - (k[2][lane] * z[6] + k[0][lane] * z[7]));
-        seen[0][lane] = k[0][lane] + (k[3][lane] * z[3] + k[4][lane] * z[4] + (k[0][lane] * z[0]
-            + k[2][lane] * z[2]));
-        seen[1][lane] = k[1][lane] + t1;
-        seen[2][lane] = k[2][lane] + (k[4][lane] * z[3] - k[3][lane] * z[4] + (k[2][lane] * z[0]
-            - k[0][lane] * z[2]));
-        seen[3][lane] = k[3][lane] + (k[2][lane] * z[4] - k[0][lane] * z[3] + (k[3][lane] * z[0]
-            - k[4][lane] * z[2]));
-        seen[4][lane] = k[4][lane] + (k[4][lane] * z[0] + k[3][lane] * z[2] - (k[2][lane] * z[3]
-            + k[0][lane] * z[4]));
-        seen[5][lane] = k[5][lane] + t2;
-        seen[6][lane] = k[6][lane] + t3;
-        seen[7][lane] = k[7][lane] + t4;
+        const double P1 = x[0], P2 = x[1], P3 = x[2];
+        const double t1 = k[4][lane] + (k[7][lane] * z[7] + k[6][lane] * z[6] + (k[5][lane] * z[5]
+            + k[4][lane] * z[4]));
+        const double t2 = z[0] * (1.0 + z[4]) - (z[5] * (P1 + z[1]) + z[6] * (P2 + z[2]));
+        const double t3 = z[7] * (P3 + z[3]);
+        const double t4 = k[5][lane] + (k[7][lane] * z[6] - k[6][lane] * z[7] + (k[5][lane] * z[4]
+            - k[4][lane] * z[5]));
+        const double t5 = t3 - t2;
+        const double t6 = k[6][lane] + (k[5][lane] * z[7] - k[4][lane] * z[6] + (k[6][lane] * z[4]
+            - k[7][lane] * z[5]));
+        const double t7 = k[7][lane] + (k[7][lane] * z[4] + k[6][lane] * z[5] - (k[5][lane] * z[6]
+            + k[4][lane] * z[7]));
+        seen[0][lane] = k[0][lane] + (k[0][lane] * z[4] - k[1][lane] * z[5] - (k[2][lane] * z[6]
+            + k[3][lane] * z[7])) - t1 * (t2 - t3);
+        seen[1][lane] = k[1][lane] + (k[3][lane] * z[6] - k[2][lane] * z[7] + (k[0][lane] * z[5]
+            + k[1][lane] * z[4])) - t4 * t5;
+        seen[2][lane] = k[2][lane] + (k[1][lane] * z[7] + k[0][lane] * z[6] + (k[2][lane] * z[4]
+            - k[3][lane] * z[5])) - t6 * t5;
+        seen[3][lane] = k[3][lane] + (k[3][lane] * z[4] + k[2][lane] * z[5] + (k[0][lane] * z[7]
+            - k[1][lane] * z[6])) - t7 * t5;
+        seen[4][lane] = t1;
+        seen[5][lane] = t4;
+        seen[6][lane] = t6;
+        seen[7][lane] = t7;
     }
 }
 
@@ -521,19 +503,20 @@ static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, doubl
     return best;
 }
 
-/* Stage increments in the frame of the end of a step, where the next step starts. */
+/* Stage increments in the frame of the end of a step from a point, where the next step starts. */
 static void kowalevski_gauss_to_next_frame(const kowalevski_gauss_solver *s,
-    const double end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes *increments,
+    double point[kowalevski_gauss_POINT], const double end[kowalevski_gauss_UNKNOWNS],
+    kowalevski_gauss_lanes *increments,
     double in_next_frame[kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH])
 {
     kowalevski_gauss_lanes in_frame[kowalevski_gauss_UNKNOWNS];
-    kowalevski_gauss_next_frame_lanes(s->coef, end, increments, in_frame);
+    kowalevski_gauss_next_frame_lanes(s->coef, point, end, increments, in_frame);
     memcpy(in_next_frame, in_frame, sizeof in_frame); /* may be unaligned */
 }
 
-/* Store the stage increments of a step with this end, to predict the next step. */
-static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, const double end[kowalevski_gauss_UNKNOWNS],
-    kowalevski_gauss_lanes *increments)
+/* Store the stage increments of a step from a point with this end, to predict the next step. */
+static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, double point[kowalevski_gauss_POINT],
+    const double end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes *increments)
 {
     kowalevski_gauss_history *past = &s->history;
     const int older = past->latest, latest = kowalevski_gauss_EARLIER - 1 - older;
@@ -542,8 +525,8 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, const double e
     past->kicked = 0;
     kowalevski_gauss_lanes last[kowalevski_gauss_UNKNOWNS];
     memcpy(last, past->increments[older], sizeof last);
-    kowalevski_gauss_to_next_frame(s, end, last, past->increments[older]);
-    kowalevski_gauss_to_next_frame(s, end, increments, past->increments[latest]);
+    kowalevski_gauss_to_next_frame(s, point, end, last, past->increments[older]);
+    kowalevski_gauss_to_next_frame(s, point, end, increments, past->increments[latest]);
     past->latest = latest;
     if (past->count < kowalevski_gauss_EARLIER) ++past->count;
 }
@@ -653,7 +636,7 @@ static kowalevski_gauss_status kowalevski_gauss_attempt(kowalevski_gauss_solver 
     kowalevski_gauss_end(increments, end);
     kowalevski_gauss_stage_change(s->coef, point, end, change);
     if (!kowalevski_gauss_advance(s, change, s->carry)) return kowalevski_gauss_NOT_FINITE;
-    kowalevski_gauss_remember(s, end, increments);
+    kowalevski_gauss_remember(s, point, end, increments);
     return kowalevski_gauss_OK;
 }
 

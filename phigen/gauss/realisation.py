@@ -17,6 +17,7 @@ from phigen.gauss.enveloping import enveloping
 from phigen.gauss.logarithms import Rates, logarithmic
 from phigen.gauss.matrices import of_matrices
 from phigen.gauss.quaternionic import quaternionic
+from phigen.gauss.square_zero import square_zero_ideal
 from phigen.gauss.star_algebra import StarAlgebra, Vector
 from phigen.geometry.blocks import blocks
 from phigen.geometry.lie_algebra import LieAlgebra
@@ -52,7 +53,8 @@ class LogarithmicBlock:
 class AlgebraBlock:
     """Coordinates (indices) with the brackets of a Lie algebra: x_i + ``shift`` is a momentum map of a star algebra.
 
-    If ``central``, the last basis element of the Lie algebra has no coordinate: its value is 1.
+    If ``central``, the last basis element of the Lie algebra has no coordinate: its value is 1. ``ideal`` are the basis
+    elements of a square-zero ideal, if functionals take the place of its part of G (`phigen.gauss.square_zero`).
     """
 
     indices: tuple[int, ...]
@@ -60,6 +62,17 @@ class AlgebraBlock:
     lie: LieAlgebra
     shift: tuple[Expression, ...]
     central: bool = False
+    ideal: tuple[int, ...] = ()
+
+    @property
+    def subalgebra(self) -> tuple[int, ...]:
+        """The basis elements outside the ideal: G has unknowns along these."""
+        return tuple(i for i in range(self.algebra.dimension) if i not in self.ideal)
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns of a stage."""
+        return 2 * len(self.subalgebra) if self.ideal else self.algebra.dimension
 
 
 Part = Plain | LogarithmicBlock | AlgebraBlock
@@ -81,6 +94,12 @@ class Realisation:
     def logarithms(self) -> tuple[LogarithmicBlock, ...]:
         """The parts whose unknowns are logarithms."""
         return tuple(part for part in self.parts if isinstance(part, LogarithmicBlock))
+
+    @property
+    def with_elements(self) -> Realisation:
+        """The same with all components of group elements as unknowns, from which translations follow."""
+        parts = (replace(part, ideal=()) if isinstance(part, AlgebraBlock) else part for part in self.parts)
+        return Realisation(tuple(parts), self.exact)
 
     @property
     def label(self) -> str:
@@ -192,7 +211,8 @@ def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | N
     algebra = star_algebra(lie)
     if algebra is None:
         return None
-    return AlgebraBlock(tuple(indices), algebra, lie, tuple(shift or [ZERO] * last), central)
+    ideal = square_zero_ideal(algebra)
+    return AlgebraBlock(tuple(indices), algebra, lie, tuple(shift or [ZERO] * last), central, ideal)
 
 
 def star_algebra(lie: LieAlgebra) -> StarAlgebra | None:

@@ -12,11 +12,11 @@ from itertools import count
 from phigen.attitude.elements import product as quaternion_product
 from phigen.attitude.group import Group
 from phigen.gauss.realisation import AlgebraBlock
-from phigen.gauss.stage_map import StageMap
+from phigen.gauss.stage_map import StageMap, offset_element, offsets_of
 from phigen.gauss.star_algebra import StarAlgebra, Vector, combined
 from phigen.geometry.field import Scalar
 from phigen.geometry.linear import Span
-from phigen.symbolic.expression import ONE, Expression, number, symbol, total
+from phigen.symbolic.expression import ONE, Expression, number, total
 
 #: Components of a dual quaternion: those of q, then those of r.
 Dual = list[Scalar]
@@ -27,19 +27,20 @@ def group_element(points: StageMap, attitude: Group) -> list[Expression] | None:
 
     None if the coordinates of the rotation belong to no star algebra, or to one without the homomorphism.
     """
-    for group, first in zip(points.realisation.groups, points.starts, strict=True):
+    for group, places in zip(points.realisation.groups, points.places, strict=True):
         if set(attitude.rotation) <= set(group.indices):
             images = _images(group, attitude)
-            return None if images is None else _element(points, group.algebra, first, images, attitude)
+            return None if images is None else _element(points, group, places, images, attitude)
     return None
 
 
 def _element(
-    points: StageMap, algebra: StarAlgebra, first: int, images: Sequence[Dual], attitude: Group
+    points: StageMap, group: AlgebraBlock, places: Sequence[int], images: Sequence[Dual], attitude: Group
 ) -> list[Expression]:
-    unknowns = [symbol(s) for s in points.unknowns[first : first + algebra.dimension]]
+    algebra = group.algebra
+    offsets = offset_element(group, offsets_of(points, places))
     w = [
-        total(algebra.field.expression(image[k]) * z for image, z in zip(images, unknowns, strict=True) if image[k])
+        total(algebra.field.expression(image[k]) * z for image, z in zip(images, offsets, strict=True) if image[k])
         for k in range(8)
     ]
     if attitude.spatial:  # the element moves from the left, so it is the inverse

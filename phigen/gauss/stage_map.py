@@ -36,9 +36,10 @@ OFFSET = "z"
 class StageMap:
     """Points as expressions in the start of the step and the unknowns.
 
-    ``unknowns`` are symbols, and ``change`` is x − x_start by coordinates. The first ``plain`` unknowns are offsets
-    of the coordinates with the indices ``moved``. Then come the offset of the time, if H depends on it, the offsets of
-    the logarithms of the coordinates ``scaled``, and the unknowns of group elements.
+    ``unknowns`` are symbols, and ``change`` is x − x_start by coordinates. The first unknowns are offsets of the
+    coordinates with the indices ``moved``. Then come the offset of the time, if H depends on it, those of functionals
+    of algebras with ideals, those of the logarithms of the coordinates ``scaled``, and those of group elements.
+    ``places`` are the indices of the unknowns of each group: those of G, then those of functionals.
     """
 
     system: System
@@ -46,15 +47,21 @@ class StageMap:
     unknowns: tuple[str, ...]
     moved: tuple[int, ...]
     scaled: tuple[int, ...]
-    starts: tuple[int, ...]  # the first unknown of each group
+    places: tuple[tuple[int, ...], ...]
     change: tuple[Expression, ...] = field(default=())
     pace: Expression = ONE  # the factor of ∇H + ζ: g with a monitor and forces
 
     @property
     def logarithms(self) -> dict[int, Expression]:
         """The unknowns that are offsets of logarithms, by their coordinates."""
-        first = len(self.moved) + len(self.system.times)
+        first = self.plain
         return {i: symbol(self.unknowns[first + k]) for k, i in enumerate(self.scaled)}
+
+    @property
+    def plain(self) -> int:
+        """Number of the first unknowns, those that have the scale of the state."""
+        groups = self.realisation.groups
+        return len(self.moved) + len(self.system.times) + sum(len(g.subalgebra) for g in groups if g.ideal)
 
     @property
     def start(self) -> tuple[str, ...]:
@@ -70,26 +77,35 @@ def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) 
         plain_indices = tuple(i for i in plain_indices if any(not e.is_zero for e in system.poisson[i]))
     if not (plain_indices or scaled or realisation.groups or system.times):
         plain_indices = (0,)  # all brackets are zero; arrays in C have at least one entry
-    count = len(plain_indices) + len(system.times) + len(scaled)
-    starts = []
-    for group in realisation.groups:
-        starts.append(count)
-        count += group.algebra.dimension
+    places, count = _places(realisation, len(plain_indices) + len(system.times), len(scaled))
     unknowns = tuple(Symbol(OFFSET, k) for k in range(count))
     change = [ZERO] * system.dimension
     for k, i in enumerate(plain_indices):
         change[i] = symbol(unknowns[k])
-    points = StageMap(system, realisation, unknowns, plain_indices, scaled, tuple(starts), pace=pace)
+    points = StageMap(system, realisation, unknowns, plain_indices, scaled, places, pace=pace)
     for i, offset in points.logarithms.items():
         change[i] = symbol(system.coordinates[i]) * call("expm1", offset)
-    for group, first in zip(realisation.groups, starts, strict=True):
-        offsets = [symbol(s) for s in unknowns[first : first + group.algebra.dimension]]
-        for i, value in zip(group.indices, _momentum_change(group, _values(system, group), offsets), strict=False):
+    for group, at in zip(realisation.groups, places, strict=True):
+        values = _momentum_change(group, group_values(system, group), offsets_of(points, at))
+        for i, value in zip(group.indices, values, strict=False):
             change[i] = value
     return replace(points, change=tuple(change))
 
 
-def _values(system: System, group: AlgebraBlock) -> list[Expression]:
+def _places(realisation: Realisation, plain: int, scaled: int) -> tuple[tuple[tuple[int, ...], ...], int]:
+    """Return the indices of the unknowns of each group, after these numbers of others, and the number of unknowns."""
+    functional = plain
+    element = plain + scaled + sum(len(g.subalgebra) for g in realisation.groups if g.ideal)
+    places = []
+    for group in realisation.groups:
+        size = len(group.subalgebra)
+        of_functional = range(functional, functional + size) if group.ideal else range(0)
+        places.append((*range(element, element + size), *of_functional))
+        functional, element = functional + len(of_functional), element + size
+    return tuple(places), element
+
+
+def group_values(system: System, group: AlgebraBlock) -> list[Expression]:
     """Return the values of the elements E_a of a Lie algebra at the start of a step."""
     coordinates = [symbol(system.coordinates[i]) + s for i, s in zip(group.indices, group.shift, strict=True)]
     return [*coordinates, *([ONE] if group.central else [])]
@@ -134,27 +150,58 @@ def _scaled(group: AlgebraBlock, x: Sequence[Expression]) -> _Scaled:
     )
 
 
-def _momentum_change(group: AlgebraBlock, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
-    """Return x̃(G E_a G*) − x_a for G = 1 + w: 2x̃(wE_a) + x̃(wE_a w*), as E_a is skew."""
-    algebra, scaled = group.algebra, _scaled(group, x)
+def offset_element(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[Expression]:
+    """Return the components of w = G − 1 by the unknowns of a group; those in its ideal are not known, and are 0."""
+    components = dict(zip(group.subalgebra, offsets, strict=False))
+    return [components.get(k, ZERO) for k in range(group.algebra.dimension)]
+
+
+def _element_at(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[Expression]:
+    """Return the components of G = 1 + w, those in the ideal as 0."""
+    unit = group.algebra.unit
+    return [
+        w + (_scalar(group.algebra, unit[k]) if k in unit else ZERO)
+        for k, w in enumerate(offset_element(group, offsets))
+    ]
+
+
+def _momentum_change(group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Expression]) -> list[Expression]:
+    """Return x̃(G E_a G*) − x_a for G = 1 + w: 2x̃(wE_a) + x̃(wE_a w*), as E_a is skew.
+
+    With functionals λ = x̃ + u of a subalgebra it is u(E_a) + λ(E_a w*) there.
+    """
+    algebra, scaled, w = group.algebra, _scaled(group, x), offset_element(group, offsets)
     left = _functional_times(algebra, scaled, w)
-    at_frame = [number(2) * _combined(algebra, f, left) + _with_star(algebra, f, left, w) for f in scaled.frame]
+    linear, quadratic = [number(2) * value for value in left], list(left)
+    if group.ideal:
+        for k, u in zip(group.subalgebra, offsets[len(group.subalgebra) :], strict=True):
+            linear[k], quadratic[k] = u, scaled.at_basis[k] + u
+    at_frame = [_combined(algebra, f, linear) + _with_star(algebra, f, quadratic, w) for f in scaled.frame]
     return [_combined(algebra, parts, at_frame) for parts in scaled.combination]
 
 
-def _momentum(group: AlgebraBlock, x: Sequence[Expression], g: Sequence[Expression]) -> list[Expression]:
+def _momentum(group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Expression]) -> list[Expression]:
     """Return x̃(G E_a G*) for a group element G."""
-    at_frame, combination = _at_frame(group, x, g)
+    at_frame, combination = _at_frame(group, x, offsets)
     return [_combined(group.algebra, parts, at_frame) for parts in combination]
 
 
 def _at_frame(
-    group: AlgebraBlock, x: Sequence[Expression], g: Sequence[Expression]
+    group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Expression]
 ) -> tuple[list[Expression], list[Vector]]:
     """Return multiples of x̃(G f G*) for the frame elements f, and the combinations of these that are x̃(G E_a G*)."""
     algebra, scaled = group.algebra, _scaled(group, x)
-    left = _functional_times(algebra, scaled, g)
+    left, g = _left(group, scaled, offsets), _element_at(group, offsets)
     return [_with_star(algebra, f, left, g) for f in scaled.frame], scaled.combination
+
+
+def _left(group: AlgebraBlock, scaled: _Scaled, offsets: Sequence[Expression]) -> list[Expression]:
+    """Return x̃(Gb)/q for the elements b of the basis; λ(b)/q in the subalgebra, where there is an ideal."""
+    left = _functional_times(group.algebra, scaled, _element_at(group, offsets))
+    if group.ideal:
+        for k, u in zip(group.subalgebra, offsets[len(group.subalgebra) :], strict=True):
+            left[k] = scaled.at_basis[k] + u
+    return left
 
 
 def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Expression]) -> list[Expression]:
@@ -186,8 +233,8 @@ def at_unknowns(points: StageMap) -> dict[str, Expression]:
     stage_values |= {
         system.coordinates[i]: symbol(system.coordinates[i]) * call("exp", z) for i, z in points.logarithms.items()
     }
-    for group, first in zip(points.realisation.groups, points.starts, strict=True):
-        momenta = _momentum(group, _values(system, group), _group_element(points, group, first))
+    for group, at in zip(points.realisation.groups, points.places, strict=True):
+        momenta = _momentum(group, group_values(system, group), offsets_of(points, at))
         for i, value, shift in zip(group.indices, momenta, group.shift, strict=False):
             stage_values[system.coordinates[i]] = value - shift
     return stage_values | {t: symbol(t) + symbol(points.unknowns[len(points.moved)]) for t in system.times}
@@ -203,13 +250,9 @@ def _element(
     ]
 
 
-def _group_element(points: StageMap, group: AlgebraBlock, first: int) -> list[Expression]:
-    """Return G = 1 + w, with the unknowns w from the index ``first`` on."""
-    algebra = group.algebra
-    return [
-        symbol(points.unknowns[first + k]) + (_scalar(algebra, algebra.unit[k]) if k in algebra.unit else ZERO)
-        for k in range(algebra.dimension)
-    ]
+def offsets_of(points: StageMap, places: Sequence[int]) -> list[Expression]:
+    """Return the unknowns at these places."""
+    return [symbol(points.unknowns[k]) for k in places]
 
 
 def vector_field(
@@ -238,28 +281,58 @@ def vector_field(
     plain_rates = substitute([field_[i] for i in points.moved], stage_values)
     derivatives = [*(weight * value for value in plain_rates), *(weight for _ in system.times)]
     relative = [_logarithmic_rate(points, i, slopes) for i in points.scaled]
+    derivatives += [ZERO] * (points.plain - len(derivatives))
     derivatives += [weight * value for value in substitute(relative, stage_values)]
+    derivatives += [ZERO] * (len(points.unknowns) - len(derivatives))
     rates = [-weight * value for value in substitute(slopes, stage_values)]
-    for group, first in zip(realisation.groups, points.starts, strict=True):
+    for group, at in zip(realisation.groups, points.places, strict=True):
         # A constant among the basis elements, if there is one, acts as 0: it is central.
         velocity = _element(group.algebra, group.algebra.basis, [rates[i] for i in group.indices])
         if collected:
-            sums = _collected(points, group, first, slopes, weight)
+            sums = _collected(points, group, at, slopes, weight)
             velocity = [v if s is None else s for v, s in zip(velocity, sums, strict=True)]
+        velocity = [number(2) * v if k in group.ideal else v for k, v in enumerate(velocity)]
         if hold is not None:
             velocity = [hold(value) for value in velocity]
-        derivatives += _multiplied(group.algebra, _group_element(points, group, first), velocity)
+        for k, value in zip(at, _derivatives(points, group, at, velocity), strict=True):
+            derivatives[k] = value
     return derivatives
 
 
+def _derivatives(
+    points: StageMap, group: AlgebraBlock, places: Sequence[int], velocity: Sequence[Expression]
+) -> list[Expression]:
+    """Return the derivatives of the unknowns of a group; the part of the velocity in the ideal counts twice."""
+    offsets = offsets_of(points, places)
+    of_element = _multiplied(group.algebra, _element_at(group, offsets), velocity)
+    if not group.ideal:
+        return of_element
+    left = _left(group, _scaled(group, group_values(points.system, group)), offsets)
+    return [*(of_element[k] for k in group.subalgebra), *_pulled_back(group, velocity, left)]
+
+
+def functional_offsets(group: AlgebraBlock, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
+    """Return the offsets of the functional λ of the subalgebra at G = 1 + w, where all components of w are known."""
+    doubled = [number(2) * v if k in group.ideal else v for k, v in enumerate(w)]
+    left = _functional_times(group.algebra, _scaled(group, x), doubled)
+    return [left[k] for k in group.subalgebra]
+
+
+def _pulled_back(group: AlgebraBlock, a: Sequence[Expression], left: Sequence[Expression]) -> list[Expression]:
+    """Return f(ab) for the elements b of the subalgebra, by the values ``left`` of a functional f at the basis."""
+    n = range(group.algebra.dimension)
+    rows = [[_combined(group.algebra, group.algebra.table.get((i, k), {}), left) for i in n] for k in group.subalgebra]
+    return [total(a[i] * value for i, value in enumerate(row) if not (a[i].is_zero or value.is_zero)) for row in rows]
+
+
 def _collected(
-    points: StageMap, group: AlgebraBlock, first: int, slopes: Sequence[Expression], weight: Expression
+    points: StageMap, group: AlgebraBlock, places: Sequence[int], slopes: Sequence[Expression], weight: Expression
 ) -> list[Expression | None]:
     """Return −w Σ_a E_a ∂H/∂x_a as sums over x̃(G f G*); None for components that are not affine in the momenta."""
     system, algebra = points.system, group.algebra
     names = [system.coordinates[i] for i in group.indices]
     state = {*system.coordinates, *system.times}
-    at_frame, combination = _at_frame(group, _values(system, group), _group_element(points, group, first))
+    at_frame, combination = _at_frame(group, group_values(system, group), offsets_of(points, places))
     components = _element(algebra, algebra.basis, [slopes[i] for i in group.indices])
     sums: list[Expression | None] = []
     for component, row in zip(components, sparse_derivatives(components, names), strict=True):
@@ -297,10 +370,43 @@ def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expre
 
 def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) -> list[Expression]:
     """Return derivatives of the unknowns in the frame of the end of a step: G* = G⁻¹ times those of group elements."""
-    values = list(slopes[: points.starts[0]])
-    for group, first in zip(points.realisation.groups, points.starts, strict=True):
-        algebra = group.algebra
-        w = [symbol(s) for s in points.unknowns[first : first + algebra.dimension]]
-        k = slopes[first : first + algebra.dimension]
-        values += [a + b for a, b in zip(k, _multiplied(algebra, _element(algebra, algebra.star, w), k), strict=True)]
+    values = list(slopes)
+    for group, places in zip(points.realisation.groups, points.places, strict=True):
+        algebra, offsets, k = group.algebra, offsets_of(points, places), [slopes[i] for i in places]
+        element = offset_element(group, k)
+        star = _element(algebra, algebra.star, offset_element(group, offsets))
+        turned = [a + b for a, b in zip(element, _multiplied(algebra, star, element), strict=True)]
+        in_frame = [turned[i] for i in group.subalgebra]
+        if group.ideal:
+            in_frame += _functional_in_next_frame(points, group, offsets, k[len(group.subalgebra) :], turned)
+        for i, value in zip(places, in_frame, strict=True):
+            values[i] = value
     return values
+
+
+def _functional_in_next_frame(
+    points: StageMap,
+    group: AlgebraBlock,
+    offsets: Sequence[Expression],
+    k: Sequence[Expression],
+    turned: Sequence[Expression],
+) -> list[Expression]:
+    """Return derivatives k of the functional λ in the next frame: k(bg*) − λ(sg*), with s the symmetric part of ġb.
+
+    Here ġ, ``turned``, are derivatives in that frame. The second term is due to nb + gn* = 0 at the end of a step.
+    """
+    algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
+    left = _left(group, _scaled(group, group_values(points.system, group)), offsets)
+    g, n = _element_at(group, offsets), range(algebra.dimension)
+    units = [{i: algebra.field.one} for i in n]
+    at_symmetric = [ZERO] * algebra.dimension
+    for i in group.subalgebra:
+        at_symmetric[i] = _with_star(algebra, combined([units[i], algebra.star[i]], {0: half, 1: half}), left, g)
+    moved = dict(zip(group.subalgebra, k, strict=True))
+    at_basis = [moved.get(i, ZERO) for i in n]
+    w = offset_element(group, offsets)
+    shears = _pulled_back(group, turned, at_symmetric)
+    return [
+        moved[i] + _with_star(algebra, units[i], at_basis, w) - shear
+        for i, shear in zip(group.subalgebra, shears, strict=True)
+    ]

@@ -11,7 +11,15 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from phigen.gauss.realisation import AlgebraBlock, Realisation
-from phigen.gauss.stage_map import StageMap, at_unknowns, stage_map, vector_field
+from phigen.gauss.stage_map import (
+    StageMap,
+    at_unknowns,
+    functional_offsets,
+    group_values,
+    offsets_of,
+    stage_map,
+    vector_field,
+)
 from phigen.gauss.star_algebra import difference
 from phigen.gauss.tableau import Tableau
 from phigen.geometry.system import System
@@ -27,6 +35,7 @@ from phigen.symbolic.expression import (
     symbol,
     total,
 )
+from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, Statement, decide_zero
 
 #: Largest residual of the order conditions that rounding of the coefficients explains.
@@ -47,6 +56,8 @@ def check(
         yield _brackets(system, realisation)
     for group in realisation.groups:
         yield _momentum_map(system, group)
+    if any(group.ideal for group in realisation.groups):
+        yield _functionals(system, points)
     field = discretised.vector_field() if pace is ONE else [pace * f for f in system.vector_field()]
     yield from _follows(system, points, field)
 
@@ -129,6 +140,40 @@ def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
     if failing:
         return Statement(name, REFUTED, failing[0])
     return Statement(name, PROVED, "associative, with involution; its skew elements have the brackets")
+
+
+def _functionals(system: System, points: StageMap) -> Statement:
+    """Decide that functionals of subalgebras make the same step as group elements: the same momenta and velocities.
+
+    The velocities are those of any H, by symbols in place of ∇H.
+    """
+    complete = stage_map(points.system, points.realisation.with_elements, points.pace)
+    values = _unknowns_by_elements(points, complete)
+    slopes = [symbol(Symbol("slope", i)) for i in range(system.dimension)]
+    complete_rates = vector_field(complete, at_unknowns(complete), slopes=slopes)
+    rates_by_name = dict(zip(complete.unknowns, complete_rates, strict=True))
+    changes = zip(system.coordinates, substitute(points.change, values), complete.change, strict=True)
+    residuals = [(name, a - b) for name, a, b in changes]
+    rates = substitute(vector_field(points, at_unknowns(points), slopes=slopes), values)
+    rows = sparse_derivatives([values[name] for name in points.unknowns], complete.unknowns)
+    for name, rate, row in zip(points.unknowns, rates, rows, strict=True):
+        residuals.append((name, rate - total(rates_by_name[z] * e for z, e in row.items())))
+    return decide_zero("g and λ(b) = x̃(gb) + 2x̃(nb) make the step of G = g + n", residuals, system.positive)
+
+
+def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Expression]:
+    """Return the unknowns of ``points`` in terms of those of ``complete``, which has no functionals."""
+    first, size = len(points.moved) + len(points.system.times), len(points.scaled)
+    common = [*range(first), *range(points.plain, points.plain + size)]
+    values = {points.unknowns[k]: symbol(complete.unknowns[i]) for i, k in enumerate(common)}
+    groups = zip(points.realisation.groups, points.places, complete.places, strict=True)
+    for group, places, element_places in groups:
+        w = offsets_of(complete, element_places)
+        offsets = [w[k] for k in group.subalgebra]
+        if group.ideal:
+            offsets += functional_offsets(group, group_values(points.system, group), w)
+        values |= dict(zip((points.unknowns[k] for k in places), offsets, strict=True))
+    return values
 
 
 def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> Iterator[Statement]:

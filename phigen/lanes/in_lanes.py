@@ -266,7 +266,7 @@ def _stages(program: Program, step: Gauss) -> Stages:
     Values at the start of the step are shared by all lanes.
     """
     kernels = [LaneKernel(step.slope, ("coef", "x"))]
-    kernels += [LaneKernel(step.frame, ("coef", "z"))] if step.frame else []
+    kernels += [LaneKernel(step.frame, ("coef", "x", "z"))] if step.frame else []
     reduced = [step.reduced.slope, step.reduced.follow] if step.reduced else []
     kernels += [LaneKernel(kernel, ("coef", "x")) for kernel in reduced]
     others = [*step.stage_transposes, *(k.kernel for k in _elapsed(program))]

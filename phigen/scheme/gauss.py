@@ -142,7 +142,7 @@ def build_gauss(
         slope,
         change,
         tableau(order.terms),
-        len(points.moved) + len(system.times),
+        points.plain,
         _full(frame, coefficients) if frame else None,
         spec.solver.max_iterations if ("solver", "max_iterations") in spec.locations else MAX_SWEEPS,
         tangent,

@@ -100,7 +100,7 @@ def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
     values = derivatives_in_next_frame(points, [symbol(s) for s in slopes])
     return Kernel(
         "next_frame",
-        "derivatives k of the unknowns in the frame of the end z of a step, where the next one starts",
-        {"coef": coefficients.slots, "z": points.unknowns, "k": slopes},
+        "derivatives k of the unknowns in the frame of the end z of a step from x, where the next one starts",
+        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "k": slopes},
         (Output("seen", tuple(coefficients.hoist(values))),),
     )

@@ -83,7 +83,7 @@ static double phi_change_back(phi_lanes *before, phi_lanes *after)
 #if PHI_FRAMED
 /* Cotangents of unknowns from those in the frame of the end of the step: the transpose of the change of frame, whose
    columns are the images of unit vectors. */
-static void phi_see_back(const phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *bar)
+static void phi_see_back(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *bar)
 {
     phi_lanes next_frame_bar[PHI_UNKNOWNS], unit[PHI_UNKNOWNS];
     double image[PHI_UNKNOWNS][PHI_WIDTH];
@@ -91,7 +91,7 @@ static void phi_see_back(const phi_solver *s, const double end[PHI_UNKNOWNS], ph
     for (int first = 0; first < PHI_UNKNOWNS; first += PHI_NODES) {
         memset(unit, 0, sizeof unit);
         for (int i = 0; i < PHI_NODES && first + i < PHI_UNKNOWNS; ++i) unit[first + i][i] = 1.0;
-        phi_to_next_frame(s, end, unit, image);
+        phi_to_next_frame(s, point, end, unit, image);
         for (int i = 0; i < PHI_NODES && first + i < PHI_UNKNOWNS; ++i) {
             memset(bar[first + i], 0, sizeof bar[0]);
             for (int l = 0; l < PHI_UNKNOWNS; ++l)
@@ -103,15 +103,16 @@ static void phi_see_back(const phi_solver *s, const double end[PHI_UNKNOWNS], ph
 #endif
 /* Starting values for the cotangents of the stage increments, from the cotangents of the unknowns in the step after: the
    predictor of steps, with the stages in the opposite order. */
-static void phi_predict_back(const phi_solver *s, const double end[PHI_UNKNOWNS], const double end_bar[PHI_UNKNOWNS],
-    const phi_cotangent *bar, phi_lanes *increments_bar)
+static void phi_predict_back(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS],
+    const double end_bar[PHI_UNKNOWNS], const phi_cotangent *bar, phi_lanes *increments_bar)
 {
     phi_lanes after[PHI_UNKNOWNS], reversed[PHI_UNKNOWNS];
     memcpy(after, bar->after, sizeof after);
 #if PHI_FRAMED
-    phi_see_back(s, end, after);
+    phi_see_back(s, point, end, after);
 #else
     (void)s;
+    (void)point;
     (void)end;
 #endif
     memset(reversed, 0, sizeof reversed);
@@ -135,7 +136,7 @@ static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT
     for (int k = 0; k < PHI_UNKNOWNS; ++k) size += fabs(end_bar[k]);
     memset(z_bar, 0, sizeof z_bar);
     memset(next, 0, sizeof next);
-    if (bar->chained) phi_predict_back(s, end, end_bar, bar, increments_bar);
+    if (bar->chained) phi_predict_back(s, point, end, end_bar, bar, increments_bar);
     else phi_mixed_back(end_bar, z_bar, increments_bar);
     for (int sweep = 0; sweep < PHI_MAX_SWEEPS; ++sweep) {
         phi_unknowns_bar(s, point, weights, z, increments_bar, next);

@@ -146,26 +146,27 @@ static void phi_predict(phi_history *past, phi_lanes *z)
 
 #endif
 #if PHI_FRAMED
-/* Stage increments in the frame of the end of a step, where the next step starts. */
-static void phi_to_next_frame(const phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *increments, double in_next_frame[PHI_UNKNOWNS][PHI_WIDTH])
+/* Stage increments in the frame of the end of a step from a point, where the next step starts. */
+static void phi_to_next_frame(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments,
+    double in_next_frame[PHI_UNKNOWNS][PHI_WIDTH])
 {
 #if PHI_STAGED
     phi_lanes in_frame[PHI_UNKNOWNS];
-    phi_next_frame_lanes(s->coef, end, increments, in_frame);
+    phi_next_frame_lanes(s->coef, point, end, increments, in_frame);
     memcpy(in_next_frame, in_frame, sizeof in_frame); /* may be unaligned */
 #else
     double increment[PHI_UNKNOWNS], in_frame[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_UNKNOWNS; ++k) increment[k] = increments[k][i];
-        phi_next_frame(s->coef, end, increment, in_frame);
+        phi_next_frame(s->coef, point, end, increment, in_frame);
         for (int k = 0; k < PHI_UNKNOWNS; ++k) in_next_frame[k][i] = in_frame[k];
     }
 #endif
 }
 
 #endif
-/* Store the stage increments of a step with this end, to predict the next step. */
-static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lanes *increments)
+/* Store the stage increments of a step from a point with this end, to predict the next step. */
+static void phi_remember(phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments)
 {
     phi_history *past = &s->history;
     const int older = past->latest, latest = PHI_EARLIER - 1 - older;
@@ -176,15 +177,16 @@ static void phi_remember(phi_solver *s, const double end[PHI_UNKNOWNS], phi_lane
 #if PHI_STAGED
     phi_lanes last[PHI_UNKNOWNS];
     memcpy(last, past->increments[older], sizeof last);
-    phi_to_next_frame(s, end, last, past->increments[older]);
+    phi_to_next_frame(s, point, end, last, past->increments[older]);
 #else
-    phi_to_next_frame(s, end, past->increments[older], past->increments[older]);
+    phi_to_next_frame(s, point, end, past->increments[older], past->increments[older]);
 #endif
-    phi_to_next_frame(s, end, increments, past->increments[latest]);
+    phi_to_next_frame(s, point, end, increments, past->increments[latest]);
 #if PHI_ADJOINT
     PHI_COPY_STAGES(past->solved, increments, past->solved);
 #endif
 #else
+    (void)point;
     (void)end;
     PHI_COPY_STAGES(past->increments[latest], increments, past->increments[latest]);
 #endif
@@ -304,7 +306,7 @@ static phi_status phi_attempt(phi_solver *s)
 #endif
     if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
     PHI_PASS(s, elapsed)
-    phi_remember(s, end, increments);
+    phi_remember(s, point, end, increments);
 #if PHI_ATTITUDE
     double factor[PHI_ELEMENT];
     phi_turn(s->coef, end, factor);

@@ -172,18 +172,19 @@ static void phi_group_solve(phi_group *group, phi_batch now)
         group->predictor = phi_group_best_predictor(group, scale, z);
 }
 
-/* Store the stage increments of a step with this end, to predict the next step. */
-static void phi_group_remember(phi_group *group, phi_lanes end[PHI_UNKNOWNS], phi_batch now)
+/* Store the stage increments of a step with this start and end, to predict the next step. */
+static void phi_group_remember(phi_group *group, phi_lanes start[PHI_POINT], phi_lanes end[PHI_UNKNOWNS], phi_batch now)
 {
     const int older = group->latest, latest = PHI_EARLIER - 1 - older;
 #if PHI_FRAMED
     phi_lanes last[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
         memcpy(last, group->increments[older][i], sizeof last);
-        phi_member_frame_lanes(group->coef, end, last, group->increments[older][i]);
-        phi_member_frame_lanes(group->coef, end, now[i], group->increments[latest][i]);
+        phi_member_frame_lanes(group->coef, start, end, last, group->increments[older][i]);
+        phi_member_frame_lanes(group->coef, start, end, now[i], group->increments[latest][i]);
     }
 #else
+    (void)start;
     (void)end;
     memcpy(group->increments[latest], now, sizeof(phi_batch));
 #endif
@@ -244,10 +245,11 @@ static void phi_group_pass(phi_group *group)
 static int phi_group_step(phi_group *group, size_t remaining)
 {
     phi_batch now;
-    phi_lanes end[PHI_UNKNOWNS], change[PHI_DIM];
+    phi_lanes start[PHI_POINT], end[PHI_UNKNOWNS], change[PHI_DIM];
     int active = 0;
     memset(now, 0, sizeof now);
     memset(end, 0, sizeof end);
+    memcpy(start, group->x, sizeof start);
     phi_group_solve(group, now);
     for (int i = 0; i < PHI_NODES; ++i)
         for (int k = 0; k < PHI_UNKNOWNS; ++k) {
@@ -259,7 +261,7 @@ static int phi_group_step(phi_group *group, size_t remaining)
     phi_group_pass(group, now);
 #endif
     phi_group_advance(group, change);
-    phi_group_remember(group, end, now);
+    phi_group_remember(group, start, end, now);
 #if PHI_TIMED
     phi_group_pass(group);
 #endif

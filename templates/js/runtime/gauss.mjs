@@ -202,8 +202,8 @@ function attempt(solver, stage) {
   if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
   pass(solver, time);
   for (let i = 0; i < NODES; i++) {
-    storeIncrement(solver.coef[stage], end, history.increments[i], history.older[i]);
-    storeIncrement(solver.coef[stage], end, work.now[i], history.increments[i]);
+    storeIncrement(solver.coef[stage], start, end, history.increments[i], history.older[i]);
+    storeIncrement(solver.coef[stage], start, end, work.now[i], history.increments[i]);
   }
   // predictors read steps of one size
   history.count = solver.h === history.h ? Math.min(history.count + 1, 2) : 1;

@@ -1,4 +1,4 @@
 /** Store the increment of a stage. */
-export function storeIncrement(coef, end, increment, to) {
+export function storeIncrement(coef, start, end, increment, to) {
   to.set(increment);
 }
