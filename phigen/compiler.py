@@ -209,12 +209,15 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
 
 def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None) -> Compilation:
     """Compile a system by its scheme; ``early_realisation`` is what `_realised_early` has found."""
-    if spec.scheme == "auto":
-        return _cheapest(spec, source, clock)
-    if spec.scheme == "splitting":
-        return _compile_splitting(spec, source, clock)
-    if spec.scheme == "gauss":
-        return _collocated(spec, source, clock)
+    if early_realisation:
+        return _compile_series(spec, source, clock, early_realisation)
+    return SCHEME_COMPILERS[spec.scheme](spec, source, clock)
+
+
+def _compile_series(
+    spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None
+) -> CompiledSeries:
+    """Compile a system to a step from S_1, S_2, … and a bi-realisation."""
     realisation = early_realisation or clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
     plan = plan_order(spec.order, spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
@@ -339,7 +342,7 @@ def _turns_bodies(spec: Spec, system: System) -> bool:
     return rotates(group)
 
 
-def _collocated(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
+def _compile_gauss(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
     """Compile a system to steps of Gauss collocation."""
     expect_offered(spec)
     plan = plan_gauss(spec)
@@ -357,6 +360,15 @@ def _collocated(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
     return CompiledGauss(
         spec=spec, system=source, order=plan, program=program, gauge=gauge, seconds=clock.seconds, gauss=realisation
     )
+
+
+#: The function that compiles an ordinary system, for each scheme; lattices have `_swept`.
+SCHEME_COMPILERS: Mapping[str, Callable[[Spec, System, _Clock], Compilation]] = {
+    "auto": _cheapest,
+    "series": _compile_series,
+    "splitting": _compile_splitting,
+    "gauss": _compile_gauss,
+}
 
 
 def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:

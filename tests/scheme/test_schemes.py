@@ -1,0 +1,77 @@
+"""Schemes: each compiles what the spec asks for, or refuses it; none compiles a spec and ignores an option."""
+
+import pytest
+from support import compile_text
+
+from phigen.compilation import Compilation
+from phigen.compiler import SCHEME_COMPILERS
+from phigen.errors import SpecError
+from phigen.scheme.program import Program
+from phigen.spec.names import SCHEMES
+from phigen.spec.validate import WITHOUT_SERIES
+
+#: The schemes that are not a choice among others.
+NAMED = [scheme for scheme in SCHEMES if scheme != "auto"]
+
+#: A body whose Hamiltonian is no quadratic form, so that no flow is exact.
+BODY = """coordinates: [x1, x2, x3]
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: x1**2/2 + x2**2/4 + x3**2/6 + x1**3/9
+casimirs: {C: x1**2 + x2**2 + x3**2}
+"""
+#: Options that change the step of the body.
+OPTIONS = [
+    "adjoint: true", "birealisation: spray", "composition: triple-jump", "forces: {covector: {x1: -0.1*x1}}",
+    "forces: {vector: {x1: -0.1*x1}}", "gauge: {C: 2}", "modified_hamiltonian: 1", "monitor: 1 + x1**2",
+    "noise: {w: {hamiltonian: x1}}", "order: 6", "reconstruct: quaternion", "terms: 5",
+]  # fmt: skip
+
+CHAIN = """lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + (q[i+1] - q)**2/2 + q**4/4
+"""
+
+
+def attempted(text: str, scheme: str) -> Compilation | str:
+    """The compilation of a spec by a scheme, or the error that refuses it."""
+    try:
+        return compile_text(f"{text}scheme: {scheme}\n")
+    except SpecError as error:
+        return str(error)
+
+
+def method(program: Program) -> str:
+    """The parts of a program that make a step, without the description of the system and the options themselves."""
+    parts = ("step", "fractions", "monitor", "noise", "modified", "attitude")
+    return repr([getattr(program, part) for part in parts])
+
+
+def test_each_scheme_has_a_compiler():
+    assert SCHEME_COMPILERS.keys() == set(SCHEMES)
+
+
+def test_each_scheme_but_one_refuses_keys_of_the_series():
+    assert WITHOUT_SERIES.keys() == {*NAMED} - {"series"}
+
+
+@pytest.mark.parametrize("option", OPTIONS, ids=lambda option: option.partition(":")[0])
+@pytest.mark.parametrize("scheme", NAMED)
+def test_an_option_changes_the_step_or_is_refused(scheme, option):
+    key = option.partition(":")[0]
+    order = "" if key in ("order", "terms") else "order: 4\n"
+    compilation = attempted(f"{BODY}{order}{option}\n", scheme)
+    if isinstance(compilation, str):
+        assert key in compilation
+    else:
+        unchanged = compile_text(f"{BODY}order: 4\nscheme: {scheme}\n")
+        assert method(compilation.program) != method(unchanged.program)
+
+
+@pytest.mark.parametrize("scheme", NAMED)
+def test_a_lattice_is_compiled_by_the_scheme_that_it_names_or_refused(scheme):
+    compilation = attempted(CHAIN, scheme)
+    if isinstance(compilation, str):
+        assert f"scheme {scheme}: not for lattices" in compilation
+    else:
+        assert compilation.scheme_name == scheme
