@@ -109,7 +109,6 @@ CONDITIONS = {
     "elapsed.c": "MONITOR",
     "ensemble.c": "ENSEMBLE",
     "expansion_lanes.c": "PATH",
-    "explicit.c": "EXPLICIT || SPLITTING",
     "explicit_stage.c": "EXPLICIT && COMPOSED",
     "finite.c": "!DEVICE",
     "first_failure.c": "GROUPS || PACKS || STAGE_GROUPS || NOISE && !EACH || ATTITUDES",

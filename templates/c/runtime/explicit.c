@@ -7,5 +7,4 @@
 #include "model.h"
 
 #include "explicit_stage.c"
-#include "splitting.c"
 #endif

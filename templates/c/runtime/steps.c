@@ -4,4 +4,5 @@
 #include "path.c"
 #include "gauss.c"
 #include "explicit.c"
+#include "splitting.c"
 #endif
