@@ -63,13 +63,13 @@ class Function:
     letters: str = ""
 
 
-def _languages(c: str, numpy: str, js: str) -> dict[str, str]:
-    return {"c": c, "numpy": numpy, "js": js}
+#: How each language calls a function of its library.
+_LIBRARIES = {"c": "{}", "numpy": "np.{}", "js": "Math.{}"}
 
 
-def _library(name: str, numpy: str = "") -> dict[str, str]:
-    """A function that the library of every language has."""
-    return _languages(name, f"np.{numpy or name}", f"Math.{name}")
+def _library(name: str, **other_names: str) -> dict[str, str]:
+    """Return the spellings of a function that the library of every language has, in some by ``other_names``."""
+    return {language: call.format(other_names.get(language, name)) for language, call in _LIBRARIES.items()}
 
 
 def _inverse(library: Any, a: Any) -> Any:
@@ -103,11 +103,11 @@ _LISTED = (
         known=lambda call, a: 1 - call("cos", a),
         parity="even",
         value=lambda library, a: 2 * library.sin(a / 2) ** 2,
-        written=_languages(
-            "(2.0 * sin(0.5 * ({0})) * sin(0.5 * ({0})))",
-            "(2.0 * np.sin(0.5 * ({0})) ** 2)",
-            "(2.0 * Math.sin(0.5 * ({0})) ** 2)",
-        ),
+        written={
+            "c": "(2.0 * sin(0.5 * ({0})) * sin(0.5 * ({0})))",
+            "numpy": "(2.0 * np.sin(0.5 * ({0})) ** 2)",
+            "js": "(2.0 * Math.sin(0.5 * ({0})) ** 2)",
+        },
         lanes="(2.0 * {sin}(0.5 * ({{0}})) * {sin}(0.5 * ({{0}})))",
         near=True,
     ),
@@ -119,11 +119,11 @@ _LISTED = (
         value=lambda library, a, b: a / (2 - b) if b < 1 else b / a,
         at_zero=None,
         cost=5,
-        written=_languages(
-            "({1} < 1.0 ? ({0}) / (2.0 - ({1})) : ({1}) / ({0}))",
-            "np.where({1} < 1.0, ({0}) / (2.0 - ({1})), ({1}) / ({0}))",
-            "({1} < 1.0 ? ({0}) / (2.0 - ({1})) : ({1}) / ({0}))",
-        ),
+        written={
+            "c": "({1} < 1.0 ? ({0}) / (2.0 - ({1})) : ({1}) / ({0}))",
+            "numpy": "np.where({1} < 1.0, ({0}) / (2.0 - ({1})), ({1}) / ({0}))",
+            "js": "({1} < 1.0 ? ({0}) / (2.0 - ({1})) : ({1}) / ({0}))",
+        },
         inline=True,
     ),
     Function(  # log(1 + a) without cancellation
@@ -141,11 +141,11 @@ _LISTED = (
         value=_inverse,
         at_zero=None,
         cost=5,
-        written=_languages(
-            "({0} > 0.0 ? 1.0 / ({0}) : (double)NAN)",
-            "np.where({0} > 0.0, 1.0 / ({0}), np.nan)",
-            "({0} > 0.0 ? 1.0 / ({0}) : NaN)",
-        ),
+        written={
+            "c": "({0} > 0.0 ? 1.0 / ({0}) : (double)NAN)",
+            "numpy": "np.where({0} > 0.0, 1.0 / ({0}), np.nan)",
+            "js": "({0} > 0.0 ? 1.0 / ({0}) : NaN)",
+        },
         inline=True,
     ),
     Function(  # 1/a where a > 0, else 0: its factor vanishes there, or need not change
@@ -156,11 +156,11 @@ _LISTED = (
         value=lambda library, a: 1 / a if a > 0 else 0 * a,
         at_zero=None,
         cost=5,
-        written=_languages(
-            "({0} > 0.0 ? 1.0 / ({0}) : 0.0)",
-            "np.where({0} > 0.0, 1.0 / ({0}), 0.0)",
-            "({0} > 0.0 ? 1.0 / ({0}) : 0.0)",
-        ),
+        written={
+            "c": "({0} > 0.0 ? 1.0 / ({0}) : 0.0)",
+            "numpy": "np.where({0} > 0.0, 1.0 / ({0}), 0.0)",
+            "js": "({0} > 0.0 ? 1.0 / ({0}) : 0.0)",
+        },
         inline=True,
     ),
     Function(
@@ -194,7 +194,7 @@ _LISTED = (
         slopes=lambda call, f, a: ((1 - a**2) ** -HALF,),
         parity="odd",
         defined=lambda a: abs(a) <= 1,
-        written=_library("asin", "arcsin"),
+        written=_library("asin", numpy="arcsin"),
         letters="arcsin",
     ),
     Function(
@@ -202,7 +202,7 @@ _LISTED = (
         slopes=lambda call, f, a: (-((1 - a**2) ** -HALF),),
         at_zero=None,
         defined=lambda a: abs(a) <= 1,
-        written=_library("acos", "arccos"),
+        written=_library("acos", numpy="arccos"),
         letters="arccos",
     ),
     Function(
@@ -210,7 +210,7 @@ _LISTED = (
         slopes=lambda call, f, a: (1 / (1 + a**2),),
         parity="odd",
         inverse="tan",
-        written=_library("atan", "arctan"),
+        written=_library("atan", numpy="arctan"),
         letters="arctan",
     ),
     Function(
@@ -219,7 +219,7 @@ _LISTED = (
         slopes=lambda call, f, a, b: (b * (radius := 1 / (a**2 + b**2)), -a * radius),
         at_zero=None,
         defined=lambda a, b: a != 0 or b != 0,
-        written=_library("atan2", "arctan2"),
+        written=_library("atan2", numpy="arctan2"),
     ),
     Function(
         "sinh",
@@ -250,7 +250,7 @@ _LISTED = (
         slopes=lambda call, f, a: ((1 + a**2) ** -HALF,),
         parity="odd",
         inverse="sinh",
-        written=_library("asinh", "arcsinh"),
+        written=_library("asinh", numpy="arcsinh"),
         letters="arsinh",
     ),
     Function(
@@ -258,7 +258,7 @@ _LISTED = (
         slopes=lambda call, f, a: ((a**2 - 1) ** -HALF,),
         at_zero=None,
         defined=lambda a: a >= 1,
-        written=_library("acosh", "arccosh"),
+        written=_library("acosh", numpy="arccosh"),
         letters="arcosh",
     ),
     Function(
@@ -266,7 +266,7 @@ _LISTED = (
         slopes=lambda call, f, a: (1 / (1 - a**2),),
         parity="odd",
         defined=lambda a: abs(a) < 1,
-        written=_library("atanh", "arctanh"),
+        written=_library("atanh", numpy="arctanh"),
         letters="artanh",
     ),
     Function(
@@ -274,7 +274,7 @@ _LISTED = (
         slopes=lambda call, f, a: (call("sign", a),),
         value=lambda library, a: abs(a),
         rational=True,
-        written=_languages("fabs", "np.abs", "Math.abs"),
+        written=_library("abs", c="fabs"),
         inline=True,
     ),
     Function(  # the derivative of abs
@@ -284,7 +284,7 @@ _LISTED = (
         value=lambda library, a: (a > 0) - (a < 0),
         rational=True,
         parity="odd",
-        written=_languages("(double)(({0} > 0.0) - ({0} < 0.0))", "np.sign", "Math.sign"),
+        written={"c": "(double)(({0} > 0.0) - ({0} < 0.0))", "numpy": "np.sign", "js": "Math.sign"},
         inline=True,
         letters="sgn",
     ),
@@ -297,7 +297,11 @@ _LISTED = (
         at_zero=None,
         rational=True,
         cost=2,
-        written=_languages("({0} > 0.0 ? {1} : {2})", "np.where({0} > 0.0, {1}, {2})", "({0} > 0.0 ? {1} : {2})"),
+        written={
+            "c": "({0} > 0.0 ? {1} : {2})",
+            "numpy": "np.where({0} > 0.0, {1}, {2})",
+            "js": "({0} > 0.0 ? {1} : {2})",
+        },
         inline=True,
     ),
     Function(  # base**exponent with an exponent that is not a rational number
@@ -306,7 +310,7 @@ _LISTED = (
         own=True,
         slopes=lambda call, f, a, b: (f * b / a, f * call("log", a)),
         at_zero=None,
-        written=_languages("pow", "np.power", "Math.pow"),
+        written=_library("pow", numpy="power"),
     ),
 )
 
