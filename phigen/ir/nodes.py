@@ -32,7 +32,8 @@ class Type(Enum):
     INDEX = auto()
     SIZE = auto()  # a number of elements, or the number of a row segment
     FLAG = auto()  # a small integer
-    ARRAY = auto()  # of a language without pointers
+    ARRAY = auto()  # an array of reals, in a language without pointers
+    INDICES = auto()  # an array of indices, likewise
     ARRAYS = auto()  # pointers to the first elements of several arrays of reals
 
 

@@ -82,8 +82,8 @@ def test_tables_of_neighbours_are_read_once() -> None:
           real c:0 = coef[0]
           real c:1 = coef[1]
           real c:2 = coef[2]
-          array near:1 = sites.near[1]
-          array near:0 = sites.near[0]
+          indices near:1 = sites.near[1]
+          indices near:0 = sites.near[0]
           plain i in 0..count:
             real q = x[i]
             index beside:1 = near:1[i]

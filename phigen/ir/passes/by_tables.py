@@ -1,4 +1,17 @@
-"""Lowering by tables: one array has the fields of all sites, and tables of site numbers give the neighbours."""
+"""Lowering by tables: one array has the fields of all sites, and tables of site numbers give the neighbours.
+
+Functions receive coefficients or parameters, arrays of reals, and the record ``sites``. The runtime of a target fills
+this record:
+
+- ``count``, the number of sites; ``params``, where parameters at sites and at bonds are arrays; the time ``t``;
+- ``near``, for each offset the neighbours of all sites; ``present``, for each term at open ends 1 or 0 at each site;
+- ``coloured``, ``inside`` and ``beside``, the sites that a sweep updates; ``colours``, the colour of each site;
+- ``sums`` over bonds or pairs, one after another; ``dw``, the increments of noise; values that parameters determine;
+- ``massive``, the end of the sites that have a mass, in sums over pairs.
+
+It has the functions ``bonds`` and ``begins`` of ``sites``, and ``fill``, ``placed`` and ``joinSums``. The model is
+``templates/js/runtime/sites.mjs``.
+"""
 
 from __future__ import annotations
 
@@ -93,7 +106,7 @@ class _Tables:
         sites = _sites_of(s.selection)
         if not sites:
             return ir.Loop("plain", body, "i", ir.Constant(s.selection.first), COUNT)
-        self.head.insert(0, ir.Declare(ir.Type.ARRAY, ((chosen.symbol, sites),)))
+        self.head.insert(0, ir.Declare(ir.Type.INDICES, ((chosen.symbol, sites),)))
         return _counted("k", ir.Member(chosen, "length"), (ir.index(SITE, ir.Entry(chosen, NUMBER)), *body))
 
     def _lowered(self, s: ir.Statement, selection: ir.Selection) -> Iterator[ir.Statement]:
@@ -148,10 +161,10 @@ class _Tables:
         """Return the array of a parameter at sites or at bonds."""
         return self._hoisted(Symbol("at", name), ir.Member(self.params, name))
 
-    def _hoisted(self, name: Symbol, value: ir.Value) -> ir.Name:
+    def _hoisted(self, name: Symbol, value: ir.Value, kind: ir.Type = ir.Type.ARRAY) -> ir.Name:
         if name not in self.hoisted:
             self.hoisted.add(name)
-            self.head.append(ir.Declare(ir.Type.ARRAY, ((name, value),)))
+            self.head.append(ir.Declare(kind, ((name, value),)))
         return ir.Name(name)
 
     def _site(self, load: ir.Load) -> ir.Value:
@@ -164,7 +177,7 @@ class _Tables:
         site = self._site(load)
         if isinstance(site, ir.Name) and site not in (SITE, OTHER) and site.symbol not in self.hoisted:
             number = self.lattice.neighbours.index(load.offset)
-            table = self._hoisted(Symbol("near", number), ir.entry(ir.Member(SITES, "near"), number))
+            table = self._hoisted(Symbol("near", number), ir.entry(ir.Member(SITES, "near"), number), ir.Type.INDICES)
             self.hoisted.add(site.symbol)
             yield ir.index(site, ir.Entry(table, SITE))
 
