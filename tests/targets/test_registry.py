@@ -26,7 +26,7 @@ def test_the_files_of_a_target_have_its_suffixes_and_tell_it(program, target):
 
 @pytest.mark.parametrize(
     ("target", "hint"),
-    [("numpyy", "did you mean 'numpy'"), ("JavaScript", "did you mean 'js'"), ("fortran", "there are c, numpy")],
+    [("numpyy", "did you mean 'numpy'"), ("JavaScript", "did you mean 'js'"), ("cobol", "there are c, numpy")],
 )
 def test_an_unknown_target_is_an_error_with_a_hint(program, target, hint):
     with pytest.raises(ValueError, match=f"unknown target '{target}'; {hint}"):
