@@ -51,7 +51,8 @@ def pytest_configure(config):
     )
     config.addinivalue_line(
         "markers",
-        "thin(n): of its quick cases one in n is, drawn by their names; of all its cases, one in two is made by --all",
+        "thin(n, of_all=m): quick tests make one in n of the quick cases, drawn by their names; --all makes one in m, "
+        "2 by default, of all cases",
     )
     config.addinivalue_line("markers", "few(*cases, of): of the cases `of`, those beside the named ones are slow")
 
@@ -62,7 +63,9 @@ def pytest_collection_modifyitems(config, items):
         return
     selected = _thinned([item for item in items if not _is_slow(item)], lambda mark: mark.args[0])
     if config.option.all or config.option.markexpr:
-        selected |= _thinned([item for item in items if not _is_alike(item)], lambda mark: ONE_IN)
+        selected |= _thinned(
+            [item for item in items if not _is_alike(item)], lambda mark: mark.kwargs.get("of_all", ONE_IN)
+        )
     remaining = [item for item in items if item in selected]
     config.hook.pytest_deselected(items=[item for item in items if item not in selected])
     items[:] = remaining

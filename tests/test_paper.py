@@ -53,6 +53,7 @@ def test_long_run_goes_on_as_it_began():
     assert measured["Casimir, PHI-2: largest error up to t = 10000"] < 1e-13
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["poisson_not_hamiltonian", "foliation"], PLATES))
 def test_figures_are_current_and_small(name):
     path = DOCS / "figures" / f"{name}.svg"
@@ -71,6 +72,7 @@ def test_page_can_be_followed(tmp_path):
     assert follow(DOCS / "paper.md", tmp_path) == 5
 
 
+@pytest.mark.slow
 def test_command_makes_one_figure_and_refuses_unknown_ones(tmp_path):
     runner = CliRunner()
     result = runner.invoke(

@@ -123,6 +123,7 @@ def test_the_attitude_is_that_of_the_state_where_an_increment_is_refused():
     assert (stopped.steps, [*stopped.state(), *stopped.element()]) == (1, [*whole.state(), *whole.element()])
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("case", CASES)
 def test_members_have_the_bits_of_runs_alone(case, target):

@@ -258,6 +258,7 @@ OTHERS: dict[str, tuple[str, Tampering, str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("how", OTHERS)
 def test_certificates_with_polynomials_and_paths_that_claim_too_much_are_refused(how: str) -> None:
     name, tamper, words = OTHERS[how]
@@ -344,6 +345,7 @@ def test_what_cannot_be_certified_is_refused_with_a_hint(name: str, changes: dic
     assert "smaller box" in refusal.value.hint
 
 
+@pytest.mark.slow
 def test_boxes_are_divided_where_one_is_too_large() -> None:
     stated, files = problem("predator_prey")
     wide = dataclasses.replace(stated, domain=[[4, 12], [4, 12]])
@@ -434,6 +436,7 @@ def test_derivatives_are_limits_of_differences() -> None:
         assert abs(slopes[0, 1] - by_b) < 1e-12
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("name", ["pendulum_euler", "satellite_wheels"])
 def test_the_list_of_operations_in_doubles_is_the_c_bit_for_bit(name: str) -> None:
     """For steps without iterations, of C that is compiled without fused operations."""

@@ -87,6 +87,7 @@ def test_verbose_lists_stages_without_a_terminal(phigen, write):
     assert phigen("check", "a.yaml").stderr.startswith("a.yaml: ")
 
 
+@pytest.mark.slow
 def test_emission_the_compiler_and_measurements_are_stages(phigen, write):
     written = phigen("build", "-v", "--compile", write("a.yaml")).stderr.splitlines()
     assert [line for line in written if line in ("a: emission of c", "a: C compiler")] == [

@@ -337,6 +337,7 @@ def asked(monkeypatch):
     return asked_of
 
 
+@pytest.mark.slow
 def test_verify_makes_steps_in_tau_up_to_a_physical_time(phigen, write, asked):
     """As many as the run: 5 of t are 6.63 of τ."""
     spec = write("spec.yaml", BODY)
@@ -396,6 +397,7 @@ def test_report_shows_the_run_up_to_its_end(phigen, write, monkeypatch, text, na
     assert said in page
 
 
+@pytest.mark.slow
 def test_states_are_stored_at_equal_times_of_a_run_of_so_many_steps_in_tau(phigen, write):
     """Its end is known when all steps are made."""
     spec = write("spec.yaml", BODY.replace("until: 5, stride: 5}", "steps: 100, every: 0.5}"))
@@ -464,6 +466,7 @@ def test_times_of_a_spec_are_those_of_the_command_line(phigen, swing):
     np.testing.assert_allclose(solver.run("listed").x, rows[:, 1:3], atol=1e-14)
 
 
+@pytest.mark.thin(4, of_all=1)
 @pytest.mark.parametrize("until", ["6.05", "6.0", "6.3"])
 @pytest.mark.parametrize(("text", "run"), [(SWING, "until"), (BODY, "tumbling"), (SWING, "stopped")])
 def test_the_command_and_python_have_the_same_rows(text, run, until, phigen, tmp_path, monkeypatch):

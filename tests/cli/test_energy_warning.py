@@ -98,6 +98,7 @@ def test_runs_that_cannot_be_warned_about_are_not_compared_with_rk4(error, steps
         assert not energy_warning.compares_with_rk4(compilation, target, unknown, steps)
 
 
+@pytest.mark.slow
 def test_a_method_that_breaks_down_at_once_has_infinite_errors(phigen, write, monkeypatch):
     """A field that is not a number where RK4 evaluates it leaves no row after the start."""
     monkeypatch.setitem(classical.METHODS, "rk4", (lambda f, x, h: np.full_like(x, np.nan), 4))

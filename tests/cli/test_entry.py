@@ -39,6 +39,7 @@ finally:
     assert "heavy: []" in process.stderr
 
 
+@pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize("name", ["pendulum", "toda3", "fput"])
 def test_build_imports_no_numerical_library(name, tmp_path):
     """NumPy takes as long to import as a small system takes to compile."""

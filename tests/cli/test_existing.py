@@ -35,6 +35,7 @@ def spec(request, write):
     return write("spec.yaml", {"swing": OSCILLATOR, "chain": LATTICE}[request.param])
 
 
+@pytest.mark.thin(4, of_all=1)
 @pytest.mark.few("a.csv", "a.svg", of=FILES)
 @pytest.mark.parametrize(
     ("option", "file"), [("-o", "a.csv"), ("-o", "a.npz"), ("--plot", "a.svg"), ("--plot", "a.pdf")]
@@ -57,6 +58,7 @@ def test_an_archive_of_others_is_no_table(phigen, in_tmp):
     assert phigen("run", "harmonic_oscillator", "-o", "a.npz").exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_continued_file_is_not_replaced(phigen, in_tmp):
     assert "wrote a.csv" in phigen("run", "harmonic_oscillator", "-o", "a.csv").stderr
     assert "wrote a.csv" in phigen("run", "harmonic_oscillator", "-o", "a.csv", "--extend", "--steps", 10).stderr
@@ -84,6 +86,7 @@ def test_figures_of_other_commands_are_replaced_by_force_only(phigen, write, in_
     assert (in_tmp / "a.svg").read_bytes() == drawn
 
 
+@pytest.mark.thin(3, of_all=1)
 @pytest.mark.few("a.csv", "a.npz", "a.pdf", "a.zarr", of=FILES)
 @pytest.mark.parametrize(
     ("text", "option", "file"),

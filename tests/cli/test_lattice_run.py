@@ -50,6 +50,7 @@ def ring(offsets, size):
     )
 
 
+@pytest.mark.slow
 def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
     spec = tmp_path / "ring.yaml"
     spec.write_text(ring([1, 2, 4], 5), encoding="utf-8")
@@ -79,6 +80,7 @@ def test_what_names_a_splitting_says_which_sizes_would_take_fewer_colours_or_no_
     assert said in phigen("check", spec).stdout
 
 
+@pytest.mark.slow
 def test_a_run_is_drawn_over_space_and_time(phigen, chain, tmp_path):
     pytest.importorskip("matplotlib")
     result = phigen("run", chain, "-t", "numpy", "--lyapunov", "--plot", tmp_path / "wave.svg")

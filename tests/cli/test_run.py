@@ -204,6 +204,7 @@ def test_memory_does_not_grow_with_the_length_of_a_run(phigen, in_tmp, monkeypat
     assert long < 1.2 * short
 
 
+@pytest.mark.slow
 def test_section_and_exponents_are_told(phigen, in_tmp):
     result = phigen("run", *EVERYTHING, "--steps", 3000, "--section", "s.npz", "--json")
     document = json.loads(result.stdout)
@@ -240,6 +241,7 @@ def test_folders_that_are_not_there_are_told_before_the_work(phigen, in_tmp, com
     assert "there is no folder 'lost'" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", slow_but(["svg"], ["png", "svg", "pdf"]))
 def test_the_same_run_is_drawn_with_the_same_bytes(phigen, write, suffix):
     path = write("a.yaml")

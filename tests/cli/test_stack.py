@@ -35,6 +35,7 @@ def stated():
     return {name: int(value) for name, value in re.findall(r"body_(STACK\w*) = (\d+)", header)}
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("flags", ["-O2", "-Os -fno-inline"])
 def test_header_states_the_stack_of_the_chain_of_calls(phigen, flags):
     """Each function of the chain has the size that gcc prints for it; without inlining the chain has several."""
@@ -56,6 +57,7 @@ def test_header_states_the_stack_of_the_chain_of_calls(phigen, flags):
     assert phigen(*WORDS, "--stack=-O0", "--check").exit_code == 5
 
 
+@pytest.mark.slow
 def test_stack_used_by_a_running_step_is_within_the_bound(phigen, write):
     """A program paints the memory below its frame, makes a step, and looks how far the paint is gone."""
     assert phigen(*WORDS, "--stack=-O2").exit_code == 0
@@ -122,6 +124,7 @@ def test_functions_that_are_called_by_others_belong_to_the_chain(monkeypatch):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "options"),
     [

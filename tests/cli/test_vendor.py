@@ -278,6 +278,7 @@ def test_wrong_usage_is_explained(phigen, write):
     assert not Path("ext").exists()
 
 
+@pytest.mark.slow
 def test_build_files_are_kept_up_with_the_solvers(phigen, vendored, write):
     phigen("vendor", EXT, "--cmake", "--meson")
     assert solvers().keys() == {"a", "b"}

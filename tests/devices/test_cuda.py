@@ -45,6 +45,7 @@ def test_small_systems_stay_in_registers(name, architecture, tmp_path):
     assert common.registers < used.registers
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("architecture", nvrtc.ARCHITECTURES)
 def test_four_blocks_of_a_rigid_body_fit_into_the_registers_of_a_multiprocessor(architecture, tmp_path):
     """With 65,536 registers; without spills. Three blocks fit by default."""

@@ -96,6 +96,7 @@ def test_a_run_is_drawn_on_one_page():
     assert len(lyapunov_figure(spectrum).axes[0].lines) == 3
 
 
+@pytest.mark.slow
 def test_svg_is_a_function_of_what_it_shows():
     first, second = (svg(error_figure({"a": spiral(), "b": spiral(broken=20)})) for _ in range(2))
     assert first == second

@@ -67,6 +67,7 @@ def test_polynomial_leads_from_the_start_of_the_step_to_its_end(case):
         assert other == pytest.approx(inside[0], abs=1e-14)
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("stages", slow_but([3], [2, 3]))
 def test_polynomial_has_the_order_of_its_degree_and_steps_back_that_of_the_method(stages):
     method, fine = (solver(compile_text(PENDULUM, order), "c") for order in (2 * stages, 16))

@@ -56,6 +56,7 @@ def test_unknowns_that_depend_on_themselves_are_iterated_all():
     assert reduced(MAGNETIC) is None
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("text", [HENON + "4", HENON + "12", HENON + "16", NAMBU])
 def test_reduced_sweeps_solve_the_equations_of_all_unknowns(text):
     """NumPy iterates all unknowns."""

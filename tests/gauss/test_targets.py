@@ -187,6 +187,7 @@ def in_single_precision(name, order):
     return replace(double, program=replace(double.program, extras=replace(double.program.extras, real="float")))
 
 
+@pytest.mark.slow
 def test_energy_does_not_drift_in_single_precision():
     """Over 20,000 steps it wanders by some units of rounding."""
     compilation = in_single_precision("henon_heiles", 12)

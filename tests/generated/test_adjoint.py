@@ -142,6 +142,7 @@ def test_a_splitting_whose_brackets_are_all_zero_pulls_back_what_it_is_given(tar
     assert [*back.x0_bar, back.parameters_bar["a"]] == [3, 4, 0]
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("kind", [k for k in KINDS if "monitor" not in k])
 def test_pullback_is_the_transpose_of_the_tangent_map(kind, target):

@@ -150,6 +150,7 @@ def of_every_library(tmp_path_factory):
     return symbols_in(folder / "empty.so")
 
 
+@pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize("name", NAMES)
 def test_library_has_no_state_and_needs_only_libm(name, of_every_library):
     """No heap, no input or output, no writable globals: reentrant."""

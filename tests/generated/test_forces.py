@@ -186,6 +186,7 @@ def test_an_ensemble_takes_the_steps_of_its_members():
     assert run == pytest.approx(np.array(single), abs=1e-13)
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("kind", slow_but(["populations"], ["populations", "path"]))
 def test_verification_asks_for_what_is_promised(kind):
     """The derivative is that of a step though ∂(∇S + hζ) is not symmetric; energy and Poisson are not judged."""

@@ -31,6 +31,7 @@ def by_hand(name: str, x: np.ndarray, h: float, steps: int, seed: int) -> np.nda
     return session.state()
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("name", slow_but({*NAMES} - {"xxz"}, NAMES))  # with open ends it is the same and more
 def test_sweeps_by_hand_in_pieces_have_the_bits_of_steps(name: str) -> None:
     x = start(name, SIZES.get(name, (40,)))

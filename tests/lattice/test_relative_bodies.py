@@ -124,6 +124,7 @@ def test_the_change_the_parts_and_their_flows_are_proved(change: str, momenta: b
     assert {s.verdict for s in statements} == {"proved"}
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize(("change", "momenta", "axes"), [
     ("jacobi", False, "xyz"), ("democratic_heliocentric", False, "xyz"),
     ("jacobi", True, "xy"), ("democratic_heliocentric", True, "xyz"),
@@ -139,6 +140,7 @@ def test_orbits_are_those_of_the_equations_of_motion(change: str, momenta: bool,
         np.testing.assert_allclose(run.x[-1], expected, rtol=0, atol=2e-10)
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize(("composition", "order"), [("saba-8-2", 2), ("blanes-moan", 4), ("blanes-moan", 6)])
 def test_the_order_is_that_of_the_composition(change: str, composition: str, order: int) -> None:
@@ -191,6 +193,7 @@ def written_out(count: int, change: str, composition: str, order: int) -> str:
     )
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize(("composition", "order"), [("wisdom-holman-17", 2), ("aba-8-6-4", 4), ("wisdom-holman", 2)])
 def test_a_lattice_is_its_ordinary_spec(change: str, composition: str, order: int) -> None:
@@ -224,6 +227,7 @@ def test_two_bodies_move_exactly(change: str) -> None:
         assert abs(run.x[-1] - reference(x, m, 7.0)).max() > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_particles_without_mass_do_nothing_to_others(change: str, target: str) -> None:
@@ -266,6 +270,7 @@ def test_a_swarm_costs_in_proportion_to_its_particles() -> None:
         CDLL("libgomp.so.1").omp_set_num_threads(2)
 
 
+@pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize(
     ("change", "composition"), [*((c, "aba-10-6-4") for c in CHANGES), ("jacobi", "wisdom-holman-5")]
 )
@@ -313,6 +318,7 @@ def test_a_first_body_without_mass_is_refused_at_its_place() -> None:
     assert caught.value.diagnostics[0].location.line == 5
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_collision_is_an_error_and_a_hyperbola_is_not(change: str, target: str) -> None:

@@ -60,6 +60,7 @@ def test_steps_and_failures_of_blocks_are_those_of_single_steps(name):
         np.testing.assert_allclose(raw.x, x, rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize("members", [1, 11])
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_members_that_fail_leave_their_group_as_they_would_alone(name, members):

@@ -70,6 +70,7 @@ def test_failing_run_has_a_page_that_says_where(phigen):
     assert "The run could not be completed" in page
 
 
+@pytest.mark.slow
 def test_solver_that_falls_short_has_a_page_with_the_verdict(phigen, monkeypatch):
     monkeypatch.setattr(verification, "ONE_STEP", 0.0)
     result = phigen(write(), "--quick")

@@ -53,6 +53,7 @@ def test_damaged_entry_is_rebuilt(cache_directory, compilations, damage):
     assert len(compilations) == 2
 
 
+@pytest.mark.slow
 def test_concurrent_processes_share_one_directory(cache_directory):
     code = f"from phigen.runtime import cache; assert cache.load({FILES!r}).one() == 1"
 

@@ -113,6 +113,7 @@ ASKING = (
 )
 
 
+@pytest.mark.slow
 def test_a_run_puts_what_it_asks_for_into_its_files(tmp_path, monkeypatch):
     xarray = pytest.importorskip("xarray")
     monkeypatch.chdir(tmp_path)

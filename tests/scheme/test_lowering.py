@@ -93,6 +93,7 @@ def state_and_coefficients(compilation):
     return at
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("name", NAMES)
 def test_assignments_compute_the_roots(name):
     compilation = compiled(name)

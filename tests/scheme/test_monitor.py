@@ -65,6 +65,7 @@ def test_it_is_the_system_with_the_pair_typed_by_hand(order):
     np.testing.assert_allclose(run.tau, STEP * np.arange(61))
 
 
+@pytest.mark.slow
 def test_a_hundred_steps_a_period_keep_the_energy_of_an_eccentric_orbit_without_drift(kepler):
     run = kepler[1]["c"].integrate(START, STEP, 2000)
     errors = np.abs(run.energy + E) / E

@@ -187,6 +187,7 @@ def test_a_failed_run_in_javascript_leaves_the_state():
         assert x == [1, 0, 0, 0, 0, 1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", TARGETS)
 def test_members_are_single_runs(target):
     integrator = solver(compilation("wisdom-holman-7", RADIAL), target)

@@ -38,6 +38,7 @@ def test_orbit_and_spin_are_one_part_and_the_oblateness_is_the_small_one():
     assert earth_moon().program.step.composition == "aba-10-6-4"
 
 
+@pytest.mark.slow
 def test_two_steps_a_month_are_as_good_as_forty_of_kinetic_energy_and_potential(monkeypatch):
     """At an energy error of 1e-8, methods of order 4 of both."""
     monkeypatch.setattr(compiler, "split", lambda system, **_: split(system, motions=False))

@@ -41,6 +41,7 @@ def newton(_, y):
     )
 
 
+@pytest.mark.slow
 def test_they_obey_the_equations_of_newton():
     """A Runge–Kutta method follows all nine bodies for a hundred days."""
     exact = solve_ivp(newton, (0, 100), np.concatenate(bodies(START)).ravel(), "DOP853", rtol=1e-12, atol=1e-14).y[

@@ -30,6 +30,7 @@ def equations(_, x):
     return [*(np.cross(m, rate) + torque), *np.cross(normal, rate), *np.cross(vertical, rate), *wheels]
 
 
+@pytest.mark.slow
 def test_it_solves_the_equations_of_the_body_with_order_four():
     """A Runge–Kutta method solves equations that are written down by hand."""
     exact = solve_ivp(equations, (0, 4), START, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]

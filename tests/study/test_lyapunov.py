@@ -44,6 +44,7 @@ def test_strongly_unstable_steps_lose_no_direction():
     assert abs(exponents.pairing) < 1e-10
 
 
+@pytest.mark.slow
 def test_exponents_of_an_integrable_system_fall_like_log_t_over_t():
     exponents = spectrum(solver(compiled("rigid_body").spec), [0.45, 0.0, 0.89], 0.05, 8000)
     bound = 3 * np.log(exponents.times) / exponents.times

@@ -234,6 +234,7 @@ def test_command_for_machines_and_exit_code(file, monkeypatch):
     assert "reversibility" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "predator_prey"]))
 def test_every_row_has_a_meaning_which_the_documentation_gives(name):
     compilation = compile_spec(compiled(name).spec, tangent=True)

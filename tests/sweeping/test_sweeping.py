@@ -579,6 +579,7 @@ def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path, monk
     assert titles == [f"final: {c}, mean over the sites, median over seed" for c in spec.coordinates]
 
 
+@pytest.mark.slow
 def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path):
     from phigen.cli import group
 
@@ -699,6 +700,7 @@ sweeps: {s: {over: {k: {from: 0.1, to: 3, count: 3}, seed: {count: 2}}, keep: [e
 """
 
 
+@pytest.mark.slow
 def test_large_energy_errors_of_lattices_are_counted_in_the_unit_of_runs(cluster, tmp_path):
     from phigen.cli import group
 

@@ -144,6 +144,7 @@ def test_awkward_names_can_be_coordinates_of_an_explicit_system(tmp_path):
     agree(compilation, np.linspace(0.5, 1.5, len(names)))
 
 
+@pytest.mark.slow
 def test_awkward_names_can_be_coordinates_of_an_implicit_system(tmp_path):
     names = ["x", "h", "p", "coef", "params", "t1", "M_E", "_X", "np", "__debug__"]
     rows = [[i - j if (i + j) % 2 else 0 for j in range(len(names))] for i in range(len(names))]

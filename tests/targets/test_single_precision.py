@@ -182,6 +182,7 @@ def test_a_site_beyond_single_precision_is_named():
     assert np.isfinite(failure.value.trajectory[0]).all()
 
 
+@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize(
     ("name", "functions"),
     [("rigid_body", ("phi0", "phi1")), ("satellite_wheels", ("cosroot", "sinroot", "sin", "versin"))],
