@@ -68,6 +68,17 @@ def test_an_option_changes_the_step_or_is_refused(scheme, option):
         assert method(compilation.program) != method(unchanged.program)
 
 
+@pytest.mark.parametrize("setting", ["max_iterations: 7", "tolerance: 1e-8"])
+def test_implicit_lattices_refuse_settings_of_the_inner_solve(setting):
+    refusal = attempted(f"{CHAIN}solver: {{{setting}}}\n", "series")
+    assert f"solver: {setting.partition(':')[0]} is not for lattices" in str(refusal)
+    assert "<string>:7:" in str(refusal)
+
+
+def test_implicit_lattices_may_name_the_usual_tolerance():
+    assert compile_text(f"{CHAIN}solver: {{tolerance: auto}}\nscheme: series\n").program.step.equation
+
+
 @pytest.mark.parametrize("scheme", NAMED)
 def test_a_lattice_is_compiled_by_the_scheme_that_it_names_or_refused(scheme):
     compilation = attempted(CHAIN, scheme)
