@@ -242,7 +242,10 @@ def interface_of(program: Program) -> Interface:
         return replace(interface, ensemble=ensemble_launch(program))
     from phigen.targets.device.launches import launches
 
-    sites = step.sites
+    sites, relative = step.sites, step.relative
+    if relative:  # momenta of bodies without mass have no velocities
+        bound = "positive" if relative.momenta else "nonnegative"
+        interface = replace(interface, **{bound: getattr(interface, bound) | {relative.mass}})
     every_other = bool(step.partners and not step.partners.graph)
     return LatticeInterface(
         **vars(interface),
@@ -260,6 +263,7 @@ def interface_of(program: Program) -> Interface:
         pairs=every_other,
         compensated=program.compensated,
         at_bonds=sites.at_bonds,
+        masses=relative.mass if relative else "",
         colours=sites.colours,
         colour_weights=sites.weights,
         launches=launches(program, step),

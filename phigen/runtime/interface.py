@@ -96,6 +96,7 @@ class LatticeInterface(Interface):
     pairs: bool = False  # whether every pair of sites interacts
     compensated: bool = False  # whether the C stores a compensation term for each field
     at_bonds: tuple[str, ...] = ()
+    masses: str = ""  # parameter with the masses of bodies in relative coordinates, the first of which is positive
     observed_fields: tuple[str, ...] = ()  # observables with a value at each site
     colours: int = 1
     # colour of a site: the sum of weights times position, modulo the number of colours

@@ -995,6 +995,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
                 raise ValueError(f"parameter {name!r} must be finite at all {domain}")
             if violated := arguments.broken_bound(name, array, interface):
                 raise ValueError(f"parameter {name!r} must be {violated} at all {domain}")
+            if name == interface.masses and not array.flat[0] > 0:
+                raise ValueError(f"parameter {name!r} must be positive at the first site, about which the others move")
             values[name] = array
         return values | bonds
 

@@ -20,6 +20,7 @@ from phigen.compiler import compile_spec, emit, examine
 from phigen.errors import SpecError, StepError
 from phigen.lattice.states import start_of
 from phigen.runtime.lattice import LatticeSolver
+from phigen.study.lattice_verification import verify_lattice
 
 TEXT = """\
 phigen: 1
@@ -297,17 +298,56 @@ def test_all_targets_agree(change: str, composition: str, tmp_path: Path) -> Non
             np.testing.assert_allclose(carried[target][1], carried["c"][1], rtol=0, atol=1e-12)
 
 
+UNBOUNDED = {False: ", nonnegative: true", True: ", positive: true"}
+MASSES_NOT_ALLOWED = {
+    "negative": ([1, -1e-3, 0], False, "must be nonnegative at all sites"),
+    "not finite": ([1, np.nan, 0], False, "must be finite at all sites"),
+    "no first mass": ([0, 1, 1], False, "must be positive at the first site"),
+    "no mass at all": (0.0, False, "must be positive at the first site"),
+    "momenta": ([1, 1e-3, 0], True, "must be positive at all sites"),
+}
+
+
 @pytest.mark.parametrize("target", ["c", "numpy"])
-def test_masses_are_checked(target: str) -> None:
-    free = text().replace(", nonnegative: true", "")
-    x = orbits(3)
-    for m in ([1, -1e-3, 0], [0, 1, 1], [1, np.nan, 0]):
-        with pytest.raises((StepError, ValueError)):
-            solver(free, target).integrate(x, h=0.1, steps=1, m=np.array(m, dtype=float))
-    solver(free, target).integrate(x, h=0.1, steps=1, m=np.array([1, 1e-3, 0]))
-    of_momenta = text(momenta=True).replace(", positive: true", "")
-    with pytest.raises((StepError, ValueError)):
-        solver(of_momenta, target).integrate(x, h=0.1, steps=1, m=np.array([1, 1e-3, 0]))
+@pytest.mark.parametrize("name", MASSES_NOT_ALLOWED)
+def test_masses_are_checked(name: str, target: str) -> None:
+    m, momenta, message = MASSES_NOT_ALLOWED[name]
+    spec = text(momenta=momenta).replace(UNBOUNDED[momenta], "")
+    with pytest.raises(ValueError, match=message):
+        solver(spec, target).integrate(orbits(3), h=0.1, steps=1, m=np.array(m, dtype=float))
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_solvers_refuse_masses_without_a_finite_sum(change: str, tmp_path: Path) -> None:
+    x, huge = orbits(4), np.array([1, 1e308, 1e308, 1e308])
+    for target in ("c", "numpy"):
+        with pytest.raises(StepError, match="no step can be made"):
+            solver(text(change), target).integrate(x, h=0.1, steps=1, m=huge)
+    (module,) = emit(compiled(text(change)).program, "js", "").values()
+    (tmp_path / "bodies.mjs").write_text(module, encoding="utf-8")
+    options = {"x0": x.ravel().tolist(), "sizes": [4], "params": {"m": huge.tolist()}}
+    (answer,) = answers(
+        SCRIPT, [{"module": (tmp_path / "bodies.mjs").as_uri(), "h": 0.1, "steps": 1, "options": options}]
+    )
+    assert answer["status"] == "BAD_ARGUMENT"
+
+
+RUN = "runs: {one: {initial: {x: [POSITIONS], y: 0, vx: 0, vy: [SPEEDS]}, step: 0.1, steps: 40}}\n"
+
+
+@pytest.mark.parametrize("masses", ["0.3", "0, 0, 1.0e-3", "0, 1.0e-3, 0, 2.0e-4, 0, 0, 0, 0"])
+def test_bodies_are_verified_on_a_few_of_them_with_the_first(masses: str) -> None:
+    count = 1 + len(masses.split(","))
+    run = RUN.replace("POSITIONS", ", ".join(map(str, range(count))))
+    run = run.replace("SPEEDS", ", ".join(f"{i and i**-0.5:.3f}" for i in range(count)))
+    spec = phigen.spec.loads(
+        text(axes="xy", composition="saba-4-2", order=2).replace("value: 0", f"value: [1, {masses}]") + run
+    )
+    compilation = compile_spec(spec, tangent=True)
+    solvers = {t: lattice_solver_of(compilation, t) for t in ("c", "numpy")}
+    verification = verify_lattice(compilation.by_sweeps(), solvers, "one", start_of(spec, spec.runs["one"]), 0.1, 40)
+    assert [c.name for c in verification.checks if not c.passed] == []
+    assert f"Poisson identity on {min(count, 3)} sites" in {c.name.split(",")[0] for c in verification.checks}
 
 
 def test_a_first_body_without_mass_is_refused_at_its_place() -> None:

@@ -10,8 +10,8 @@
    Positions are relative to the centre of mass of all bodies before (Jacobi), or to the first body (democratic
    heliocentric); velocities then are those from the centre of mass. */
 
-/* Compute the masses that Kepler motions are about; 0 if a mass is negative, or 0 where none may be: that of the first
-   body, and of bodies with momenta, whose velocities would be undefined. */
+/* Compute the masses that Kepler motions are about; 0 if the mass of all bodies is not finite, or a mass is negative, or
+   0 where none may be: that of the first body, and of bodies with momenta, whose velocities would be undefined. */
 static int phi_weigh(phi_solver *s)
 {
     const double *m = s->x[PHI_MASS];
@@ -20,12 +20,11 @@ static int phi_weigh(phi_solver *s)
     for (ptrdiff_t i = 0; i < s->length; ++i) {
         if (m[i] < 0.0 PHI_OR_NO_MASS(m[i])) return 0;
         if (m[i] > 0.0) s->massive = i + 1;
-#if PHI_JACOBI
         sum += m[i];
+#if PHI_JACOBI
         s->x[PHI_INNER][i] = sum;
 #else
-        sum = m[0];
-        s->x[PHI_INNER][i] = sum;
+        s->x[PHI_INNER][i] = m[0];
 #endif
     }
     return m[0] > 0.0 && isfinite(sum);

@@ -13,5 +13,8 @@ size_t phi_work_size(const size_t sizes[PHI_AXES]);
    PHI_BAD_ARGUMENT if sizes are not admissible, params or a required array is NULL, x0 or a parameter is not finite, or
    one that must be positive is not. */
 #endif
+#if PHI_BODIES
+/* It also returns PHI_BAD_ARGUMENT if a mass is negative, that of the first body is 0, or the sum of all is not finite. */
+#endif
 phi_status phi_init(phi_solver *s, const phi_params *params, PHI_SIZES, const double *x0, void *work);
 #endif

@@ -10,12 +10,13 @@ import { bodiesFrom, innerMasses, relativeFrom } from "./bodies_jacobi.mjs";
 /** Compute the masses that Kepler motions are about, and the number of bodies up to the last with a mass. */
 export function weigh(sites) {
   const m = sites.params[MASS];
-  if (!(m[0] > 0) || m.some((mass) => mass < 0)) {
-    throw new StepError("BAD_ARGUMENT", 0, "masses must not be negative, and the first body must have one");
+  sites.mass = m.reduce((sum, mass) => sum + mass, 0);
+  if (!(m[0] > 0) || m.some((mass) => mass < 0) || !Number.isFinite(sites.mass)) {
+    const message = "masses must not be negative, their sum must be finite, and the first body must have a mass";
+    throw new StepError("BAD_ARGUMENT", 0, message);
   }
   expectMasses(m);
   sites.massive = m.findLastIndex((mass) => mass > 0) + 1;
-  sites.mass = m.reduce((sum, mass) => sum + mass, 0);
   sites.inner = innerMasses(m);
 }
 
