@@ -2,7 +2,7 @@
 
 from phigen import interrupts
 
-interrupts.obey()  # before the imports that take time
+interrupts.obey()  # Before the imports that take time, so that Ctrl-C ends the process during them too.
 
 
 def main() -> None:

@@ -42,10 +42,10 @@ Source: TypeAlias = "str | PathLike[str] | Spec | System | LatticeSystem | Compi
 
 
 def load(path: str | PathLike[str]) -> System | LatticeSystem:
-    """Return the system in a spec file, or in the bundled spec of that name; its ``spec`` holds the other parts of
-    the file.
+    """Return the system in a spec file, or in the bundled spec of that name.
 
-    A lattice is a `LatticeSystem`. Raises `SpecError` with all errors of the file.
+    The result is a `System`, or for a lattice a `LatticeSystem`. Its attribute ``spec`` holds the other parts of the
+    file. Raises `SpecError` with all errors of the file.
     """
     spec = specs.load(resources.file_of(fspath(path)))
     try:
@@ -98,14 +98,17 @@ def compile(
     """Return a solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled spec.
 
     ``target`` is ``c``, ``numpy``, ``opencl``, ``cuda``, or ``auto``: C if there is a compiler, else NumPy with a
-    `PhigenWarning`. On ``opencl`` and ``cuda``, ensembles and lattices run on a device, see `Solver.device`;
-    ``device`` selects one by its number. ``order`` overrides the order of the spec, ``scheme`` (``series``,
-    ``splitting``, ``gauss``, ``auto``) its scheme; ``tangent`` adds `Solver.step_tangent`, ``adjoint`` adds
-    `Solver.pullback` and `Solver.jacobian`, in addition to the parts that the spec requests. The code has the
-    profile ``fast``, or ``profile``; the profile in a spec is for ``phigen build``. Compiled C is cached by its
-    content. Returns a `Solver`, for a lattice a `LatticeSolver`. Raises `SpecError`, `LimitError`, `CheckError` if
-    the mathematics is refuted, e.g. if π is not Poisson, and `ToolchainError` if C was requested and there is no
-    working compiler, or the one named in CC does not work.
+    `PhigenWarning`. On ``opencl`` and ``cuda``, ensembles and lattices run on a device, see `Solver.device`; ``device``
+    selects one by its number.
+
+    ``order`` overrides the order of the spec, and ``scheme`` (``series``, ``splitting``, ``gauss``, ``auto``) its
+    scheme. ``tangent`` adds `Solver.step_tangent`, and ``adjoint`` adds `Solver.pullback` and `Solver.jacobian`, in
+    addition to the parts that the spec requests. ``profile`` is the profile of the code, ``fast`` by default; the
+    profile in a spec only applies to ``phigen build``.
+
+    Compiled C is cached by its content. Returns a `Solver`, or for a lattice a `LatticeSolver`. Raises `SpecError`;
+    `LimitError`; `CheckError` if a statement is refuted, e.g. if π is not Poisson; and `ToolchainError` if C was
+    requested and there is no working compiler, or if the compiler named in CC does not work.
     """
     expect_runnable(target)
     if device is not None and target not in registry.DEVICES:
@@ -122,11 +125,11 @@ def expect_runnable(target: str) -> None:
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
-    """Return α, β and S_1 … S_k of the method that `compile` uses, and the Hamiltonian that is discretised, in
-    sympy.
+    """Return the formulas of the method that `compile` uses, in sympy: α, β, S_1 … S_k, and the Hamiltonian that is
+    discretised.
 
-    ``terms`` requests S_1 … S_terms instead of those of the method. Raises the same as `compile`, and `SpecError`
-    for a splitting, which has none of these.
+    ``terms`` requests S_1 … S_terms instead of the terms of the method. Raises the errors of `compile`, and `SpecError`
+    for a splitting, which has none of these formulas.
     """
     from phigen.notation.sympy_formulas import sympy_formulas
 
@@ -136,9 +139,10 @@ def formulas(source: Source, order: int | None = None, *, terms: int | None = No
 
 
 def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
-    """Return the compilation of a source for phigen itself to run, proved; see `compile` for its arguments and errors.
+    """Return the compilation of a source, with its statements proved, for solvers that run inside phigen.
 
-    The options override the spec, see `phigen.spec.model.Spec.overridden`. A compilation stays in its profile.
+    The options override the spec, see `phigen.spec.model.Spec.overridden`. The compilation has the profile ``fast``
+    unless the options or the source, if it is a compilation already, name another one. Raises the errors of `compile`.
     """
     _expect_valid(**options)
     if isinstance(source, Compilation):
@@ -147,7 +151,8 @@ def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
     if isinstance(source, System):
         return compile_proved((source.spec or _spec_of(source)).for_running(**options), system=source)
     if not isinstance(source, Spec | str | PathLike) and isinstance(getattr(source, "spec", None), Spec):
-        source = source.spec  # a LatticeSystem, whose room is loaded for lattices alone
+        # The source is a LatticeSystem. Its package is imported only for lattices, so there is no isinstance here.
+        source = source.spec
     if isinstance(source, Spec):
         return compile_proved(source.for_running(**options))
     if isinstance(source, str | PathLike):
@@ -156,7 +161,7 @@ def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
 
 
 def _expect_valid(**options: Unpack[Overrides]) -> None:
-    """Raise `ValueError` for unknown values of options."""
+    """Raise `ValueError` for invalid values of the options ``order``, ``scheme`` and ``profile``."""
     order, scheme, profile = (options.get(name) for name in ("order", "scheme", "profile"))
     if order is not None and not (isinstance(order, int) and 1 <= order <= limits.ORDER):
         raise ValueError(f"order must be an integer from 1 to {limits.ORDER}, not {order!r}")
@@ -183,7 +188,7 @@ def lattice_solver_of(compilation: Compilation, target: str = "auto", device: in
 
 
 def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any]:
-    """Return the back end of a program, and its interface."""
+    """Return the back end of a program on a target, and its `Interface`."""
     interface = interface_of(program)
     target_name = chosen_target(target, _warn)
     files = files_of(program, target_name, f"phigen build {program.name}.yaml")
@@ -191,8 +196,11 @@ def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any
 
 
 def files_of(program: Program, target: str, command: str) -> dict[str, str]:
-    """Return the files that Python loads for a target: for a device, also those of another target for computations
-    on the host."""
+    """Return the files (name → text) that Python loads for a target.
+
+    For a device, these are the files of the device and those of a host target, which serves computations that do not
+    run on devices.
+    """
     if target not in registry.DEVICES:
         return emit(program, target, command)
     host = "numpy" if program.step.kind.sites else chosen_target("auto", _warn)
@@ -205,16 +213,15 @@ def _warn(message: str) -> None:
 
 def backend_of(files: Mapping[str, str], interface: Interface, target: str = "", device: int | None = None) -> Backend:
     """Return the back end of the files (name → text) of a target, by default the target that the files belong to.
-    Raises `ToolchainError`.
 
-    ``device`` is the number of a device, for targets that run on devices.
+    ``device`` is the number of a device, for targets that run on devices. Raises `ToolchainError`.
     """
     language = registry.find(target) if target else registry.target_of(files, interface.name)
     return language.load(files, interface, device)
 
 
 def interface_of(program: Program) -> Interface:
-    """Return the names and sizes of a program that the runtime needs."""
+    """Return the names and sizes of a program that the runtime needs; a `LatticeInterface` for lattices."""
     from phigen.runtime.interface import Interface, LatticeInterface
 
     interface = Interface(
@@ -272,9 +279,10 @@ def interface_of(program: Program) -> Interface:
 
 
 def chosen_target(target: str, warn: Callable[[str], None] = lambda message: None) -> str:
-    """Return the name of a target; ``auto`` is C if there is a compiler, else NumPy; ``warn`` receives the reason.
+    """Return ``target``, or for ``auto`` the name of a target: C if there is a compiler, else NumPy.
 
-    Raises `ToolchainError` if a compiler is named in CC that does not work.
+    If NumPy replaces C, ``warn`` receives the reason. Raises `ToolchainError` if the compiler named in CC does not
+    work.
     """
     from phigen.runtime import toolchain
 
@@ -306,7 +314,7 @@ def _spec_of(system: System) -> Spec:
 
 
 def _expect_names(system: System) -> None:
-    """Raise for names that sympy accepts and generated code cannot have."""
+    """Raise `SpecError` if names of the system, its coordinates or its parameters cannot stand in generated code."""
     problems = [objection(system.name)] if re.fullmatch(SPEC_NAME, system.name) else [_malformed(system.name, _HINT)]
     problems += [
         _malformed(name, "letters, digits and _, not starting with a digit")

@@ -1,8 +1,8 @@
 """The results of compiling one spec: ``Compilation = CompiledSeries | CompiledSplitting | CompiledGauss |
 CompiledLattice``.
 
-All four share what `_Compiled` declares, and a ``system``: that of a lattice of any size raises `SpecError`. Where one
-kind is expected, `by_series`, `by_splitting`, `by_gauss` and `by_sweeps` return the compilation as that kind.
+All four have the members of `_Compiled` and a ``system``, which raises `SpecError` for a lattice of any size. Code that
+needs one kind calls `by_series`, `by_splitting`, `by_gauss` or `by_sweeps`, which raise `ValueError` for other kinds.
 """
 
 from __future__ import annotations
@@ -35,13 +35,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class _Compiled(ABC):
-    """The part that all compilations share; ``seconds`` maps stages of the compiler to their time."""
+    """Base class of all compilations; ``seconds`` has the duration of each stage of the compiler by the name of the
+    stage."""
 
     spec: Spec
     order: Order
     program: Program
     seconds: Mapping[str, float] = field(default_factory=dict)
-    choice: str = ""  # the reason for the scheme, where ``scheme: auto`` chose it
+    choice: str = ""  # the reason for the scheme, if ``scheme: auto`` chose it
 
     def __repr__(self) -> str:
         return f"<Compilation of {self.spec.name}: order {self.order.order}, {self.label}>"
@@ -49,23 +50,26 @@ class _Compiled(ABC):
     @property
     @abstractmethod
     def scheme_name(self) -> str:
-        """The scheme, as in specs."""
+        """The name of the scheme, as in specs: ``series``, ``splitting`` or ``gauss``."""
 
     @property
     @abstractmethod
     def label(self) -> str:
-        """The kind of the method, for every place that names it to the user."""
+        """The method in a few words for users, e.g. the kind of the bi-realisation."""
 
     @property
     @abstractmethod
     def exact(self) -> bool:
-        """Whether a step starts and ends at the ends of one path to round-off, or has exact structure; see
-        `poisson`."""
+        """Whether a step has its structure to round-off, not only to a truncation order.
+
+        For a series: whether a step starts and ends at the ends of one path. A step with forces can be exact in this
+        sense, but is no Poisson map; see `poisson`.
+        """
 
     @property
     @abstractmethod
     def poisson(self) -> bool:
-        """Whether a step is a Poisson map to round-off: one of exact structure, without forces."""
+        """Whether a step is a Poisson map to round-off: it is exact, and there are no forces."""
 
     @property
     def symmetric(self) -> bool:
@@ -74,17 +78,18 @@ class _Compiled(ABC):
 
     @property
     def degree(self) -> int | None:
-        """The degree d of a truncation, with a Poisson defect of O(h^(d+1)); None where none is known."""
+        """The degree d of a truncated method, whose Poisson defect in a step is O(h^(d+1)); None if nothing is
+        truncated."""
         return None
 
     @property
     def kind(self) -> str:
-        """The kind of the bi-realisation, or the scheme where steps have none."""
+        """The kind of the bi-realisation, or the name of the scheme if steps have no bi-realisation."""
         return self.scheme_name
 
     @property
     def birealisation(self) -> str | None:
-        """The kind of the bi-realisation that the compiler chose or was asked for; None where steps have none."""
+        """The kind of the bi-realisation, chosen by the compiler or by the spec; None if steps have none."""
         return None
 
     @property
@@ -94,7 +99,7 @@ class _Compiled(ABC):
         return replace(self, program=replace(program, extras=replace(program.extras, real="double")))
 
     def including(self, part: str) -> Self:
-        """Return the compilation for code that has a part, although its profile or its spec leaves the part out."""
+        """Return the compilation with a part of the code, even if the profile or the spec leaves this part out."""
         extras, program = self.program.extras, self.program
         if program.offers(part):
             return self
@@ -102,35 +107,37 @@ class _Compiled(ABC):
         return replace(self, program=replace(program, extras=extras))
 
     def with_stack(self, stack: StackBound | None) -> Self:
-        """Return the compilation whose C states a measured bound of its stack, or none."""
+        """Return the compilation with ``stack``, the measured stack use that the C states; None for no such
+        statement."""
         return replace(self, program=replace(self.program, stack=stack))
 
     @property
     def method(self) -> str:
-        """The scheme, the bi-realisation if there is one, the order and the profile, as the first lines of runs say."""
+        """The method in words, for the first lines of runs: scheme, bi-realisation if there is one, order, and
+        profile."""
         scheme = self.described["scheme"]
         scheme_text = scheme if self.label.startswith(scheme) else f"{scheme} ({self.label})"
         return f"scheme {scheme_text}, order {self.order.order}, profile {self.program.profile}"
 
     @property
     def described(self) -> dict[str, Any]:
-        """Description of the method as plain data."""
+        """Description of the method as plain data, for JSON."""
         return {"scheme": self.scheme_name}
 
     @property
     def reasons(self) -> Mapping[str, str]:
-        """The choices of the compiler that have a reason of their own, with it."""
+        """Reasons for choices of the compiler, by the label of the choice."""
         return {"scheme chosen": self.choice} if self.choice else {}
 
     @property
     def notes(self) -> list[str]:
-        """Decisions of the compiler that the user may not expect, a line each."""
+        """Decisions of the compiler that the user may not expect, one line each."""
         choice_note = f"scheme: auto chose {self.choice}" if self.choice else ""
         return [*filter(None, [choice_note, self.order.note])]
 
     @property
     def monitor(self) -> Expression | None:
-        """dt/dτ, where steps are equal in τ."""
+        """The rate dt/dτ of a monitor, whose steps have equal size in τ; None without a monitor."""
         return None
 
     @property
@@ -145,67 +152,69 @@ class _Compiled(ABC):
 
     @property
     def stage(self) -> Order:
-        """The order and the terms of one stage: those of the method, unless it is composed of stages of order 2."""
+        """Order and number of terms of one stage: those of the method, or order 2 and one term if a step is
+        composed."""
         return self.order if len(self.program.fractions) == 1 else Order(2, 1)
 
     @property
     def known_system(self) -> System | None:
-        """The system, for another compilation of it; None for a lattice, whose cell is built anew."""
+        """The system, to be passed to further compilations of the spec; None for a lattice, whose cell is built
+        again."""
         return None
 
     def named(self, method: str) -> str:
-        """A line that names the method, with the reason for a choice that depends on the runs of the spec."""
+        """Return a line that names the method, with the reason if the method depends on the runs of the spec."""
         return method
 
     def by_series(self) -> CompiledSeries:
-        """The compilation to a series. Raises `ValueError` for others."""
+        """Return this compilation if its scheme is a series. Raises `ValueError` for others."""
         raise self._not("generating function")
 
     def by_splitting(self) -> CompiledSplitting:
-        """The compilation to a splitting. Raises `ValueError` for others."""
+        """Return this compilation if its scheme is a splitting. Raises `ValueError` for others."""
         raise self._not("parts with flows")
 
     def by_gauss(self) -> CompiledGauss:
-        """The compilation to Gauss collocation. Raises `ValueError` for others."""
+        """Return this compilation if its scheme is Gauss collocation. Raises `ValueError` for others."""
         raise self._not("stages of collocation")
 
     def by_sweeps(self) -> CompiledLattice:
-        """The compilation of a lattice of any size. Raises `ValueError` for others."""
+        """Return this compilation if it is that of a lattice of any size. Raises `ValueError` for others."""
         raise self._not("sweeps over sites")
 
     def _not(self, part: str) -> ValueError:
         return ValueError(f"{self.spec.name} is compiled to {self.label}, which has no {part}")
 
     def _repr_html_(self) -> str:
-        """The system and its method, for notebooks."""
+        """The system and its method as HTML, for notebooks."""
         return cast(str, display("page of a compilation")(self))
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class _CompiledSystem(_Compiled, ABC):
-    """A system of a fixed number of coordinates."""
+    """Compilation of a system with a fixed number of coordinates."""
 
     system: System
     gauge: Gauge = field(default_factory=Gauge)
 
     @property
     def poisson(self) -> bool:
-        """Whether a step is a Poisson map to round-off: one of exact structure, without forces."""
+        """Whether a step is a Poisson map to round-off: it is exact, and there are no forces."""
         return self.exact and self.system.forces is None
 
     @property
     def discretised(self) -> System:
-        """The system with the Hamiltonian that is discretised: H less the Casimirs of the gauge."""
+        """The system with the Hamiltonian that is discretised: H minus the Casimirs of the gauge."""
         return self.gauge.applied(self.system)
 
     @property
     def notes(self) -> list[str]:
-        """Decisions of the compiler that the user may not expect, a line each."""
+        """Decisions of the compiler that the user may not expect, one line each."""
         return [*super().notes, *filter(None, self.gauge.notes)]
 
     @property
     def monitor(self) -> Expression | None:
-        """dt/dτ, where steps are equal in τ."""
+        """The rate dt/dτ of a monitor, whose steps have equal size in τ; None without a monitor."""
         return self.gauge.monitor
 
     @abstractmethod
@@ -215,21 +224,24 @@ class _CompiledSystem(_Compiled, ABC):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """The result of the function for this kind of compilation."""
+        """Call the function for this kind of compilation with this compilation, and return the result."""
 
     @property
     def known_system(self) -> System | None:
-        """The system of coordinates."""
+        """The compiled system."""
         return self.system
 
     def _repr_latex_(self) -> str:
-        """The formulas of the system and of the method, for notebooks."""
+        """The formulas of the system and of the method as LaTeX, for notebooks."""
         return cast(str, display("formulas of a compilation")(self))
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledSeries(_CompiledSystem):
-    """A step from S_1, S_2, … and the bi-realisation, with the discretised system and its generating function."""
+    """Compilation by scheme ``series``: a step from S_1, S_2, … and a bi-realisation.
+
+    ``gauged`` holds the discretised system and its Hamilton–Jacobi series, ``scheme`` the generating function.
+    """
 
     realisation: BiRealisation
     gauged: Gauged
@@ -247,7 +259,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def exact(self) -> bool:
-        """Whether a step starts and ends at the ends of one p to round-off."""
+        """Whether a step starts and ends at the ends of one path, to round-off."""
         return self.realisation.exact
 
     @property
@@ -257,7 +269,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def degree(self) -> int | None:
-        """The degree of a truncated bi-realisation."""
+        """The degree at which the bi-realisation is truncated; None if it is exact."""
         return self.realisation.degree
 
     @property
@@ -272,7 +284,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def reasons(self) -> Mapping[str, str]:
-        """The reason for the bi-realisation."""
+        """The reasons for the scheme and for the bi-realisation."""
         reason, automatic = self.realisation.explanation, f"auto picked {self.realisation.kind}, "
         if reason.startswith(automatic):
             reason = "chosen by phigen, " + reason.removeprefix(automatic)
@@ -285,16 +297,17 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def discretised(self) -> System:
-        """The system with the Hamiltonian that is discretised: H less the Casimirs of the gauge."""
+        """The system with the Hamiltonian that is discretised: H minus the Casimirs of the gauge."""
         return self.gauged.system
 
     @property
     def series(self) -> HamiltonJacobi:
-        """The series of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver chooses."""
+        """The Hamilton–Jacobi series of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver
+        chooses."""
         return self.gauged.series
 
     def by_series(self) -> CompiledSeries:
-        """Return this compilation, which is one by a series."""
+        """Return this compilation."""
         return self
 
     def by_kind(
@@ -303,19 +316,20 @@ class CompiledSeries(_CompiledSystem):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """The result of the function for a series."""
+        """Call ``series`` with this compilation, and return the result."""
         return series(self)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledSplitting(_CompiledSystem):
-    """A step by the exact flows of the parts of H."""
+    """Compilation by scheme ``splitting``: a step by the exact flows of parts of H."""
 
     splitting: SplitHamiltonian
 
     @property
     def symmetric(self) -> bool:
-        """Whether a step of −h is the inverse of a step of h; with a corrector only up to terms of order ε²."""
+        """Whether a step of −h is the inverse of a step of h; with a corrector this holds only up to terms of order
+        ε²."""
         schedule = self.program.step.flow_schedule
         return schedule is None or len(schedule.end) < 2
 
@@ -326,21 +340,21 @@ class CompiledSplitting(_CompiledSystem):
 
     @property
     def label(self) -> str:
-        """The name of the scheme."""
+        """The word "splitting"."""
         return "splitting"
 
     @property
     def exact(self) -> bool:
-        """Whether a step is a Poisson map: always, since flows are."""
+        """True: flows of parts of H are Poisson maps."""
         return True
 
     @property
     def is_composed(self) -> bool:
-        """A step is composed of flows."""
+        """True: a step is composed of flows."""
         return True
 
     def by_splitting(self) -> CompiledSplitting:
-        """Return this compilation, which is one by a splitting."""
+        """Return this compilation."""
         return self
 
     def by_kind(
@@ -349,13 +363,13 @@ class CompiledSplitting(_CompiledSystem):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """The result of the function for a splitting."""
+        """Call ``splitting`` with this compilation, and return the result."""
         return splitting(self)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledGauss(_CompiledSystem):
-    """A step by Gauss collocation, of the unknowns of ``gauss``."""
+    """Compilation by scheme ``gauss``: a step by Gauss collocation, with the unknowns that ``gauss`` describes."""
 
     gauss: Realisation
 
@@ -366,43 +380,43 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def label(self) -> str:
-        """The unknowns, and whether the structure is exact."""
+        """The unknowns of a step, and whether its structure is exact."""
         return self.gauss.label
 
     @property
     def exact(self) -> bool:
-        """Whether the step has exact structure."""
+        """Whether the step preserves the Poisson structure to round-off."""
         return self.gauss.exact
 
     @property
     def degree(self) -> int | None:
-        """The order, which is that of the Poisson defect too."""
+        """The order d of the method; without exact structure, the Poisson defect of a step is O(h^(d+1))."""
         return self.order.order
 
     @property
     def notes(self) -> list[str]:
-        """Decisions of the compiler, and that steps to truncation are no Poisson maps."""
+        """Decisions of the compiler, one line each, and a warning if steps are no Poisson maps."""
         defect = f"its defect is O(h^{self.order.order + 1}) in a step, and phigen verify measures it"
         warned = [] if self.gauss.exact else [f"structure: to truncation: a step is not a Poisson map; {defect}"]
         return [*super().notes, *warned]
 
     @property
     def structure(self) -> str:
-        """The structure of the method, as in specs."""
+        """The structure of the method, as in specs: ``exact`` or ``to truncation``."""
         return "exact" if self.gauss.exact else "to truncation"
 
     @property
     def tableau(self) -> Tableau:
-        """The coefficients of the stages."""
+        """The coefficients of the Gauss stages."""
         return tableau(self.order.terms)
 
     @property
     def described(self) -> dict[str, Any]:
-        """Description of the method as plain data."""
+        """Description of the method as plain data, for JSON, with unknowns and structure."""
         return {"scheme": self.scheme_name, "structure": self.structure}
 
     def by_gauss(self) -> CompiledGauss:
-        """Return this compilation, which is one by Gauss collocation."""
+        """Return this compilation."""
         return self
 
     def by_kind(
@@ -411,30 +425,30 @@ class CompiledGauss(_CompiledSystem):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """The result of the function for collocation."""
+        """Call ``gauss`` with this compilation, and return the result."""
         return gauss(self)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledLattice(_Compiled):
-    """A lattice of any size: its ``cell``, and the plan of the ``sweeps`` of a step."""
+    """Compilation of a lattice of any size: its ``cell``, and the plan of the ``sweeps`` of a step."""
 
     cell: Cell
     sweeps: LatticePlan
 
     @property
     def system(self) -> System:
-        """Raise `SpecError`: the number of coordinates is not known before a run."""
+        """Raise `SpecError`: the number of coordinates is unknown before a run."""
         raise system_of_lattice(self.spec)
 
     @property
     def discretised(self) -> System:
-        """Raise `SpecError`: the number of coordinates is not known before a run."""
+        """Raise `SpecError`: the number of coordinates is unknown before a run."""
         return self.system
 
     @property
     def gauge(self) -> Gauge:
-        """Nothing is subtracted from H."""
+        """An empty gauge: nothing is subtracted from H."""
         return Gauge()
 
     @property
@@ -444,7 +458,7 @@ class CompiledLattice(_Compiled):
 
     @property
     def label(self) -> str:
-        """The bi-realisation, or that H is split."""
+        """The kind of the bi-realisation, or "splitting"."""
         return self.sweeps.label
 
     @property
@@ -454,22 +468,22 @@ class CompiledLattice(_Compiled):
 
     @property
     def birealisation(self) -> str | None:
-        """The kind of the bi-realisation, where it is one of a site."""
+        """The kind of the bi-realisation of one site; None for a splitting."""
         return self.sweeps.site_kind
 
     @property
     def is_composed(self) -> bool:
-        """Whether a step is composed of several maps: of flows, or of stages."""
+        """Whether a step is composed of several maps: flows, or stages of order 2."""
         return not self.sweeps.is_implicit or len(self.program.fractions) > 1
 
     @property
     def exact(self) -> bool:
-        """Flows and implicit stages are Poisson maps."""
+        """True: flows and implicit stages are Poisson maps."""
         return True
 
     @property
     def poisson(self) -> bool:
-        """Whether a step is a Poisson map to round-off: one without forces."""
+        """Whether a step is a Poisson map to round-off: there are no forces."""
         return not self.cell.forces
 
     @property
@@ -482,7 +496,7 @@ class CompiledLattice(_Compiled):
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 
     def named(self, method: str) -> str:
-        """Return a line that names the method; if the sizes of the runs decide it, with the reason."""
+        """Return a line that names the method, with the reason if the sizes in the runs decide the method."""
         if not self.sweeps.since:
             return method
         colours = self.sweeps.colouring.count
@@ -490,7 +504,7 @@ class CompiledLattice(_Compiled):
         return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     def by_sweeps(self) -> CompiledLattice:
-        """Return this compilation, which is one of a lattice."""
+        """Return this compilation."""
         return self
 
     def by_kind(
@@ -499,11 +513,11 @@ class CompiledLattice(_Compiled):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """Raise `SpecError`: a lattice is of none of these kinds."""
+        """Raise `SpecError`: a lattice has a compilation of its own, which has none of these kinds."""
         raise system_of_lattice(self.spec)
 
     def _repr_latex_(self) -> str:
-        """The formulas of the cell, for notebooks."""
+        """The formulas of the cell as LaTeX, for notebooks."""
         return cast(str, display("formulas of a cell")(self.cell))
 
 

@@ -1,13 +1,13 @@
-"""The pipeline, on one screen.
+"""The pipeline of the compiler, from a spec to the source files of a solver.
 
     spec file ─► Spec ─► System ─► BiRealisation ─► Gauged ─► Discretisation ─► Program ─► source files
                             │   └─► SplitHamiltonian ───────────────────────────┘  │
                             └───────────────────────► Examination ◄────────────────┘
 
-Each stage is a function from one frozen dataclass to the next; `Compilation` holds the results of all stages and
-their seconds. `Gauged` holds the Hamilton–Jacobi series, whose terms are computed once, on request; `Discretisation`
-holds the generating function. `Examination` holds the proofs: those about the system are made before anything is
-built on it, then those about the method.
+Each stage is a function from one frozen dataclass to the next. `Compilation` holds the results of all stages and their
+durations. `Gauged` holds the Hamilton–Jacobi series, whose terms are computed once, on request. `Discretisation` holds
+the generating function. `Examination` holds the proofs. Statements about the system are proved before anything is built
+on it, and statements about the method afterwards.
 """
 
 from __future__ import annotations
@@ -51,11 +51,12 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: The order of the series whose number of operations gives a lower bound for higher orders.
+#: Order of the series that is built to estimate the operations of a series of higher order; the estimate is a lower
+#: bound.
 PREVIEW_ORDER = 4
 
-#: Number of sites from which a written-out lattice causes a warning.
-SITES = 8
+#: Number of coordinates from which a spec is examined for a lattice that is written out, and least number of its sites.
+LEAST_LATTICE_SITES = 8
 
 
 def compile_spec(
@@ -66,8 +67,9 @@ def compile_spec(
 ) -> Compilation:
     """Compile a spec with the options that override it; see `Spec.overridden`.
 
-    ``system`` is its system, if the caller has already built it. Nothing is proved: see `compile_proved`. Raises
-    `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too large).
+    ``system`` is the system of the spec, if the caller has already built it. Nothing is proved: see `compile_proved`.
+    Raises `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too
+    large).
     """
     spec, clock = spec.overridden(**options), _Clock()
     if spec.lattice:
@@ -77,7 +79,7 @@ def compile_spec(
             cell = clock.timed("cell", lambda: cell_from_spec(spec))
             return _swept(spec, cell, clock)
     with bounded(spec):
-        _tell_of_lattice(spec)
+        _warn_of_written_out_lattice(spec)
         source = system or clock.timed("system", lambda: system_from_spec(spec))
         return _compiled(spec, source, clock)
 
@@ -96,7 +98,7 @@ def examine(
     if spec.lattice:
         return _examine_lattice(spec, clock)
     with bounded(spec), progress.stage(spec.name):
-        _tell_of_lattice(spec)
+        _warn_of_written_out_lattice(spec)
         try:
             source = system or clock.timed("system", lambda: system_from_spec(spec))
         except SpecError as error:
@@ -130,10 +132,10 @@ def compile_proved(
     system: System | None = None,
     **options: Unpack[Overrides],
 ) -> Compilation:
-    """Compile as `compile_spec`, and refuse a spec with a refuted statement.
+    """Compile as `compile_spec`, but prove the statements about the system and the method.
 
-    Raises `CheckError` that names what is refuted, with the residual: no π that is not Poisson, no claimed Casimir
-    that is none, no wrong bi-realisation reaches the output. Raises `SpecError` and `LimitError` as `compile_spec`.
+    Raises `CheckError` if a statement is refuted, with its name and its residual: π is not Poisson, a claimed Casimir
+    is none, or the bi-realisation is wrong. Raises `SpecError` and `LimitError` as `compile_spec`.
     """
     examination = examine(spec, system=system, **options)
     if examination.refuted:
@@ -146,19 +148,26 @@ def compile_proved(
 
 
 def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
-    """The files of one target, by name; ``command`` is what regenerates them. `ValueError` for unknown targets."""
+    """Return the files of one target (name → text).
+
+    ``command`` is the command line that regenerates the files; it is written into their headers. Raises `ValueError`
+    for an unknown target.
+    """
     with progress.stage(f"{program.name}: emission of {target}"):
         return registry.find(target).emit(program, command, single_file=single_file)
 
 
-def _tell_of_lattice(spec: Spec) -> None:
-    """Return a warning for a lattice that is written out, before its slow compilation; one of any size would be
-    fast."""
-    if spec.dimension < SITES:
+def _warn_of_written_out_lattice(spec: Spec) -> None:
+    """Warn if the spec is a lattice that is written out site by site.
+
+    Its compilation is slow; the warning says how to get a spec of one site, which compiles fast for any number of
+    sites.
+    """
+    if spec.dimension < LEAST_LATTICE_SITES:
         return
     from phigen.lattice.recognition import recognised_lattice
 
-    lattice_spec = recognised_lattice(spec, least=SITES)
+    lattice_spec = recognised_lattice(spec, least=LEAST_LATTICE_SITES)
     if lattice_spec is not None and lattice_spec.lattice is not None:
         sites = spec.dimension // len(lattice_spec.coordinates)
         message = f"{spec.name} is a lattice of {sites} identical sites, written out"
@@ -168,7 +177,7 @@ def _tell_of_lattice(spec: Spec) -> None:
 
 
 def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
-    """Prove what can be proved about a lattice, for all sizes at once."""
+    """Prove the statements about a lattice that hold for all its sizes."""
     from phigen.lattice.cell_building import cell_from_spec
     from phigen.proofs import lattice_statements
 
@@ -191,10 +200,10 @@ def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
 
 
 def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation | None:
-    """The bi-realisation of a large system, of which nothing is proved yet. LimitError if it makes steps too large.
+    """Return the bi-realisation of a large system, before anything is proved about the system.
 
-    None if it cannot be decided before the gauge is chosen, and if there is no bi-realisation; the proofs report the
-    reason.
+    Returns None if the system is small, if the gauge decides on the bi-realisation, or if there is no bi-realisation;
+    in the last case, the proofs report the reason. Raises `LimitError` if the generating function would be too large.
     """
     as_it_is = isinstance(spec.gauge, str) and not (spec.monitor or source.forces or source.noise)
     if spec.scheme != "series" or not as_it_is or not is_large(source):
@@ -208,7 +217,7 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
 
 
 def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None) -> Compilation:
-    """Compile a system by its scheme; ``early_realisation`` is what `_realised_early` has found."""
+    """Compile a system by the scheme of its spec; ``early_realisation`` is the result of `_realised_early`."""
     if early_realisation:
         return _compile_series(spec, source, clock, early_realisation)
     return SCHEME_COMPILERS[spec.scheme](spec, source, clock)
@@ -217,7 +226,7 @@ def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRe
 def _compile_series(
     spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None
 ) -> CompiledSeries:
-    """Compile a system to a step from S_1, S_2, … and a bi-realisation."""
+    """Compile a system by the scheme series, to a step from S_1, S_2, … and a bi-realisation."""
     realisation = early_realisation or clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
     plan = plan_order(spec.order, spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
@@ -262,20 +271,20 @@ def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
 
 
 def _is_of_series(spec: Spec) -> bool:
-    """Whether options name parts of the series."""
+    """Whether options of the spec apply only to the scheme series."""
     names_options = spec.birealisation.kind != "auto" or spec.terms is not None
     return names_options or spec.extras.modified_hamiltonian > 0
 
 
 def _choice(best: str, compilations: Mapping[str, Compilation], failures: Mapping[str, SpecError]) -> str:
-    """Return the reason for a scheme: the expected costs of the other schemes."""
+    """Return the reason for the scheme ``best``: the expected costs of the alternatives, relative to its cost."""
     least = _expected(compilations[best])
     if least == 0:
         return f"{best}: one exact flow"
     alternatives = [f"{_expected(c) / least:.1f} times the time for {s}" for s, c in compilations.items() if s != best]
     alternatives += [f"{s} does not apply" for s in failures]
     alternatives += ["more for series"] * ("series" not in {*compilations, *failures} and bool(compilations))
-    return f"{best}; expected: {', '.join(alternatives)}" if alternatives else f"{best}, which its options name"
+    return f"{best}; expected: {', '.join(alternatives)}" if alternatives else f"{best}, since options apply to it only"
 
 
 def _expected(compilation: Compilation) -> float:
@@ -283,7 +292,8 @@ def _expected(compilation: Compilation) -> float:
 
 
 def _is_dearer(spec: Spec, source: System, least: float) -> bool:
-    """Whether a series of a high order costs more than ``least``, by its operations at a low order."""
+    """Whether a series of the order of the spec is expected to cost more than ``least``, judged by a series of low
+    order."""
     order = spec.order or 0
     if math.isinf(least) or order <= PREVIEW_ORDER:
         return False
@@ -292,7 +302,7 @@ def _is_dearer(spec: Spec, source: System, least: float) -> bool:
 
 
 def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
-    """Compile a system to a splitting into parts with elementary flows."""
+    """Compile a system by the scheme splitting, into parts of H with elementary flows."""
     gauge = Gauge() if isinstance(spec.gauge, str) else fixed_gauge(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: _parts(spec, discretised.frozen))
@@ -322,7 +332,12 @@ def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSpl
 
 
 def _parts(spec: Spec, system: System) -> SplitHamiltonian:
-    """The parts of H. A monitor takes T and V, a named composition composes two parts, attitudes follow rotations."""
+    """Return the parts of H, each with its flow.
+
+    With ``coordinates_from``, H is split by its bodies. With a monitor, or with a named composition for an H that is
+    one part, H is split into parts without exact flows of motions. Free rigid bodies may be parts if `_turns_bodies`
+    allows it.
+    """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)
     if spec.monitor:
@@ -333,7 +348,8 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 
 
 def _turns_bodies(spec: Spec, system: System) -> bool:
-    """Whether free rigid bodies may be parts: if the spec asks for the attitude, this must be theirs."""
+    """Whether free rigid bodies may be parts of H: always without an attitude; else if the attitude is that of the
+    bodies."""
     group = _group(spec, system, "exponential")
     if group is None:
         return True
@@ -343,7 +359,7 @@ def _turns_bodies(spec: Spec, system: System) -> bool:
 
 
 def _compile_gauss(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
-    """Compile a system to steps of Gauss collocation."""
+    """Compile a system by the scheme gauss."""
     expect_offered(spec)
     plan = plan_gauss(spec)
     realisation = clock.timed("momentum maps", lambda: realise_gauss(spec, source))
@@ -372,7 +388,7 @@ SCHEME_COMPILERS: Mapping[str, Callable[[Spec, System, _Clock], Compilation]] = 
 
 
 def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:
-    """Compile a lattice, of any sizes, to sweeps over its sites."""
+    """Compile a lattice, for any sizes, to a plan of sweeps over its sites."""
     if spec.scheme == "gauss":
         expect_offered(spec)
     from phigen.lattice.cell_building import expect_coloured
@@ -380,7 +396,7 @@ def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:
 
     plan = clock.timed("plan", lambda: plan_sweeps(cell, spec))
     if spec.solver.compensated and (plan.is_implicit or spec.extras.adjoint):
-        message = "solver: compensated is for lattices whose H splits, without adjoint"
+        message = "solver: compensated is only offered for lattices with scheme splitting and without adjoint"
         raise SpecError([Diagnostic(message, spec.locations.get(("solver",)))])
     if plan.is_implicit:
         _expect_no_settings_of_the_solve(spec)
@@ -402,7 +418,7 @@ def _expect_no_settings_of_the_solve(spec: Spec) -> None:
 
 
 def _group(spec: Spec, source: System, kind: str) -> Group | None:
-    """The group whose element steps are the action of, where the spec asks for it."""
+    """Return the group whose elements act as steps, if the spec asks for an attitude (``reconstruct``); else None."""
     if not spec.reconstruct:
         return None
     from phigen.attitude.group import group_of
@@ -412,7 +428,7 @@ def _group(spec: Spec, source: System, kind: str) -> Group | None:
 
 @contextmanager
 def bounded(spec: Spec) -> Iterator[None]:
-    """Polynomials that would be larger than memory are a `LimitError` of the spec."""
+    """Context in which polynomials that would not fit into memory raise a `LimitError` of the spec."""
     try:
         yield
     except OverflowError as error:
@@ -421,13 +437,13 @@ def bounded(spec: Spec) -> Iterator[None]:
 
 
 class _Clock:
-    """The seconds of each stage; a stage may be entered several times."""
+    """Clock of the stages of a compilation; a stage that is entered several times adds up its ``seconds``."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
     def timed(self, stage: str, work: Callable[[], T]) -> T:
-        """The result of a stage."""
+        """Return the result of ``work()``, and add its duration to the stage."""
         with progress.stage(stage) as running:
             result = work()
         self.seconds[stage] = self.seconds.get(stage, 0.0) + running.seconds

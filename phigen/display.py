@@ -10,7 +10,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, cast
 
-#: Name of a display → module and function that make it.
+#: Name of a display → the module and the function that make this display.
 DISPLAYS = {
     "formulas of a system": ("phigen.notation.notebook", "system_latex"),
     "page of a system": ("phigen.notation.notebook", "system_html"),

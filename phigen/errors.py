@@ -1,15 +1,16 @@
-"""Every error a user can meet, each class with its exit code.
+"""The errors that a user can meet, each class with its exit code.
 
 ========== =====================================================================
 exit code  meaning
 ========== =====================================================================
 0          ok
 1          the spec is wrong (`SpecError`)
-2          the command line is wrong (click's own), a file cannot be read or written,
-           or a Python package for what is asked is missing (`MissingPackageError`)
+2          the command line is wrong (errors of click), a file cannot be read or
+           written, or a Python package is missing (`MissingPackageError`)
 3          a limit is exceeded (`LimitError`)
 4          internal error: a bug of phigen
-5          a check failed: mathematics refuted, stale or edited output (`CheckError`)
+5          a check failed: a statement is refuted, or output is stale or edited
+           (`CheckError`)
 6          no usable C toolchain, or it failed (`ToolchainError`)
 7          an integration failed (`StepError`)
 ========== =====================================================================
@@ -23,7 +24,7 @@ from typing import Any
 
 @dataclass(frozen=True, order=True)
 class Location:
-    """A place in a source file; line and column count from 1."""
+    """Position in a source file; line and column count from 1."""
 
     line: int
     column: int
@@ -35,7 +36,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One message about a spec: the place, the error (with the value), and how to correct it."""
+    """Message about a spec: its location, the error with the wrong value, and a hint how to correct it."""
 
     message: str
     location: Location | None = None
@@ -57,10 +58,9 @@ class Diagnostic:
 
 
 def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
-    """Return the part of a long line around a column (from 0), and the column in it.
+    """Return at most ``width`` characters of a line around a column (from 0), and the position of the column in them.
 
-    Characters that a terminal would not show as one character are replaced, so that the caret is below its
-    character.
+    Characters that a terminal would not show as one character are replaced, so that the caret is below its character.
     """
     start = 0 if len(line) <= width else max(0, min(column - width // 2, len(line) - width))
     part = "".join(c if c.isprintable() else " " if c == "\t" else "�" for c in line[start : start + width])
@@ -70,7 +70,8 @@ def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
 
 
 def missing_attribute(owner: object, name: str) -> AttributeError:
-    """Return the error of an attribute that a system does not have; runs belong to solvers."""
+    """Return the `AttributeError` for an attribute that a system lacks; for attributes of solvers, such as ``run``, it
+    has a hint."""
     hint = f"; solver = phigen.compile(system) has {name}" if name in ("run", "runs", "integrate") else ""
     return AttributeError(f"{type(owner).__name__!r} object has no attribute {name!r}{hint}")
 
@@ -81,7 +82,8 @@ class PhigenError(Exception):
     exit_code = 4
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # By default, an exception is made anew from its message: not those with further arguments.
+        # By default, an unpickled exception is created from its message alone, which fails for exceptions with further
+        # arguments.
         return _restored, (type(self), self.args, self.__dict__)
 
 
@@ -90,7 +92,7 @@ class PhigenWarning(RuntimeWarning):
 
 
 class SpecError(PhigenError):
-    """The spec is wrong; holds all diagnostics of the run, in the order of the file."""
+    """The spec is wrong; ``diagnostics`` has all errors found, in the order of the file."""
 
     exit_code = 1
 
@@ -118,7 +120,8 @@ class ToolchainError(PhigenError):
 
 
 class DeviceError(ToolchainError):
-    """There is no usable device, or the device failed; ``trajectory`` has the results so far, NaN if missing."""
+    """There is no usable device, or the device failed; ``trajectory`` has the results so far, with NaN for missing
+    ones."""
 
     trajectory: Any = None
 
@@ -130,17 +133,17 @@ class MissingPackageError(PhigenError):
 
 
 class FileError(PhigenError):
-    """A file cannot be written, and there is more to say than which, and why."""
+    """A file cannot be written, for a reason that the message of the operating system does not contain."""
 
     exit_code = 2
 
 
 class StepError(PhigenError):
-    """A step failed; the state is that before it.
+    """A step failed; the state is the one before this step.
 
-    Attributes: ``step`` (number of the failing step, from 0), ``status`` (the name of the solver's status,
-    e.g. ``NO_CONVERGENCE``), ``trajectory`` (what was computed before it, or ``None``), ``members``
-    (indices of the members of an ensemble that failed).
+    Attributes: ``step`` (number of the failing step, from 0), ``status`` (the name of the solver's status, e.g.
+    ``NO_CONVERGENCE``), ``trajectory`` (the results before the failing step, or ``None``), ``members`` (indices of the
+    members of an ensemble that failed).
     """
 
     exit_code = 7
@@ -153,7 +156,7 @@ class StepError(PhigenError):
 
 
 class ParameterError(StepError, ValueError):
-    """Parameters with which no step is possible: values computed from them alone are not finite."""
+    """Parameters for which no step is possible: values computed from the parameters alone are not finite."""
 
 
 def _restored(kind: type[PhigenError], args: tuple[Any, ...], parts: dict[str, Any]) -> PhigenError:

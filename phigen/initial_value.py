@@ -1,4 +1,4 @@
-"""`solve_ivp` with the interface of `scipy.integrate.solve_ivp`, over a solver of phigen."""
+"""`solve_ivp` with the interface of `scipy.integrate.solve_ivp`, which integrates by a solver of phigen."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: An event of SciPy: a function of t and y (DIM,), with the optional attributes ``terminal`` and ``direction``.
 Event = Callable[[float, Floats], float]
 
-#: Number of steps of the first attempt without ``h``, and how often the step is halved at most.
+#: Without ``h``: number of steps of the first attempt, and the maximum number of times that the step is halved.
 _FIRST_STEPS, _MAX_HALVINGS = 64, 16
 
 _REACHED = "The solver successfully reached the end of the integration interval."
@@ -60,7 +60,7 @@ class OdeResult:
         return self.status >= 0
 
 
-#: Arguments of SciPy's solve_ivp that are refused → the reason, for the message.
+#: Arguments of SciPy's solve_ivp that are refused → the reason, which the message states.
 _SCIPY = {
     "method": "the method is that of the solver; order= changes its order",
     "jac": "the solver has its derivatives",
@@ -87,11 +87,13 @@ def solve_ivp(
 ) -> OdeResult:
     """Integrate from ``t_span[0]`` to ``t_span[1]``, with the arguments and the result of `scipy.integrate.solve_ivp`.
 
-    ``system`` replaces SciPy's function: a spec, a `System`, or a `Solver`. All steps have the size ``h`` (in τ with a
-    monitor). Without ``h``, the step is halved until the last state changes by less than atol + rtol |y|. States
-    between steps, at ``t_eval``, of ``sol`` and at ``events``, are results of further steps on the leaf, and are not
-    interpolated. ``status`` is −1 if a step fails, or if the tolerances are not reached, as for chaotic motion over a
-    long time. Raises `TypeError` for systems with noise, since steps of other sizes are not on the same path.
+    ``system`` replaces SciPy's function: a spec, a `System`, or a `Solver`. All steps have the size ``h``, in τ if the
+    system has a monitor. Without ``h``, the step is halved until the last state changes by less than atol + rtol |y|.
+    States between steps, at ``t_eval``, at ``events`` and of ``sol``, are computed by further steps rather than by
+    interpolation, so they have the Casimirs of the trajectory.
+
+    ``status`` is −1 if a step fails, or if the tolerances are not reached, as for chaotic motion over a long time.
+    Raises `TypeError` for systems with noise, since steps of different sizes do not follow one path of the noise.
     """
     solver = system if isinstance(system, Solver) else _compiled(system, target, order)
     for name in sorted(_SCIPY.keys() & more.keys() - {*solver.interface.parameters}):
@@ -139,7 +141,7 @@ def solve_ivp(
 
 @dataclass(frozen=True)
 class _Problem:
-    """An initial value problem: a solver, an interval of time, an initial state and parameters."""
+    """Initial value problem: a solver, the interval from ``begin`` to ``end``, an initial state and parameters."""
 
     solver: Solver
     begin: float
@@ -149,19 +151,23 @@ class _Problem:
 
     @property
     def offset(self) -> float:
-        """The time to add to those of the solver, which begin at 0 if the Hamiltonian does not depend on the time."""
+        """The difference between times of the problem and times of the solver.
+
+        Times of the solver begin at 0 if the Hamiltonian does not depend on the time; else the difference is 0.
+        """
         return 0.0 if self.solver.interface.time else self.begin
 
     def integrated(self, h: float, until: float, stride: int = 1) -> Trajectory:
-        """Return the trajectory until a given time."""
+        """Return the trajectory until a time of the problem, in steps of size ``h``."""
         start: dict[str, Any] = {"t0": self.begin} if self.solver.interface.time else {}
         span = until - self.offset
         return self.solver.integrate(self.y0, h, until=span, stride=stride, parameters=self.values, **start)
 
     def chosen(self, rtol: float, atol: float) -> tuple[float, bool]:
-        """Return a step at which a further halving changes the last state by less than the tolerances, and True.
+        """Return a step size at which another halving changes the last state by less than the tolerances, and True.
 
-        Returns the smallest step tried, and False, if there is none.
+        If no step size reaches the tolerances, returns the smallest one tried, and False. Raises `StepError` if the
+        last attempt fails.
         """
         h, previous, failure = (self.end - self.begin) / _FIRST_STEPS, None, None
         for _ in range(_MAX_HALVINGS):
@@ -179,7 +185,8 @@ class _Problem:
         return 2 * h, False
 
     def events(self, event_list: Sequence[Event], h: float) -> tuple[list[list[tuple[float, Floats]]], float | None]:
-        """Return times and states of each event until the end, and the time of the terminal event, if there is one."""
+        """Return the times and states of each event until the end, and the time of the first terminal event, or
+        None."""
         by_event = [self._crossings(event, h) for event in event_list]
         sign, stops = math.copysign(1.0, self.end - self.begin), []
         for event, event_crossings in zip(event_list, by_event, strict=True):
@@ -190,9 +197,10 @@ class _Problem:
         return [[(t, x) for t, x in event_crossings if (t - last) * sign <= 0] for event_crossings in by_event], stop
 
     def _crossings(self, event: Event, h: float) -> list[tuple[float, Floats]]:
+        """Return the times and states at which an event changes its sign in its direction."""
         direction_of_change = np.sign(getattr(event, "direction", 0)) * np.sign(
             self.end - self.begin
-        )  # directions refer to increasing time
+        )  # SciPy's directions refer to the direction of integration, those of CrossingFinder to increasing time.
         direction = {1: "rising", -1: "falling", 0: "both"}[int(direction_of_change)]
 
         def g(states: Floats, t: Floats) -> Floats:

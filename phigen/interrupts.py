@@ -1,8 +1,8 @@
-"""Ctrl-C of the command line, from the first import to the end: exit code 130, one word, no traceback.
+"""Handling of Ctrl-C in the command line: exit code 130 and the word "interrupted", without a traceback.
 
-While a command runs, Ctrl-C is a `KeyboardInterrupt`, so that the command can clean up. A second Ctrl-C, and one
-before or after the command, ends the process at once. This module is imported before everything else, so it imports
-next to nothing.
+While a command runs, Ctrl-C raises `KeyboardInterrupt`, so that the command can clean up. A second Ctrl-C, or one
+before or after the command, ends the process at once. This module is imported before all others, so it imports few
+modules itself.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ def _handle(number: int, frame: FrameType | None) -> None:
 
 
 def _imports(frame: FrameType | None) -> bool:
-    """Whether a module is being imported: compiled modules convert an interrupt into errors of their own."""
+    """Whether a module is being imported; a KeyboardInterrupt in compiled modules would become an error of another
+    kind."""
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True
@@ -43,7 +44,8 @@ def _imports(frame: FrameType | None) -> bool:
 
 
 def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
-    """An interrupt may occur in a callback of a weak reference, from which Python cannot propagate it."""
+    """End the process if the interrupt occurred where Python cannot propagate it, such as in a callback of a weak
+    reference."""
     if issubclass(unraisable.exc_type, KeyboardInterrupt):
         _end()
     sys.__unraisablehook__(unraisable)

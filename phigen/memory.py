@@ -16,16 +16,20 @@ from numpy.typing import NDArray
 
 from phigen.errors import Diagnostic, LimitError, Location
 
-#: Bytes below which nothing is checked: reading the state of the memory takes longer than a step on an array of this
-#: size.
-UNASKED = 2**24
+#: Requests of up to this number of bytes are not checked: reading the free memory takes longer than a step on an array
+#: of this size.
+UNCHECKED_BYTES = 2**24
 
-_HINT = "fewer sites; frames in a file; real: float, which halves the solver; phigen.mpi on several machines"
+_HINT = "use fewer sites, frames in a file, real: float (half the memory), or phigen.mpi on several machines"
 
 
 def expect_room(what: str, byte_count: int, place: Location | None = None, hint: str = _HINT) -> None:
-    """Raise `LimitError` if ``byte_count`` bytes are not available; do nothing if the system does not report it."""
-    if byte_count <= UNASKED:
+    """Raise `LimitError` if ``byte_count`` bytes are not available; do nothing if the system does not report free
+    memory.
+
+    ``what`` is the plural subject of the message, such as "12 frames".
+    """
+    if byte_count <= UNCHECKED_BYTES:
         return
     available_bytes = available()
     if available_bytes is None or byte_count <= available_bytes:
@@ -35,33 +39,39 @@ def expect_room(what: str, byte_count: int, place: Location | None = None, hint:
 
 
 def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.float64) -> NDArray[Any]:
-    """Return an array of NaN. Raises `LimitError` if it does not fit, as `expect_room` does.
+    """Return a new array of NaN. Raises `LimitError` if it does not fit into memory, as `expect_room` does.
 
-    NaN is written to all of it at once, because untouched pages of ``np.empty`` would still count as available when the
-    next array is allocated.
+    NaN is written to the whole array at once, because untouched pages of ``np.empty`` would still count as available
+    when the next array is allocated.
     """
     expect_room(what, np.dtype(dtype).itemsize * math.prod(shape))
     return np.full(shape, np.nan, dtype)
 
 
 def available() -> int | None:
-    """Return the bytes that this process can still allocate, swap space included; None if the system does not say."""
+    """Return the bytes that this process can still allocate, swap space included; None if the system does not report
+    them."""
     limits = [limit for limit in (_of_machine(), *_of_groups()) if limit is not None]
     return min(limits, default=None)
 
 
 def _of_machine() -> int | None:
+    """Return the free memory of the machine in bytes.
+
+    Returns all its memory if the free memory is unknown, and None if that is unknown too.
+    """
     sizes = _table(Path("/proc/meminfo"), ":")
     if "MemAvailable" in sizes:
         return 1024 * (sizes["MemAvailable"] + sizes.get("SwapFree", 0))
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (ValueError, OSError, AttributeError):  # no such name, or no sysconf, on this system
+    except (ValueError, OSError, AttributeError):  # this system has no sysconf, or does not know these names
         return None
 
 
 def _of_groups(root: Path = Path("/sys/fs/cgroup")) -> Iterator[int | None]:
-    """Yield the bytes left by the limits of control groups, of version 2 and of version 1.
+    """Yield the bytes left by the limits of control groups, of version 2 and of version 1; nothing for groups without
+    limits.
 
     Cached pages of files count as available, since the system can drop them.
     """
@@ -77,12 +87,12 @@ def _of_groups(root: Path = Path("/sys/fs/cgroup")) -> Iterator[int | None]:
 def _number(path: Path) -> int | None:
     try:
         return int(path.read_text())
-    except (OSError, ValueError):  # not there, or "max": no limit
+    except (OSError, ValueError):  # no such file, or "max", which means no limit
         return None
 
 
 def _table(path: Path, separator: str | None = None) -> dict[str, int]:
-    """Return the numbers of a file whose lines are a name and a number; {} if it cannot be read."""
+    """Return the numbers of a file with a name and a number in each line, by name; {} if the file cannot be read."""
     try:
         rows = [line.split(separator, 1) for line in path.read_text().splitlines()]
         return {name: int(value.split()[0]) for name, value in rows}

@@ -1,4 +1,4 @@
-"""Lattices on several processes: domains of planes along the slowest axis, which are exchanged by mpi4py.
+"""Lattices on several processes, each of which has a domain of planes along the first axis; needs the extra ``mpi``.
 
     from phigen.mpi import DistributedLattice
 
@@ -7,10 +7,10 @@
 
     mpirun -n 8 python script.py
 
-A plane is the set of all sites with one index of the first axis. Each process has the C solver of its planes and of
-copies of the neighbouring planes. It receives these from its neighbours just before a sweep reads them, while it
-works on the inner planes. States have the bits of `LatticeSolver` for any number of processes. Needs the extra
-``mpi``.
+A plane is the set of all sites with one index of the first axis. Each process runs the C solver on its planes and on
+copies of the neighbouring planes (a halo). Before a sweep that reads the halo, the process requests it from its
+neighbours by mpi4py, and works on its inner planes until the halo has arrived. The states are bitwise equal to those of
+`LatticeSolver`, for any number of processes.
 """
 
 from __future__ import annotations
@@ -36,22 +36,25 @@ from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
 from phigen.writing import replacing
 
-#: As in the C, whose bits these are: see templates/c/runtime/lattice.c.
+#: Steps between two checks for finite values, and steps with full-range functions after a failed check. Both are the
+#: same as in templates/c/runtime/lattice.c, whose results runs on several processes reproduce bit by bit.
 STRETCH, FAR_STEPS = 32, 64
 
-#: Arguments for runs in one process, which make parts of steps or copies of the solver; not offered with several
-#: processes.
+#: Arguments that only runs in one process have: they need parts of steps, or copies of the solver.
 _WHOLE_ONLY = ("until", "every", "at", "stop", "section", "retry")
 
-#: An array over the whole lattice, or a function that gives the planes from one to another, that not among them.
+#: An array over the whole lattice, or a function f(first, end) that returns the planes first … end − 1.
 Given = Any
 
 
 @dataclass(frozen=True, eq=False)
 class DistributedRun:
-    """Frames of one process: ``t`` and ``energy`` (frames,) of the whole, ``x`` (frames, coordinates, planes, …) of its
-    ``planes``, from the first to the one after the last; None where frames went to a file. ``waiting`` are the seconds
-    that this process waited for planes of others."""
+    """Results of a run, as one process has them.
+
+    ``t`` and ``energy`` (frames,) refer to the whole lattice. ``x`` (frames, coordinates, planes, …) has the planes
+    ``planes[0]`` … ``planes[1]`` − 1 of this process, and is None if frames went to a file. ``waiting`` is the time in
+    seconds that this process waited for planes of its neighbours.
+    """
 
     t: Floats
     energy: Floats
@@ -62,10 +65,10 @@ class DistributedRun:
 
 
 class DistributedLattice:
-    """Solver of a lattice on the processes of a communicator, by default on all processes.
+    """Solver of a lattice on the processes of an MPI communicator, by default on all processes.
 
     ``source`` is an argument of `phigen.compile`, or a `LatticeSolver` for C in profile fast. The lattice must be a
-    grid whose H is split. Raises `ValueError` for other lattices.
+    grid with scheme splitting. Raises `ValueError` for other lattices.
     """
 
     def __init__(self, source: Any, comm: Any = None, order: int | None = None) -> None:
@@ -73,7 +76,7 @@ class DistributedLattice:
         self.solver = source if isinstance(source, LatticeSolver) else self._compiled(source, order)
         backend = self.solver.backend
         if not isinstance(backend, CLattice):
-            raise ValueError(f"processes share lattices that are compiled to C, not {self.solver!r}")
+            raise ValueError(f"DistributedLattice needs a lattice that is compiled to C, not {self.solver!r}")
         self.stages = backend.stages()
         self.period = self.solver.interface.colour_period
 
@@ -82,7 +85,7 @@ class DistributedLattice:
 
         compilation = compilation_of(source, order=order, profile="fast")
         if self.comm.rank == 0:
-            lattice_solver_of(compilation, "c")  # fills the cache
+            lattice_solver_of(compilation, "c")  # compiles the C into the cache, from which the other processes load it
         self.comm.barrier()
         return lattice_solver_of(compilation, "c")
 
@@ -107,19 +110,23 @@ class DistributedLattice:
     ) -> DistributedRun:
         """Integrate as `LatticeSolver.integrate`; all processes call this method with the same arguments.
 
-        ``x0`` is an array (coordinates, *sizes), or a function that gives its planes, x0(from, to) of shape
-        (coordinates, to - from, …), and then needs ``sizes``; parameters at sites likewise. Frames go to ``output``, a
-        ``.npy`` file that all processes write to. With ``checkpoints``, a path, the state is kept at every frame; the
-        same call goes on from it, on any number of processes; ``resume=False`` begins anew, where no interrupted run
-        is. Raises on all processes: `StepError`, and `ValueError` where files are of an interrupted run, or of a
-        complete one that was to go on.
+        ``x0`` is an array (coordinates, *sizes), or a function x0(first, end) that returns the planes first … end − 1,
+        of shape (coordinates, end − first, …). A function needs ``sizes``. Parameters at sites are arrays or functions
+        too. Frames go to ``output``, a ``.npy`` file that all processes write.
+
+        ``checkpoints`` is a path at which the state is stored with every frame. If a run is interrupted, the same call
+        continues it, on any number of processes; with ``resume=False`` the run starts again, unless files of an
+        interrupted run exist.
+
+        Raises on all processes: `StepError` if a step fails, and `ValueError` if existing files do not allow the run to
+        begin or to continue.
         """
         for name in _WHOLE_ONLY:
             if name in more and name not in self.solver.interface.parameters:
                 hint = "integrate in one process, or to whole steps, and call it again from the last state"
                 raise TypeError(f"{name} is not available on several processes, whose rows are whole steps: {hint}")
         if checkpoints and not output:
-            raise ValueError("checkpoints= needs output=, where the frames are of a run that was interrupted")
+            raise ValueError("checkpoints= needs output=, the file with the earlier frames of an interrupted run")
         paths = Path(output) if output else None, Path(checkpoints) if checkpoints else None
         if refused := self.comm.bcast(_objection(*paths, resume=resume) if self.comm.rank == 0 else ""):
             raise ValueError(refused)
@@ -134,7 +141,7 @@ class DistributedLattice:
         arrays = arguments.together(parameters, more)
         arrays |= self.solver.defaults(
             arrays, lattice_sizes
-        )  # of the whole lattice, since a process has some of its planes
+        )  # defaults for the whole lattice, since this process has only some of its planes
         domain = _Domain(self, lattice_sizes, x0, h, arrays, begin, draws)
         marks = row_steps(steps, stride)
         shape = (len(marks), len(self.solver.coordinates), *lattice_sizes)
@@ -152,7 +159,7 @@ class DistributedLattice:
                     checkpoint.save(energy)
                 if progress:
                     progress(int(marks[k]))
-        except StepError:  # on all processes; the run cannot be gone on with
+        except StepError:  # raised on all processes; the run cannot be continued
             frames.close()
             frames.discard()
             if checkpoint:
@@ -170,8 +177,10 @@ class DistributedLattice:
 
 
 class _Domain:
-    """The planes of one process, with copies of neighbouring planes; a state that is open lacks the last flow of its
-    step."""
+    """The planes of one process, with copies of neighbouring planes.
+
+    ``open`` says that the state lacks the last flow of its step, which is merged with the first flow of the next step.
+    """
 
     def __init__(
         self,
@@ -204,7 +213,7 @@ class _Domain:
         session = lattice.solver.started(Beginning(checked, h, values, t0, draws))
         assert isinstance(session, CLatticeSession)
         self.session = session
-        if self.noisy:  # each site has the random numbers that it has in the whole
+        if self.noisy:  # each site receives the random numbers that it has in the whole lattice
             session.set_planes((self.planes[0] - ghosts[0]) % sizes[0], sizes[0])
         self.session.begin(h)
         self.fields = len(lattice.solver.coordinates)
@@ -213,10 +222,13 @@ class _Domain:
         self.saved = self._all()
         self.waiting = 0.0
 
-    # --- who has what
+    # --- distribution of planes
 
     def _share(self, planes: int, reach: int) -> tuple[int, int]:
-        """Return the planes of this process, as evenly distributed as the colour periods allow."""
+        """Return the first plane of this process and the plane after its last.
+
+        All processes have nearly the same number of planes, in multiples of the colour period.
+        """
         period, count, rank = self.lattice.period, self.comm.size, self.comm.rank
         if planes < count * max(reach, period):
             most = planes // max(reach, period)
@@ -226,14 +238,14 @@ class _Domain:
         return first, end
 
     def _neighbours(self) -> list[int | None]:
-        """Return the processes behind and ahead; None beyond open ends."""
+        """Return the ranks of the processes with the planes behind and ahead; None beyond an open end."""
         rank, count, is_open = self.comm.rank, self.comm.size, self.lattice.solver.interface.first_open
         behind = None if is_open and rank == 0 else (rank - 1) % count
         ahead = None if is_open and rank == count - 1 else (rank + 1) % count
         return [behind, ahead]
 
     def _planes_of(self, values: Given, first: int, end: int, axis: int) -> Floats:
-        """The planes first..end of an array, or of a function of planes; periodic beyond the ends."""
+        """Return the planes first … end − 1 of an array or of a function; indices beyond the ends wrap around."""
         size = self.sizes[0]
         if not callable(values):
             return np.take(np.asarray(values, dtype=np.float64), np.arange(first, end) % size, axis)
@@ -245,6 +257,7 @@ class _Domain:
         return np.concatenate([np.asarray(part, dtype=np.float64) for part in parts], axis)
 
     def _local(self, value: Any, first: int, end: int, name: str) -> Any:
+        """Return the planes of a parameter at sites; other parameters are returned unchanged."""
         if name in self.lattice.solver.interface.at_sites and (callable(value) or np.ndim(value)):
             return self._planes_of(value, first, end, axis=0)
         return value
@@ -252,7 +265,7 @@ class _Domain:
     # --- steps
 
     def advance(self, steps: int) -> None:
-        """Make a number of steps; the state is closed after that. Raises `StepError`."""
+        """Make a number of steps, after which the state is complete (not open). Raises `StepError`."""
         if steps:
             self._put_all(self.saved)
         end, stretch = self.steps + steps, STRETCH
@@ -271,17 +284,18 @@ class _Domain:
                 )
                 raise StepError(message, step=self.steps, status="NOT_FINITE")
         self._apply_last_flow()
-        self._tell_time(self.steps)
+        self._set_solver_time(self.steps)
 
-    def _tell_time(self, steps: int) -> None:
+    def _set_solver_time(self, steps: int) -> None:
+        """Set the time and the number of steps in the solver, if the Hamiltonian or the noise depends on them."""
         if self.lattice.solver.interface.time or self.noisy:
             self.session.passed(self.h, steps)
 
     def _attempt_steps(self, steps: int) -> bool:
-        """Make some steps, or none if they lead to values that are not finite."""
+        """Make ``steps`` steps and return True; if a value is not finite, restore the saved state and return False."""
         for step in range(steps):
-            self._tell_time(self.steps + step)
-            if self.noisy:  # the flows of two steps are not joined
+            self._set_solver_time(self.steps + step)
+            if self.noisy:  # with noise, the last flow of a step is not merged with the first flow of the next
                 for stage in range(self.joined):
                     self._stage(stage)
                 continue
@@ -298,17 +312,21 @@ class _Domain:
         return True
 
     def _apply_last_flow(self) -> None:
-        """Apply the last flow of a step, after saving the state before it."""
+        """Complete an open state by the last flow of its step; ``saved`` remains the open state."""
         if not self.open:
             return
-        self._tell_time(self.steps - 1)
+        self._set_solver_time(self.steps - 1)
         self._stage(self.joined - 1)
         if not self._holds() and self.far == 0:
             self._put_all(self.saved)
             self._stage(self.joined - 1, far=True)
 
     def _stage(self, number: int, far: bool = False) -> None:
-        """Make one sweep over all own planes: the inner ones while the neighbouring planes are being received."""
+        """Make one sweep over all planes of this process, with full-range functions if ``far``.
+
+        If the sweep reads outdated halos, the inner planes are updated while the halos are being received, and the
+        outer planes after that.
+        """
         stage, (first, end) = self.stages[number], self.own
         way = 1 if far or self.far else 0
         stale = stage.read & self.dirty
@@ -326,7 +344,10 @@ class _Domain:
         self.dirty = (self.dirty & ~stale) | stage.changed
 
     def _request_halos(self, fields: int) -> list[tuple[Any, int, tuple[int, int], Floats]]:
-        """Send the fields that the neighbours read, and request theirs."""
+        """Send the planes that the neighbours read, and request theirs, for each field of the bit mask ``fields``.
+
+        Returns (request, field, planes of the halo, buffer) for each message to be received.
+        """
         (behind, ahead), (first, end), (reach_behind, reach_ahead) = self.beside, self.own, self.reach
         requests, sent = [], []
         for field in (k for k in range(self.fields) if fields >> k & 1):
@@ -340,12 +361,13 @@ class _Domain:
                     sent.append(self.comm.Isend(self.session.planes(field, *mine), neighbour, 2 * field + tag))
                 if theirs[0] < theirs[1]:
                     buffer = np.empty((theirs[1] - theirs[0], *self.sizes[1:]))
-                    # what a neighbour ahead sends backwards has the tag of that
+                    # A message from the neighbour ahead has the tag 2 field, one from behind has 2 field + 1.
                     requests.append((self.comm.Irecv(buffer, neighbour, 2 * field + 1 - tag), field, theirs, buffer))
         self._sent = sent
         return requests
 
     def _received(self, requests: Sequence[tuple[Any, int, tuple[int, int], Floats]]) -> None:
+        """Wait for the requested planes, and copy them into the halos."""
         begin = time.perf_counter()
         _mpi().Request.Waitall([request for request, *_ in requests])
         self.waiting += time.perf_counter() - begin
@@ -356,6 +378,7 @@ class _Domain:
     # --- the state
 
     def _holds(self) -> bool:
+        """Whether all values of the state are finite, on every process."""
         return bool(self.comm.allreduce(int(self.session.holds(*self.own)), op=_mpi().MIN))
 
     def _all(self) -> list[Floats]:
@@ -367,11 +390,11 @@ class _Domain:
         self.dirty = (1 << self.fields) - 1
 
     def state(self) -> Floats:
-        """Planes of this process (coordinates, planes, …)."""
+        """The planes of this process, (coordinates, planes, …)."""
         return np.array([self.session.planes(field, *self.own) for field in range(self.fields)])
 
     def energy(self) -> float:
-        """H of the whole lattice, on all processes: the sum over planes, rounded once."""
+        """Return H of the whole lattice, on all processes; the sums of the planes are added with a single rounding."""
         self._received(self._request_halos(self.dirty))
         self.dirty = 0
         density = self.session.density()[self.own[0] : self.own[1]]
@@ -379,33 +402,37 @@ class _Domain:
         return math.fsum(value for part in self.comm.allgather(sums) for value in part.tolist())
 
     def restore(self, x: Floats, steps: int, full_range: int, is_open: bool) -> None:
-        """Continue from a state, of which each process has its planes."""
+        """Continue from a stored state; ``x`` has the planes of this process.
+
+        ``steps``, ``full_range`` and ``is_open`` are the attributes ``steps``, ``far`` and ``open`` stored with the
+        state.
+        """
         for field in range(self.fields):
             self.session.put_planes(field, *self.own, x[field])
         self.dirty = (1 << self.fields) - 1
         self.saved = self._all()
         self.steps, self.far, self.open = steps, full_range, is_open
-        self._tell_time(steps)
+        self._set_solver_time(steps)
 
     def saved_state(self) -> Floats:
-        """Planes of this process at the last saved state, from which further steps continue."""
+        """Return the planes of this process in the state from which further steps continue; this state may be open."""
         return np.array([values[self.own[0] : self.own[1]] for values in self.saved])
 
 
 def _part(path: Path) -> Path:
-    """Where frames are until all of them are there."""
+    """Return the path of the file of frames while the run is incomplete."""
     return path.with_name(path.name + ".part")
 
 
 def _objection(output: Path | None, checkpoints: Path | None, *, resume: bool) -> str:
-    """Reason why a run may not begin or continue with the existing files; "" if it may."""
+    """Return the reason why a run may not begin or continue with the existing files; "" if there is none."""
     if checkpoints:
         return objection(checkpoints, output, resume=resume, how="resume=True")
     return objection_to_frames(_part(output)) if output else ""
 
 
 class _SharedArrayFile:
-    """A ``.npy`` file of arrays (…, coordinates, *sizes) that all processes write and read their planes of."""
+    """``.npy`` file of arrays (…, coordinates, *sizes), of which each process writes and reads its own planes."""
 
     def __init__(self, domain: _Domain, path: Path, shape: tuple[int, ...], *, new: bool) -> None:
         self.domain = domain
@@ -424,17 +451,19 @@ class _SharedArrayFile:
         self.file = mpi.File.Open(domain.comm, str(path), mpi.MODE_RDWR)
 
     def _place(self, block: int) -> int:
+        """Return the offset in bytes of this process's planes in block ``block``; the file has one block for each array
+        and coordinate."""
         planes = self.domain.sizes[0]
         plane = 8 * math.prod(self.domain.sizes[1:])
         return self.start + (block * planes + self.domain.planes[0]) * plane
 
     def write(self, k: int, x: Floats) -> None:
-        """Write the planes of this process to array k."""
+        """Write the planes of this process into array number ``k``."""
         for field, values in enumerate(x):
             self.file.Write_at_all(self._place(k * len(x) + field), np.ascontiguousarray(values))
 
     def read(self) -> Floats:
-        """Read the planes of this process from the first array."""
+        """Return the planes of this process from the first array."""
         if self.file.Get_size() < self.start + 8 * self.domain.fields * math.prod(self.domain.sizes):
             raise ValueError(f"{self.path} is shorter than a state of this run")
         first, end = self.domain.planes
@@ -448,7 +477,7 @@ class _SharedArrayFile:
 
 
 class _Frames:
-    """Where frames go: an array of each process, or one file."""
+    """Frames of a run, in an array of each process, or in one file if there is a path."""
 
     def __init__(self, domain: _Domain, path: Path | None, shape: tuple[int, ...], *, new: bool) -> None:
         self.domain, self.path, self.array = domain, path, None
@@ -457,11 +486,12 @@ class _Frames:
             self.array = filled(f"{shape[0]} frames", (shape[0], shape[1], end - first, *shape[3:]))
             return
         if path.suffix != ".npy":
-            raise ValueError(f"frames of processes go to files that end in .npy, not {str(path)!r}")
+            raise ValueError(f"output= must be a file that ends in .npy, not {str(path)!r}")
         self.part = _part(path)
         self.file = _SharedArrayFile(domain, self.part, shape, new=new)
 
     def put(self, k: int) -> None:
+        """Store the current state as frame ``k``."""
         x = self.domain.state()
         if self.array is not None:
             self.array[k] = x
@@ -480,7 +510,7 @@ class _Frames:
         self.domain.comm.barrier()
 
     def finish(self) -> None:
-        """Give the file its name."""
+        """Rename the complete file of frames to its final path."""
         self.domain.comm.barrier()
         if self.path and self.domain.comm.rank == 0:
             self.part.replace(self.path)
@@ -488,7 +518,11 @@ class _Frames:
 
 
 class _StoredState:
-    """A state to go on from, in a file beside its description: two of them in turn, so that one is always whole."""
+    """The stored state of a run, at ``path``, from which the run can be continued.
+
+    A JSON file at ``path`` describes the state; its values are in one of two files that are written alternately, so
+    that the last complete state is never overwritten.
+    """
 
     def __init__(self, domain: _Domain, path: Path, run: Sequence[float]) -> None:
         self.domain, self.path = domain, path
@@ -497,10 +531,11 @@ class _StoredState:
         self.identity = {"solver": domain.lattice.solver.backend.identity, **identity}
 
     def _file(self, count: int) -> Path:
+        """Return the file of the values after ``count`` frames."""
         return self.path.with_name(f"{self.path.name}.{count % 2}.npy")
 
     def save(self, energy: Sequence[float]) -> None:
-        """Keep the state after so many frames, then say so."""
+        """Store the state after the frame of the last of these energies, and then its description."""
         domain, count = self.domain, len(energy)
         state_file = _SharedArrayFile(domain, self._file(count), (domain.fields, *domain.sizes), new=True)
         state_file.write(0, domain.saved_state())
@@ -512,7 +547,10 @@ class _StoredState:
                 file.write(json.dumps({"identity": self.identity, **record}).encode())
 
     def restored(self) -> list[float]:
-        """Go on from what was kept; the energies of the frames before. Raises `ValueError` for that of another run."""
+        """Continue from the stored state, and return the energies of its frames; [] if nothing is stored.
+
+        Raises `ValueError` if the state is that of another run.
+        """
         domain = self.domain
         text = domain.comm.bcast(self._text() if domain.comm.rank == 0 else None)
         if not text:
@@ -527,13 +565,14 @@ class _StoredState:
         return energy
 
     def _text(self) -> str:
+        """Return the text of the stored description; "" if there is none."""
         if not self.path.exists():
             return ""
         with opened(self.path) as file:
             return file.read().decode()
 
     def remove(self) -> None:
-        """At the end of the run."""
+        """Remove all files of the stored state, on all processes together."""
         if self.domain.comm.rank == 0:
             for path in (self.path, self._file(0), self._file(1)):
                 path.unlink(missing_ok=True)

@@ -9,9 +9,10 @@ from phigen.errors import MissingPackageError
 
 
 def imported(name: str, user: str = "this", installed_by: str = "") -> Any:
-    """Return a module. Raises `MissingPackageError`: its ``user`` needs the package, which pip installs.
+    """Return the module of that name. Raises `MissingPackageError` if the package is not installed.
 
-    ``installed_by`` are the arguments of ``pip install``, the name of the package by default.
+    The message says that ``user`` needs the package. ``installed_by`` are the arguments of ``pip install``, by default
+    the name of the package.
     """
     package = name.partition(".")[0]
     try:

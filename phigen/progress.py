@@ -1,7 +1,7 @@
-"""Progress of the compiler: named, nested stages, for any observer.
+"""Progress of the compiler: named, nested stages that an observer can follow.
 
-The compiler reports its stages by ``with stage("Jacobi identity", total=n) as progress: … progress.done = k``.
-Without an observer a stage costs a microsecond. The command line shows them, see `phigen.cli.display`.
+The compiler reports its stages by ``with stage("Jacobi identity", total=n) as progress: … progress.done = k``. Without
+an observer, a stage costs a microsecond. The command line shows the stages, see `phigen.cli.display`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from contextlib import contextmanager
 
 
 class Stage:
-    """A stage: ``done`` out of ``total`` pieces (0 if the number is unknown), and its start."""
+    """Stage of a compilation: ``done`` out of ``total`` parts (0 if the total is unknown), and the time of its
+    start."""
 
     __slots__ = ("_end", "_stack", "began", "done", "name", "total")
 
@@ -45,7 +46,7 @@ class Stage:
         return f"{self.name}, {self.done}" if self.done else self.name
 
 
-#: The function that is called at the start and end of a stage, with the active stages, outermost first.
+#: Function that is called at the start and at the end of each stage, with the active stages, outermost first.
 Watcher = Callable[[tuple[Stage, ...]], None]
 
 stage = Stage
@@ -64,7 +65,7 @@ _here = _Here()
 
 @contextmanager
 def watched(watcher: Watcher) -> Iterator[None]:
-    """Within this context, ``watcher`` receives the stages of this thread."""
+    """Context in which ``watcher`` receives the stages of this thread."""
     previous_watcher, _here.watcher = _here.watcher, watcher
     try:
         yield

@@ -1,4 +1,4 @@
-"""Opening files for reading: regular ones only.
+"""Opening of files for reading, restricted to regular files.
 
 A pipe or a terminal would block the reader, and devices such as /dev/zero have no end.
 """
@@ -14,9 +14,12 @@ from typing import BinaryIO
 
 
 def opened(path: str | Path) -> BinaryIO:
-    """Open a regular file. Raises `OSError` naming it for anything else, and `ValueError` for names with zeros."""
-    # The file is opened without blocking, and its type is checked after that, so that nothing can replace it in
-    # between.
+    """Open a regular file for reading bytes.
+
+    Raises `OSError` with the path for anything else, and `ValueError` for a path with a null character.
+    """
+    # The type is checked on the open file, so that nobody can replace the file between check and opening. Opening
+    # without blocking lets pipes fail too.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):

@@ -1,7 +1,7 @@
-"""The targets: the languages that phigen writes solvers in.
+"""Registry of the targets, the languages in which phigen writes solvers.
 
-Every list of targets derives from this one: choices of the command line, allowed values in specs, suffixes of
-generated files, targets that can be loaded. Emitters and loaders are imported on request.
+Other lists of targets derive from this one: choices of the command line, allowed values in specs, suffixes of generated
+files, targets that can be loaded. Emitters and loaders are imported on request.
 """
 
 from __future__ import annotations
@@ -19,13 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Target:
-    """A language in which phigen writes solvers.
+    """Language in which phigen writes solvers, or a device that runs solvers.
 
-    ``emitter`` is the module whose ``emit(program, command)`` gives file names and their contents; it takes
-    ``single_file`` too if that is offered. ``loader`` is the module whose ``load(files, interface)`` makes a back end
-    of them, empty if Python cannot run them. ``suffixes`` are the suffixes of all files, the main file's first.
-    Specs that name no targets get the targets with ``default``. A ``device`` is where Python runs the files of the
-    target device; the host runs the files of another target.
+    ``emitter`` is the module with the function ``emit(program, command)``, which returns file names and contents; if
+    ``single_file`` is set, the function takes this argument too. ``loader`` is the module with the function
+    ``load(files, interface)``, which returns a back end; it is empty if Python cannot run the files. ``suffixes`` has
+    the suffixes of all files, the suffix of the main file first. ``default`` marks the targets of specs that name none.
+    ``compiled`` says that a compiler is needed.
+
+    ``device`` marks a device, such as OpenCL. It runs the files of the target ``device``, together with the files of a
+    target for the host.
     """
 
     name: str
@@ -39,18 +42,19 @@ class Target:
     device: bool = False
 
     def emit(self, program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
-        """File names and contents; ``command`` is what regenerates them."""
+        """Return file names and contents; ``command`` is the command line that regenerates the files."""
         options = {"single_file": True} if single_file and self.single_file else {}
         return cast(dict[str, str], import_module(self.emitter).emit(program, command, **options))
 
     def expect_offered(self, program: Program) -> None:
-        """Raise the `SpecError` with which ``emit`` would refuse a program, without emitting it."""
+        """Raise the `SpecError` with which ``emit`` would refuse a program."""
         refuse = getattr(import_module(self.emitter), "expect_offered", None)
         if refuse is not None:
             refuse(program)
 
     def load(self, files: Mapping[str, str], interface: Interface, device: int | None = None) -> Backend:
-        """The back end of generated files, on the device of a number. Raises `ToolchainError`."""
+        """Return the back end that runs generated files; ``device`` is the number of a device. Raises
+        `ToolchainError`."""
         options = {} if device is None else {"device": device}
         return cast("Backend", import_module(self.loader).load(files, interface, **options))
 
@@ -71,27 +75,27 @@ _LISTED = (
     Target("js", "JavaScript", (".mjs",), "phigen.targets.js.emitter"),
 )
 
-#: All targets by name.
+#: The targets by name.
 TARGETS: Mapping[str, Target] = {target.name: target for target in _LISTED}
 
 _DEVICE = TARGETS["device"]
 
-#: The device on which Python runs the files of the target device.
+#: The devices by name; they run the files of the target device.
 DEVICES: Mapping[str, Target] = {
     name: replace(_DEVICE, name=name, title=title, loader=f"phigen.runtime.devices.{name}", device=True)
     for name, title in (("opencl", "OpenCL"), ("cuda", "CUDA"))
 }
 
-#: Default targets of specs, and targets that Python can run.
+#: Default targets of specs, and targets that Python can load.
 DEFAULT = tuple(target.name for target in _LISTED if target.default)
 LOADABLE = tuple(target.name for target in _LISTED if target.loader)
 
-#: The names of all that Python can run a solver on.
+#: Names of all targets and devices on which Python can run a solver.
 RUNNABLE = (*LOADABLE, *DEVICES)
 
 
 def find(name: str) -> Target:
-    """The target or device of that name. Raises `ValueError` with a hint if there is none."""
+    """Return the target or device of that name. Raises `ValueError` with a hint if there is none."""
     if name in DEVICES:
         return DEVICES[name]
     if name not in TARGETS:
@@ -109,21 +113,21 @@ def find(name: str) -> Target:
 
 
 def automatic(*, compiler: bool) -> str:
-    """Return the default target: the first that Python can run on this machine."""
+    """Return the name of the first target that Python can load; ``compiler`` says whether there is a C compiler."""
     return next(name for name in LOADABLE if compiler or not TARGETS[name].compiled)
 
 
 def suffixes(targets: Iterable[str] = TARGETS) -> list[str]:
-    """The suffixes of the files of these targets, of all by default."""
+    """Return the suffixes of the files of some targets, by default of all targets."""
     return [suffix for target in targets for suffix in TARGETS[target].suffixes]
 
 
 def loadable(targets: Iterable[str]) -> tuple[str, ...]:
-    """Those among some targets that Python can run."""
+    """Return the targets, among those given by name, that Python can load."""
     return tuple(target for target in targets if target in LOADABLE)
 
 
 def target_of(files: Iterable[str], name: str) -> Target:
-    """The target whose main file is among the files of a solver."""
+    """Return the target of the files of a solver, by the name of its main file; ``name`` is the name of the solver."""
     file_names = set(files)
     return next(target for target in _LISTED if f"{name}{target.suffixes[0]}" in file_names)

@@ -1,4 +1,4 @@
-"""Locations of the files that are not Python: in a wheel inside the package, in a checkout beside it."""
+"""Locations of templates and bundled specs, which a wheel has inside the package and a checkout beside it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def templates() -> Path:
-    """The folder of the templates, with one sub-folder per target.
+    """Return the folder of the templates, with one sub-folder per target.
 
     Raises `FileNotFoundError` if the installation is incomplete.
     """
@@ -18,7 +18,7 @@ def templates() -> Path:
 
 
 def bundled_specs() -> Path:
-    """The folder of the bundled spec files, ``NAME.yaml``; those of lattices are in ``lattices``.
+    """Return the folder of the bundled spec files, ``NAME.yaml``; lattices are in its sub-folder ``lattices``.
 
     Raises `FileNotFoundError` if the installation is incomplete.
     """
@@ -26,36 +26,39 @@ def bundled_specs() -> Path:
 
 
 def bundled() -> dict[str, Path]:
-    """The files of the bundled specs by their names, lattices last."""
+    """Return the paths of the bundled spec files by name, lattices last."""
     folder = bundled_specs()
     files = [*sorted(folder.glob("*.yaml")), *sorted(folder.glob("lattices/*.yaml"))]
     return {path.stem: path for path in files}
 
 
 def bundled_name(file: str) -> str | None:
-    """The name of the bundled spec that is in a file, None if that is another file."""
+    """Return the name of a bundled spec by the path of its file; None for other files."""
     path = Path(file)
     return path.stem if path.is_absolute() and bundled().get(path.stem) == path else None
 
 
 def file_of(source: str) -> str:
-    """Return the path itself if there is such a file, or if no bundled spec has that name; else the path of the
-    bundled spec."""
+    """Return the path of a spec file: ``source`` if this is a file, or else the bundled spec of that name.
+
+    If there is neither, ``source`` is returned unchanged.
+    """
     try:
         exists = Path(source).is_file()
-    except OSError:  # too long for a name
+    except OSError:  # the text is too long for a file name
         exists = False
     return source if exists else str(bundled().get(source, source))
 
 
 def missing(source: str) -> Diagnostic:
-    """Return the error for a text that names neither a file nor a bundled spec, with suggestions."""
+    """Return the error for a text that names neither a file nor a bundled spec, with a hint."""
     also = "" if set(source) & {"/", "."} else ", and no bundled spec has that name"
     return Diagnostic(f"there is no file {source!r}{also}", hint=suggestion(source))
 
 
 def suggestion(source: str) -> str:
-    """The hint for a spec that was not found: a bundled one or a file of nearly that name, or how to find one."""
+    """Return the hint for a spec that was not found: a bundled spec or a file with a similar name, or how to list the
+    specs."""
     from difflib import get_close_matches
 
     path, names = Path(source), bundled()
@@ -73,7 +76,7 @@ def suggestion(source: str) -> str:
 
 
 def _find(name: str) -> Path:
-    # The checkout is tried second: a wheel must not use an unrelated folder in site-packages.
+    # The checkout is tried second, since beside an installed package there may be an unrelated folder of that name.
     for folder in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):
         if folder.is_dir():
             return folder

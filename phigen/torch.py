@@ -1,7 +1,7 @@
 """Runs of solvers as functions of PyTorch, with gradients. Needs torch.
 
-The solver runs on the CPU, in double precision. Derivatives are those of `Solver.pullback`; second ones are not
-offered.
+The solver runs on the CPU, in double precision. Gradients are computed by `Solver.pullback`; there are no second
+derivatives.
 """
 
 from __future__ import annotations
@@ -29,12 +29,15 @@ def propagator(
     t0: float | None = None,
     **shared: Any,
 ) -> Callable[..., Any]:
-    """The run of a solver as ``f(x0, parameters={})``: the last state, of the shape (…, DIM) of the tensor ``x0``.
+    """Return the run of a solver as a function f(x0, parameters={}) of tensors, with gradients exact to round-off.
 
-    With a ``stride`` all rows of `Solver.integrate`, (…, rows, DIM). ``parameters`` are tensors by name, of shapes that
-    broadcast to (…); what is not given has its default. Results have the precision and the device of x0. Gradients are
-    exact to round-off, and ask for a solver compiled with ``adjoint=True``. Of a lattice DIM is (coordinates, *sizes);
-    further arguments, such as ``bonds=``, are those of all its runs. Raises `StepError`.
+    ``x0`` has the shape (…, DIM), and so has the result, the last state. With a ``stride``, the result has all rows of
+    `Solver.integrate`, (…, rows, DIM). For a lattice, DIM stands for (coordinates, *sizes). ``parameters`` are tensors
+    by name, whose shapes broadcast to (…); other parameters have their defaults. Results have the precision and the
+    device of ``x0``.
+
+    The solver must be compiled with ``adjoint=True``. Further arguments, such as ``bonds=``, apply to all runs of the
+    function, which raises `StepError`.
     """
     runs = Propagation(solver, h, steps, stride, t0, shared)
 
@@ -47,7 +50,7 @@ def propagator(
 
 
 class _DifferentiableRun(torch.autograd.Function):  # type: ignore[misc]
-    """The run, and its transpose."""
+    """PyTorch function of a run, with its transposed derivative for the backward pass."""
 
     @staticmethod
     def forward(runs: Propagation, names: tuple[str, ...], x0: Any, *values: Any) -> Any:

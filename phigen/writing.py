@@ -1,7 +1,7 @@
-"""Files that are written completely or not at all, together or not at all, and errors that name their file.
+"""Atomic writing: a file, or several files together, are written completely or not at all.
 
-Contents are first written to temporary files in the same folder, which replace the files when all are on the disk.
-So readers never see incomplete files, and a full disk leaves the old ones.
+Contents are first written to temporary files in the same folder, which replace the files when all are on the disk. So
+readers never see incomplete files, and a full disk leaves the old files unchanged. Errors name the file.
 """
 
 from __future__ import annotations
@@ -14,13 +14,16 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-#: Folders of files that are no files: devices, and names of what is open already.
+#: Folders whose entries are devices or open file descriptors, which are written directly rather than replaced.
 _DEVICES = ("/dev/", "/proc/")
 
 
 @contextmanager
 def naming(path: str | Path) -> Iterator[None]:
-    """Errors of the operating system name this file: a full disk names none, and a temporary file means nothing."""
+    """Context in which errors of the operating system name this file.
+
+    Errors of a full disk name no file, and errors of a temporary file name one that users do not know.
+    """
     try:
         yield
     except OSError as error:
@@ -28,17 +31,17 @@ def naming(path: str | Path) -> Iterator[None]:
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Replace a file as a whole; a device or a pipe is written to. Raises `OSError` naming the file."""
+    """Replace a file atomically, or write to a device or a pipe. Raises `OSError` that names the file."""
     if str(path).startswith(_DEVICES) or (path.exists() and not path.is_file()):
         with naming(path):
             path.write_bytes(_encoded(content))
         return
-    # A link to the file is kept.
+    # If the path is a symbolic link, its target is replaced, so that the link remains.
     write_all({path.resolve() if path.is_symlink() else path: content})
 
 
 def write_all(contents: Mapping[Path, str | bytes]) -> None:
-    """Replace files as wholes, all or none; folders are made. Raises `OSError` naming the file that was the reason."""
+    """Replace all files or none; missing folders are created. Raises `OSError` that names the file with the error."""
     pending: list[_Pending] = []
     with ExitStack() as cleanup:
         for path, content in contents.items():
@@ -55,7 +58,10 @@ def write_all(contents: Mapping[Path, str | bytes]) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Within this context, a file to write to, which replaces ``path`` at the end. Raises `OSError` naming ``path``."""
+    """Context with a binary file to write, which replaces ``path`` at the end. Raises `OSError` that names ``path``.
+
+    If the context raises, ``path`` remains unchanged.
+    """
     pending = _Pending(path)
     try:
         with naming(path):
@@ -68,7 +74,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 class _Pending:
-    """A temporary file that will replace another."""
+    """Temporary file that will replace the file at ``path``."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -80,14 +86,14 @@ class _Pending:
         self._temporary = Path(temporary)
 
     def settle(self) -> None:
-        """Write everything to the disk, which may turn out to be full only now."""
+        """Write everything to the disk, which reports only now if it is full."""
         self.file.flush()
         os.fsync(self.file.fileno())
         self.file.close()
         self._temporary.chmod(_mode(self.path))
 
     def take_place(self) -> None:
-        """Replace the file by the temporary file, atomically."""
+        """Replace the file at ``path`` by the temporary file, atomically."""
         with naming(self.path):
             self._temporary.replace(self.path)
 
@@ -110,12 +116,13 @@ def _make_folder(folder: Path, cleanup: ExitStack) -> None:
 
 
 def _remove_folder(folder: Path) -> None:
-    with suppress(OSError):  # another process has created a file there
+    with suppress(OSError):  # not empty: another process has created a file in the folder
         folder.rmdir()
 
 
 def _mode(path: Path) -> int:
-    """The permissions of the file that is replaced, else those of a new file; mkstemp makes private ones."""
+    """Return the permissions of the file to be replaced, or those that a new file gets; mkstemp creates private
+    files."""
     try:
         return path.stat().st_mode & 0o777
     except OSError:
@@ -125,5 +132,5 @@ def _mode(path: Path) -> int:
 
 
 def _encoded(content: str | bytes) -> bytes:
-    # Names of files that are no UTF-8 have surrogates.
+    # Names of files that are no valid UTF-8 contain surrogates, which are written as escapes.
     return content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")

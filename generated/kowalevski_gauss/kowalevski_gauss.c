@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 67767d5d841b47568d253e43d247abe4980429bd4c2fad91b99635911924a78b
+ * body-sha256: 592410526d5c9ed4db1003d44aac628f909803a1c259746945b64118b59dc9f6
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -301,8 +301,8 @@ static inline void kowalevski_gauss_mix_twice(const double matrix[kowalevski_gau
 
 enum {
     kowalevski_gauss_ITERATED = kowalevski_gauss_UNKNOWNS, /* unknowns that sweeps iterate */
-    kowalevski_gauss_READS = kowalevski_gauss_UNKNOWNS,    /* values that they read */
-    kowalevski_gauss_FACTORS = 1                           /* of a stage: its weight */
+    kowalevski_gauss_READS = kowalevski_gauss_UNKNOWNS,    /* values that sweeps read */
+    kowalevski_gauss_FACTORS = 1                           /* number of factors of a stage: its weight */
 };
 
 /* kowalevski_gauss_stage_field in all lanes. */
@@ -478,7 +478,7 @@ static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int 
         for (int r = 0; r < kowalevski_gauss_READS; ++r)
             kowalevski_gauss_mix_twice(kowalevski_gauss_prediction[predictor], last[kowalevski_gauss_READ(r)],
             older[kowalevski_gauss_READ(r)], reads[r]);
-    else /* the last one reads the last step only */
+    else /* the last predictor reads one step only */
         for (int r = 0; r < kowalevski_gauss_READS; ++r)
             kowalevski_gauss_mix(kowalevski_gauss_prediction[predictor], last[kowalevski_gauss_READ(r)],
             reads[r]);

@@ -1,1 +1,1 @@
-"""Attitude and position: the group element whose coadjoint action is a step on the dual of a Lie algebra."""
+"""Attitudes and positions: the group element whose coadjoint action is a step on the dual of a Lie algebra."""

@@ -1,16 +1,16 @@
-"""Elements of the rotation group and of the group of motions, as formulas in which nothing cancels.
+"""Elements of the rotation group and of the group of motions, as formulas without cancellation.
 
-A rotation is the unit quaternion (w, x, y, z) less 1: small numbers for small rotations. With φ as in
-`phigen.symbolic.special` and |p|² = s, exp(p/2) is the quaternion (c, p/4) divided by its length, c = 1 − φ(s/4)s/4,
-and exp(p) its square, which needs no root:
+A rotation is represented by its unit quaternion (w, x, y, z) minus (1, 0, 0, 0), whose entries are small for small
+rotations. Let |p|² = s, and φ as in `phigen.symbolic.special`. Then exp(p/2) is the quaternion (c, p/4) divided by its
+length, where c = 1 − φ(s/4)s/4. Its square exp(p) needs no root:
 
     (c² − u, cp/2)/(c² + u),    u = s/16.
 
-The Cayley transform of p is (1, p/2) divided by its length. exp(p, t) translates by
+The Cayley transform of p is (1, p/2) divided by its length. The translation of exp(p, t) is
 
     (c(c² − u) t + c²/2 p×t + (c + 2c² + u − 4c³φ(s/4))/16 p (p·t))/(c² + u)²
 
-and the Cayley transform by (t + ½p×t + ¼p (p·t))/(1 + s/4).
+and the translation of the Cayley transform is (t + ½p×t + ¼p (p·t))/(1 + s/4).
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ _HALF = number(Fraction(1, 2))
 
 @dataclass(frozen=True)
 class Direction:
-    """An element before division: the quaternion ``turn`` by its ``length``, ``shift`` by the square of that.
+    """Group element before its division by lengths.
 
-    ``factor`` is the ratio of ``turn`` to that of `with_phi`.
+    The rotation is the quaternion ``turn`` divided by its ``length``; the translation is ``shift`` divided by
+    ``length``². ``factor`` is the ratio of ``turn`` to the ``turn`` of `with_phi`.
     """
 
     turn: tuple[Expression, ...]
@@ -40,7 +41,7 @@ class Direction:
 
 
 def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
-    """exp(p, t), or its Cayley transform; ``t`` may be empty."""
+    """Return exp(p, t), or its Cayley transform if ``cayley``; ``t`` is empty for rotations."""
     s = dot(p, p)
     if cayley:
         increment = with_phi(p, t, ZERO)
@@ -54,14 +55,17 @@ def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
 
 
 def with_phi(p: Vector, t: Vector, phi: Expression) -> Direction:
-    """The element for a given value of φ(s), with the square of its length: ((1 − sφ), p/2). φ = 0: Cayley."""
+    """Return the element with the quaternion (1 − sφ, p/2), for any φ; φ = 0 gives the Cayley transform.
+
+    Here, ``length`` is the square of the length of the quaternion.
+    """
     s = dot(p, p)
     c = ONE - s * phi
     return Direction((c, *(pi / 2 for pi in p)), _shift(p, t, (c, _HALF, (ONE - 4 * c * phi) / 4)), c**2 + s / 4)
 
 
 def _shift(p: Vector, t: Vector, factors: Vector) -> tuple[Expression, ...]:
-    """The combination of t, p×t and p (p·t)."""
+    """Return the combination of t, p×t and p (p·t) with three factors; () if ``t`` is empty."""
     if not t:
         return ()
     a, b, axial = factors[0], factors[1], factors[2] * dot(p, t)
@@ -69,7 +73,8 @@ def _shift(p: Vector, t: Vector, factors: Vector) -> tuple[Expression, ...]:
 
 
 def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
-    """The quaternion of p minus 1 and, if ``t`` is not empty, its translation."""
+    """Return the quaternion of exp(p) or of the Cayley transform, minus 1, and its translation unless ``t`` is
+    empty."""
     increment = direction(p, t, cayley=cayley)
     per = ONE / increment.length
     s = dot(p, p)
@@ -78,11 +83,12 @@ def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
 
 
 def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
-    """exp(r), or exp(r, t), in the same form, for rotations by any angle.
+    """Return exp(r) or exp(r, t), minus 1, for rotations by any angle.
 
-    Without a translation and about a coordinate axis it is not divided by its length: (1, tan(|r|/2)) is the
-    cheapest form, since a flow knows the angle anyway. Products are normalised at the end of a step. With a
-    translation it has sin and 1 − cos of half the angle, as the flow in `phigen.attitude.flow_elements.by_angles`.
+    For a rotation about a coordinate axis without a translation, the quaternion is (1, tan(|r|/2)), not of unit length.
+    This form is the cheapest, since the flow computes sin and cos of the angle anyway; products of elements are
+    normalised at the end of a step. With a translation, the quaternion uses sin and 1 − cos of half the angle, as does
+    the flow (see `phigen.attitude.flow_elements.by_angles`).
     """
     s, turning = dot(r, r), [ri for ri in r if not ri.is_zero]
     if len(turning) == 1 and not t:
@@ -112,7 +118,7 @@ def cross(a: Vector, b: Vector) -> list[Expression]:
 
 
 def product(a: Vector, b: Vector) -> list[Expression]:
-    """The product of two quaternions."""
+    """Return the product of two quaternions (w, x, y, z)."""
     cross_product = cross(a[1:], b[1:])
     return [
         a[0] * b[0] - dot(a[1:], b[1:]),
@@ -121,7 +127,7 @@ def product(a: Vector, b: Vector) -> list[Expression]:
 
 
 def rotated(q: Vector, v: Vector) -> list[Expression]:
-    """q v q̄: the vector rotated, and scaled by |q|²."""
+    """Return q v q̄: the vector v, rotated by the quaternion q and scaled by |q|²."""
     w, u = q[0], q[1:]
     axial, size, once = dot(u, v), w**2 - dot(u, u), cross(u, v)
     return [size * a + 2 * axial * b + 2 * w * c for a, b, c in zip(v, u, once, strict=True)]

@@ -1,11 +1,11 @@
-"""The elements of exact flows: of parts of H whose gradient is constant along their own flow, exp(t∇H_k).
+"""Group elements of exact flows of parts of H.
 
-A part is written as c C + Q + R with a Casimir C, Q = ½c′|m|² for the angular momentum m, and R, such that the
-gradients of Q and of R are constant along the flows of both. Then the flow of the part is, in the group, exp(t∇Q)
-exp(t∇R) times the rotation by C. This rotation does not change x, and over a step its times add up to h, so it is
-applied once. If it is not uniform (with forces, a monitor, the time in H, or noise), C has an element in each flow,
-like Q and R. A flow that is composed of commuting ones has the product of their elements. Free rigid bodies have those
-of `phigen.attitude.free_bodies`.
+A part is written as C + Q + R with a multiple C of a Casimir, Q = ½c|m|² with the angular momentum m, and a rest R. The
+gradients of Q and of R must be constant along the flows of both. Then the group element of the flow is exp(t∇Q)
+exp(t∇R), times the rotation by C. This rotation does not change x, and its times in the flows of a step add up to h. So
+it is applied once in a step. With forces, a monitor, time in H, or noise, the rotation is not uniform; then C has an
+element in each flow, as Q and R have. The element of a flow that is composed of commuting flows is the product of their
+elements. Elements of free rigid bodies are in `phigen.attitude.free_bodies`.
 """
 
 from __future__ import annotations
@@ -39,15 +39,15 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import PROVED, Statement, decide_zero
 
-#: Most commuting flows of one part whose orders are all tried.
+#: Largest number of commuting summands of a part whose orders are all tried: 4! = 24 orders.
 MOST_PIECES = 4
 
 
 @dataclass(frozen=True)
 class Turning:
-    """A part as ``casimir`` + the sum of ``terms`` + ``bodies``, whose flows are made in turn.
+    """Part of H as a sum of ``casimir``, ``terms`` and ``bodies``, with the flows of the summands one after the other.
 
-    ``put_back`` says whether the rotation by the Casimir is applied once a step.
+    If ``put_back`` is set, the rotation by the Casimir is applied once in a step, not in each flow.
     """
 
     casimir: Expression
@@ -57,18 +57,19 @@ class Turning:
 
     @property
     def factors(self) -> list[Expression]:
-        """The summands that have a group element of their own, except the free rigid bodies."""
+        """The summands, other than free rigid bodies, whose flows have a group element in each flow of the part."""
         turning = self.terms if self.put_back else (self.casimir, *self.terms)
         return [e for e in turning if not e.is_zero]
 
     @property
     def left(self) -> Expression:
-        """The summands that have none."""
+        """The summand without a group element in each flow: the Casimir if ``put_back`` is set, else 0."""
         return self.casimir if self.put_back else ZERO
 
 
 def by_angles(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> tuple[Flow, ...]:
-    """The flows written with functions of half the angles, which their group elements need in any case."""
+    """Return the flows with increments in terms of functions of half the angles; the group elements need these
+    functions anyway."""
     turning_parts = turnings(system, group, flows, put_back=put_back)
     return tuple(_by_angles(system, group, flow, turning) for flow, turning in zip(flows, turning_parts, strict=True))
 
@@ -93,7 +94,10 @@ def _by_angles(system: System, group: Group, flow: Flow, turning: Turning) -> Fl
 
 
 def _of_angle(function: str, sign: Expression, angle: Expression, *, double: bool) -> Expression:
-    """A function of an angle or of its double, in terms of the sine and 1 − cosine of the angle."""
+    """Return sin, cos or 1 − cos (versin) of ``sign`` times the angle, or twice the angle if ``double``.
+
+    The result is written in sin and versin of the angle.
+    """
     sine, versine = call("sin", angle), call("versin", angle)
     if double:
         sine, versine = 2 * (sine * (ONE - versine)), 2 * sine**2
@@ -101,18 +105,18 @@ def _of_angle(function: str, sign: Expression, angle: Expression, *, double: boo
 
 
 def _of_square(function: str, square: Expression) -> Expression:
-    """A function of the root of 4s, in terms of functions of the root of s."""
+    """Return ``sinroot`` or ``cosroot`` of 4s in terms of these functions of s."""
     sine = call("sinroot", square)
     return sine * call("cosroot", square) if function == "sinroot" else ONE - 2 * (square * sine**2)
 
 
 def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> list[Turning]:
-    """Each part in this form. Raises `SpecError` that names the first that has none."""
+    """Return the `Turning` of each flow. Raises `SpecError` that names the first part without one."""
     return [_turning(system, group, flow, f"H_{k}", put_back=put_back) for k, flow in enumerate(flows, 1)]
 
 
 def _turning(system: System, group: Group, flow: Flow, name: str, *, put_back: bool) -> Turning:
-    """Return a part in this form, the terms that commute with free rigid bodies first."""
+    """Return the `Turning` of a flow. ``name`` stands for the part in messages."""
     summands = flow.pieces or (flow,)
     bodies = tuple(summand.motion for summand in summands if isinstance(summand.motion, EulerMotion))
     remaining = [summand.hamiltonian for summand in summands if not isinstance(summand.motion, EulerMotion)]
@@ -124,7 +128,10 @@ def _turning(system: System, group: Group, flow: Flow, name: str, *, put_back: b
 def turning_of(
     system: System, group: Group, h: Expression, name: str, pieces: Sequence[Expression] = (), *, put_back: bool
 ) -> Turning:
-    """A function in this form; ``pieces`` are commuting summands. Raises `SpecError` that names it if there is none."""
+    """Return a `Turning` of the function h; ``pieces`` are its commuting summands, if there are some.
+
+    Raises `SpecError` that contains ``name`` if phigen finds none.
+    """
     orders = permutations(pieces) if len(pieces) <= MOST_PIECES else iter([tuple(pieces)])
     for candidate in chain(_candidates(system, group, h), (Turning(ZERO, order) for order in orders if order)):
         if constancy(system, candidate, "").verdict == PROVED:
@@ -138,6 +145,7 @@ def turning_of(
 
 
 def _candidates(system: System, group: Group, h: Expression) -> Iterator[Turning]:
+    """Yield decompositions of h: h alone, with a multiple of |m|²/2 as a term, and with a multiple of a Casimir."""
     yield Turning(ZERO, (h,))
     if not group.matrices and group.vectors:
         m = [symbol(system.coordinates[i]) for i in group.rotation]
@@ -149,7 +157,7 @@ def _candidates(system: System, group: Group, h: Expression) -> Iterator[Turning
 
 
 def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expression]:
-    """The c for which h − c q has no second derivative along some coordinate."""
+    """Yield each c for which h − c q has no second derivative along at least one coordinate."""
     curvatures: list[Expression] = []
     for name in system.coordinates:
         numerator, denominator = (derivative(derivative(e, name), name) for e in (h, q))
@@ -165,7 +173,8 @@ def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expres
 
 
 def constancy(system: System, turning: Turning, name: str) -> Statement:
-    """The gradients of all factors are constant along the flows of the factor itself and of those before it."""
+    """Decide whether the gradient of each factor is constant along the flow of the factor and of the factors before
+    it."""
     names, residuals = system.coordinates, list[tuple[str, Expression]]()
     fields = [hamiltonian_vector_field(system.poisson, gradient(f, names)) for f in turning.factors]
     for k, factor in enumerate(turning.factors):
@@ -180,9 +189,10 @@ def constancy(system: System, turning: Turning, name: str) -> Statement:
 def factor_elements(
     system: System, group: Group, turning: Turning, t: Expression | None = None
 ) -> list[list[Expression]]:
-    """The elements of the factors and of bodies, less 1, for the time ``t``, at the state before the flow.
+    """Return the elements, minus 1, of the factors and then of the bodies, as functions of the state before the flow.
 
-    `SpecError` for matrices whose exponential has no closed form.
+    ``t`` is the time of the flow, by default the symbol of the time step. Raises `SpecError` for matrices whose
+    exponential has no closed form.
     """
     t, elements = t or symbol(TIME), []
     for factor in turning.factors:
@@ -201,7 +211,7 @@ def factor_elements(
 
 
 def joined(group: Group, elements: Sequence[Sequence[Expression]]) -> list[Expression]:
-    """The element of the factors, one after the other, minus 1."""
+    """Return the product of elements of successive flows; arguments and result are elements minus 1."""
     leading, *following = elements
     result = list(leading)
     for later in following:

@@ -1,7 +1,8 @@
 """The group element of the exact flow of a free rigid body, by an elliptic integral of the third kind.
 
 Let x be the momentum in the body, ẋ = x × ω with ω_i = w_i x_i, and x' its value after the time t. The rotation from
-the body at t to the body at 0, which takes x' to x, is the shortest such rotation M, then one about x by θ|x|:
+the body at time t to the body at time 0 takes x' to x. It is the product of the shortest such rotation M and of a
+rotation about x by the angle θ|x|:
 
     M = (|x|² + x·x', x' × x),    θ̇ = ω'·(x + x')/(|x|² + x·x').
 
@@ -14,9 +15,9 @@ Then θ = t w_l − β_h n ∫S²/(1 − nS²)dt + χ/L, where χ is the angle o
 
     (1 − (Q − WC)T²/2(1 + D),  LS(c/L² + β_m(Q + W)T²/2(1 + D))).
 
-An error of the angle does not change the momentum in space. Near x' = -x, where M is undefined, the attitude has
-relative errors of about 1e-16/ν with ν = 1 + x·x'/|x|²; this occurs near the separatrix, from one unstable rotation
-to the opposite one. For momenta in space the element is the inverse of that for −H.
+An error of the angle does not change the momentum in space. Near x' = −x, where M is undefined, the attitude has
+relative errors of about 1e-16/ν with ν = 1 + x·x'/|x|². This occurs near the separatrix, on the way from one unstable
+rotation to the opposite one. If x are momenta in space, the element is the inverse of the element for −H.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ Vector = Sequence[Expression]
 
 
 def rotates(group: Group) -> bool:
-    """Whether elements are quaternions, or the matrices of the rotations of so(3)."""
+    """Whether elements of the group are quaternions, or the matrices of the rotations of so(3)."""
     if not group.matrices:
         return True
     if (group.dimension, group.rows) != (3, 3) or not group.orthogonal:
@@ -45,7 +46,7 @@ def rotates(group: Group) -> bool:
 
 
 def elements(motion: EulerMotion, group: Group, t: Expression) -> list[list[Expression]]:
-    """Return the elements, less 1, whose product is that of the flow for the time ``t``."""
+    """Return elements, minus 1, whose product is the element of the flow for the time ``t``."""
     weights = [derivative(derivative(motion.hamiltonian, name), name) for name in motion.coordinates]
     addition = motion.addition(t)
     x, changes = addition.x, addition.changes()
@@ -70,7 +71,7 @@ def elements(motion: EulerMotion, group: Group, t: Expression) -> list[list[Expr
 
 
 def _matrix(group: Group, q: Vector) -> list[Expression]:
-    """Return the rotation matrix of 1 + q, less 1, for a quaternion of any length."""
+    """Return the rotation matrix, minus 1, of the quaternion 1 + q, which may have any length."""
     once = group.generator(q[1:])
     w, rows = ONE + q[0], group.rows
     scale = 2 * power(w**2 + dot(q[1:], q[1:]), -1)
@@ -82,7 +83,7 @@ def _matrix(group: Group, q: Vector) -> list[Expression]:
 
 @dataclass(frozen=True)
 class _SortedAxes:
-    """x_i and w_i in the order l, m, h, with L² and 1/L²."""
+    """Components of the momentum x and of w in the order l, m, h of the axes; ``square`` is L², ``inverse`` is 1/L²."""
 
     x: Vector
     weights: Vector
@@ -91,32 +92,33 @@ class _SortedAxes:
 
     @property
     def betas(self) -> tuple[Expression, Expression, Expression]:
-        """β_l, β_m, β_h."""
+        """The constants β_l, β_m, β_h."""
         low, middle, high = self.weights
         return high - middle, low - high, middle - low
 
     @property
     def c(self) -> Expression:
-        """The constant c of the motion."""
+        """The constant c = β_h x_m² − β_m x_h²."""
         _, of_m, of_h = self.betas
         return of_h * self.x[1] ** 2 - of_m * self.x[2] ** 2
 
     @property
     def n(self) -> Expression:
-        """The parameter n of the integral."""
+        """The parameter n = β_m c of the elliptic integral."""
         return self.betas[1] * self.c
 
     @property
     def linear(self) -> tuple[Expression, Expression]:
-        """The factors of the time and of the integral in θ."""
+        """The factors of t and of the integral in θ: w_l and −β_h n."""
         return self.weights[0], -(self.betas[2] * self.n)
 
     def point(
         self, q: Expression, unit: Expression, square: Expression, s: Expression, c: Expression, d: Expression
     ) -> tuple[Expression, Expression]:
-        """Return the point of χ, its second entry over L, from Q, 1, T², S, C and D.
+        """Return the point whose angle is χ, with its second entry divided by L.
 
-        ``unit`` and ``square`` may have a common factor, which the point then has.
+        The arguments are Q, 1, T², S, C and D. If ``unit`` and ``square`` are 1 and T² times a common factor, the point
+        is multiplied by this factor too.
         """
         of_l, of_m, _ = self.betas
         ratio = self.c * self.inverse
@@ -126,17 +128,17 @@ class _SortedAxes:
 
 
 def identities() -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals that vanish if the element is that of the flow, in independent symbols x_i, w_i and S.
+    """Yield named residuals that vanish if the element is that of the flow, in independent symbols x_i, w_i and S.
 
-    That x' is the momentum after the flow is proved by the identities of the motion, with Ṡ = CD.
+    The residuals assume that x' is the momentum after the flow, which the identities of the motion prove; Ṡ = CD.
     """
     yield from _shortest_rotation()
-    for order in ((0, 2, 1), (1, 2, 0)):  # others follow by cyclic permutations
+    for order in ((0, 2, 1), (1, 2, 0)):  # cyclic permutations give the other orders of axes
         yield from _angle(order)
 
 
 def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of M x' = x and of Ṁ = M(ω − θ̇x')/2, up to its length, for any ω."""
+    """Yield the residuals of M x' = x and of Ṁ = M(ω − θ̇x')/2, the latter up to the length of M, for any ω."""
     x, omega = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "ω"))
     end = [symbol(Symbol("attitude", "end", i)) for i in range(2)]
     end.append(sqrt(dot(x, x) - dot(end, end)))

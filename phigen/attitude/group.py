@@ -1,10 +1,11 @@
-"""The group of a step: the rotations of so(3), the motions of se(3), or the matrices of a representation.
+"""The group of an attitude: rotations of so(3), motions of se(3), or matrices of a representation.
 
-On the dual of a Lie algebra a step x₀ → x₁ is the coadjoint action of one group element, τ of the covector p. Its
-product along a trajectory is the attitude g. Two conventions, by the sign of the bracket:
+On the dual of a Lie algebra, a step x₀ → x₁ is the coadjoint action of a group element, which is a map τ (exp or
+Cayley) of the covector p. The product of these elements along a trajectory is the attitude g. It maps the body to
+space. The sign of the bracket decides between two conventions:
 
-- minus, x the momenta in the body: ġ = g·Ω with Ω = ∇H, g takes body to space, the momentum in space is constant
-- plus, x the momenta in space: ġ = Ω·g, g takes body to space, the momentum in the body is constant
+- minus: x are momenta in the body, ġ = g·Ω with Ω = ∇H, and the momentum in space is constant
+- plus: x are momenta in space, ġ = Ω·g, and the momentum in the body is constant
 """
 
 from __future__ import annotations
@@ -30,11 +31,11 @@ Dense = tuple[tuple[Expression, ...], ...]
 
 @dataclass(frozen=True)
 class Group:
-    """A group and its algebra, with covectors of ``dimension`` components.
+    """Group of an attitude and its algebra, which has ``dimension`` components.
 
-    ``spatial`` says that x are momenta in space: elements are multiplied from the left. ``matrices``, one for each
-    component, exist if the attitude is a matrix; otherwise the components of ``rotation`` make quaternions, and
-    ``vectors`` are the vectors that they rotate.
+    ``spatial`` says that x are momenta in space, so that elements are multiplied from the left. If the attitude is a
+    matrix, ``matrices`` has the generator of each component. Otherwise the attitude is a quaternion: ``rotation`` has
+    the indices of the components of so(3), and ``vectors`` the indices of each vector that they rotate.
     """
 
     spatial: bool
@@ -45,7 +46,7 @@ class Group:
 
     @property
     def translation(self) -> tuple[int, ...]:
-        """The components that translate, if the algebra is se(3)."""
+        """The indices of the translations if the algebra is se(3); else ()."""
         return self.vectors[0] if self.dimension == 6 and len(self.vectors) == 1 else ()
 
     @property
@@ -55,21 +56,21 @@ class Group:
 
     @property
     def rows(self) -> int:
-        """Number of rows of a matrix; 0 for quaternions."""
+        """Number of rows of the matrices; 0 for quaternions."""
         return len(self.matrices[0]) if self.matrices else 0
 
     @property
     def size(self) -> int:
-        """Number of entries of an element: 4, 4 + 3, or those of a square matrix."""
+        """Number of entries of an element: 4 for quaternions, 7 for poses, rows² for matrices."""
         return self.rows**2 or (7 if self.translation else 4)
 
     @property
     def orthogonal(self) -> bool:
-        """Whether elements are quaternions or orthogonal matrices, those of skew ones."""
+        """Whether elements are quaternions or orthogonal matrices, that is, whether all generators are skew."""
         return all((m[i][j] + m[j][i]).is_zero for m in self.matrices for i in range(len(m)) for j in range(len(m)))
 
     def generator(self, p: Sequence[Expression]) -> list[Expression]:
-        """Σ p_i E_i, the entries row by row."""
+        """Return the matrix Σ p_i E_i, row by row."""
         size = range(self.rows)
         return [
             total(pi * m[i][j] for pi, m in zip(p, self.matrices, strict=True) if not (pi.is_zero or m[i][j].is_zero))
@@ -79,7 +80,11 @@ class Group:
 
 
 def group_of(system: System, requested: str, kind: str) -> Group:
-    """The group of a Lie–Poisson π; ``kind`` is that of the bi-realisation. Raises `SpecError` where there is none."""
+    """Return the group of a system for the value ``requested`` of ``reconstruct``; ``kind`` is the kind of its
+    bi-realisation.
+
+    Raises `SpecError` if π is not Lie–Poisson, or if its algebra has no such group.
+    """
     algebra = system.lie_algebra
     if algebra is None:
         hint = "attitudes need a Lie–Poisson structure, as that of a rigid body or a top"
@@ -89,12 +94,15 @@ def group_of(system: System, requested: str, kind: str) -> Group:
 
 
 def refused(system: System, message: str, hint: str = "") -> SpecError:
-    """The error at the key of the spec."""
+    """Return a `SpecError` at the key ``reconstruct`` of the spec."""
     return SpecError([Diagnostic(message, system.locations.get(("reconstruct",)), hint)])
 
 
 def _rotations(system: System, algebra: LieAlgebra) -> Group:
-    """Three coordinates of so(3); with three of its vectors, and nothing else, se(3)."""
+    """Return the group of quaternions for three coordinates that form so(3), with the vectors that they rotate.
+
+    If the algebra consists of so(3) and one vector, this is se(3).
+    """
     triples = [(r, s) for r in combinations(range(algebra.dimension), 3) if (s := _sign(algebra, r))]
     if len(triples) != 1:
         count_text = "there are several" if triples else "there are none"
@@ -109,7 +117,7 @@ def _rotations(system: System, algebra: LieAlgebra) -> Group:
 
 
 def _sign(algebra: LieAlgebra, triple: tuple[int, ...]) -> int:
-    """±1 if x ↦ (x_i, x_j, x_k) is a homomorphism to so(3) with [L_1, L_2] = ±L_3, else 0."""
+    """Return ±1 if x ↦ (x_i, x_j, x_k) is a homomorphism to so(3) with [L_1, L_2] = ±L_3; 0 if it is none."""
     products = {(0, 1): 2, (1, 2): 0, (0, 2): 1}
     for sign in (1, -1):
         signs = {(0, 1): sign, (1, 2): sign, (0, 2): -sign}
@@ -127,18 +135,19 @@ def _place(triple: Sequence[int], i: int) -> int:
 
 
 def _components(algebra: LieAlgebra, i: int, j: int, triple: Sequence[int]) -> dict[int, object]:
-    """The components of [E_i, E_j] along a triple."""
+    """Return the components of [E_i, E_j] in a triple of indices, by their positions in the triple."""
     row = algebra.bracket(i, j)
     return _numbers({k: c for k, c in row.items() if k in triple}, triple)
 
 
 def _numbers(row: Mapping[int, Expression], triple: Sequence[int]) -> dict[int, object]:
-    """The entries of a row by their positions in a triple, or −1; numbers unchanged."""
+    """Return the entries of a row by the positions of their indices in a triple, −1 for others; numbers as Python
+    numbers."""
     return {_place(triple, k): c.value if c.is_number else c for k, c in row.items()}
 
 
 def _vectors(algebra: LieAlgebra, rotation: Triple, sign: int) -> tuple[Triple, ...]:
-    """The coordinates of the vectors that are rotated."""
+    """Return the index triples of the vectors that the components ``rotation`` rotate."""
     left = [i for i in range(algebra.dimension) if i not in rotation]
     vectors: list[Triple] = []
     for a, b, c in permutations(left, 3):
@@ -163,7 +172,7 @@ def _is_vector(algebra: LieAlgebra, rotation: Triple, translation: Sequence[int]
 
 
 def _matrices(system: System, algebra: LieAlgebra, kind: str) -> Group:
-    """The matrices of the named algebra, with its sign; for so(3) in any notation, rotations with its sign."""
+    """Return the group of the matrices that represent the algebra, with the sign of its bracket."""
     representation = closed_representation(algebra) if kind == "cayley" else known_representation(algebra)
     if representation is None:
         raise refused(
@@ -181,12 +190,16 @@ def _matrices(system: System, algebra: LieAlgebra, kind: str) -> Group:
 
 
 def _is_spatial(system: System, algebra: LieAlgebra) -> bool:
-    """Whether momenta are in space: by the sign in the spec; without one, by brackets of so(3), else in the body."""
+    """Whether x are momenta in space: by the sign in the spec, else by the brackets of so(3); False for other
+    algebras."""
     if isinstance(system.form, LieAlgebraForm):
         return system.form.sign > 0
     return algebra.dimension == 3 and _sign(algebra, (0, 1, 2)) > 0
 
 
 def _signed(e: Expression, spatial: bool) -> Expression:
-    """Matrices represent the bracket; where elements are multiplied from the right, it takes the negative ones."""
+    """Return an entry of a generator with the sign of the convention.
+
+    The matrices represent the bracket if elements are multiplied from the left; otherwise the negative matrices do.
+    """
     return e if spatial else -ONE * e

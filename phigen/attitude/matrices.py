@@ -1,11 +1,12 @@
-"""Group elements that are matrices: exp(P) and the Cayley transform of P = Σ p_i E_i, less 1, as straight formulas.
+"""Group elements that are matrices, minus 1: exp(P) and the Cayley transform of P = Σ p_i E_i, as formulas without
+loops.
 
-By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix of N rows. So all powers, and the series of
-exp, are combinations of 1, P, …, P^{N−1}, whose scalar factors obey a recurrence: N − 2 products of matrices in all.
-The q_j are, up to signs, the elementary symmetric functions of the eigenvalues, which by Newton's identities follow
-from the traces of powers.
+By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix of N rows. So all powers, and the series of exp,
+are combinations of 1, P, …, P^{N−1}, and their scalar factors obey a recurrence. This needs N − 2 products of matrices.
+Up to signs, the q_j are the elementary symmetric functions of the eigenvalues, which follow from the traces of powers
+by Newton's identities.
 
-In flows of a splitting most P are rotations in planes, or shifts: P³ = −sP with a number s. Then exp(P) is 1 +
+In flows of a splitting, most P are rotations in planes, or shifts: P³ = −sP with a number s. Then exp(P) is 1 +
 sin(√s)/√s P + (1 − cos √s)/s P², for any s.
 """
 
@@ -20,7 +21,7 @@ from phigen.attitude.group import Dense, Group
 from phigen.symbolic.expression import ONE, ZERO, Expression, call, number, total
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Terms of the series of exp for double precision where the largest eigenvalue is at most 1/2.
+#: Number of terms of the series of exp that double precision needs if the largest eigenvalue of P is at most 1/2.
 TERMS = 14
 
 _HALF = number(Fraction(1, 2))
@@ -29,17 +30,21 @@ Flat = list[Expression]
 
 
 def size_of(group: Group, p: Sequence[Expression]) -> Expression:
-    """A bound for the square of the largest eigenvalue of P: the sum of the squares of all entries, half for skew P."""
+    """Return an upper bound for the squared modulus of the largest eigenvalue of P.
+
+    The bound is the sum of the squares of all entries; half this sum for skew P.
+    """
     squares = total(e**2 for e in group.generator(p))
     return _HALF * squares if group.orthogonal else squares
 
 
 def exponential(group: Group, p: Sequence[Expression]) -> Flat:
-    """The entries of exp(P) − 1, by a series that is accurate for `size_of` up to 1/4."""
+    """Return the entries of exp(P) − 1, by a series that is accurate if `size_of` is at most 1/4."""
     powers, (first, *recurrence) = _powers(group, p), [*_symmetric(group, p)]
     assert first is ONE
     rows = len(powers) + 1
-    last = [e if (rows - j) % 2 else -ONE * e for j, e in enumerate(reversed(recurrence))]  # P^rows = Σ last_j P^j
+    # coefficients in P^rows = Σ last_j P^j
+    last = [e if (rows - j) % 2 else -ONE * e for j, e in enumerate(reversed(recurrence))]
     factors = [number(Fraction(1, factorial(j))) if j else ZERO for j in range(rows)]
     power = [ZERO] * (rows - 1) + [ONE]
     for k in range(rows, TERMS + 1):
@@ -49,7 +54,7 @@ def exponential(group: Group, p: Sequence[Expression]) -> Flat:
 
 
 def cayley(group: Group, p: Sequence[Expression]) -> Flat:
-    """The entries of (1 − P/2)⁻¹(1 + P/2) − 1 = (1 − P/2)⁻¹P.
+    """Return the entries of (1 − P/2)⁻¹(1 + P/2) − 1 = (1 − P/2)⁻¹P.
 
     With A = P/2 and its symmetric functions e_i, (1 − A)⁻¹ Σ(−1)ⁱe_i = Σ_k A^k Σ_{i < N−k} (−1)ⁱe_i.
     """
@@ -58,7 +63,7 @@ def cayley(group: Group, p: Sequence[Expression]) -> Flat:
     rows = len(powers) + 1
     signed = [e if i % 2 == 0 else -ONE * e for i, e in enumerate(symmetric)]
     per = ONE / total(signed)
-    # 2(1 − A)⁻¹A = 2((1 − A)⁻¹ − 1): the factor of 1 is the difference, −(−1)ᴺe_N.
+    # The result is 2((1 − A)⁻¹ − 1). In it, the unit matrix has the factor −(−1)ᴺe_N, apart from 2/Σ(−1)ⁱe_i.
     sums = [-ONE * signed[rows], *(total(signed[: rows - k]) for k in range(1, rows))]
     return [2 * per * e for e in _combined(sums, powers)]
 
@@ -73,7 +78,10 @@ def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
 
 
 def _symmetric(group: Group, p: Sequence[Expression]) -> Iterator[Expression]:
-    """The elementary symmetric functions of the eigenvalues, from 1 to the determinant; odd ones of skew P are 0."""
+    """Yield the elementary symmetric functions of the eigenvalues of P, from 1 to the determinant.
+
+    Those of odd degree are 0 if P is skew.
+    """
     powers = _powers(group, p)
     rows = len(powers) + 1
     traces = [ZERO, *(_trace(m, rows) for m in powers), _trace_of_product(powers[-1], powers[0], rows)]
@@ -96,7 +104,7 @@ def _trace_of_product(a: Flat, b: Flat, rows: int) -> Expression:
 
 
 def _combined(factors: Sequence[Expression], powers: Sequence[Flat]) -> Flat:
-    """A number, and multiples of powers."""
+    """Return the matrix factors_0 · 1 + Σ factors_k P^k, row by row, from the powers P, P², …."""
     rows = len(powers) + 1
     return [
         total([factors[0]] * (i % (rows + 1) == 0) + [f * m[i] for f, m in zip(factors[1:], powers, strict=True)])
@@ -105,13 +113,16 @@ def _combined(factors: Sequence[Expression], powers: Sequence[Flat]) -> Flat:
 
 
 def multiplied(a: Sequence[Expression], b: Sequence[Expression]) -> Flat:
-    """The product of two square matrices, row by row."""
+    """Return the product of two square matrices; all three are lists of entries, row by row."""
     n = isqrt(len(a))
     return [total(a[i * n + k] * b[k * n + j] for k in range(n)) for i in range(n) for j in range(n)]
 
 
 def flow_exponential(group: Group, p: Sequence[Expression], positive: Sequence[str]) -> Flat | None:
-    """The entries of exp(P) − 1 for a P that is a sum of commuting matrices with P³ = −sP; None for others."""
+    """Return the entries of exp(P) − 1 in closed form; None if phigen knows no closed form.
+
+    There is one if P is a sum of commuting matrices with P³ = −sP, or such a matrix itself.
+    """
     basis = [(pi, m) for pi, m in zip(p, group.matrices, strict=True) if not pi.is_zero]
     ratios = [_ratio(m) for _, m in basis]
     if all(r is not None for r in ratios) and all(_commute(a, b) for (_, a), (_, b) in combinations(basis, 2)):
@@ -126,12 +137,12 @@ def flow_exponential(group: Group, p: Sequence[Expression], positive: Sequence[s
 
 
 def product_less_1(a: Sequence[Expression], b: Sequence[Expression]) -> Flat:
-    """(1 + A)(1 + B) − 1."""
+    """Return (1 + A)(1 + B) − 1, without cancellation."""
     return [x + y + z for x, y, z in zip(a, b, multiplied(a, b), strict=True)]
 
 
 def _ratio(matrix: Dense) -> Fraction | None:
-    """s with E³ = −sE, if there is one, for a matrix of numbers."""
+    """Return the number s with E³ = −sE for a matrix of numbers; None if there is none."""
     e = [x for row in matrix for x in row]
     cube = multiplied(multiplied(e, e), e)
     if not all(x.is_number for x in (*e, *cube)):
@@ -147,7 +158,7 @@ def _commute(a: Dense, b: Dense) -> bool:
 
 
 def _of_constant(p: Expression, matrix: Dense, s: Fraction) -> Flat:
-    """exp(pE) − 1; with sin and cos of a multiple of p itself, where s is a square."""
+    """Return exp(pE) − 1 for E³ = −sE; if s is a square, by sin and cos of √s p."""
     e = [x for row in matrix for x in row]
     root = Fraction(isqrt(s.numerator), isqrt(s.denominator)) if s > 0 else Fraction(0)
     if s > 0 and root**2 == s:
@@ -160,7 +171,7 @@ def _of_constant(p: Expression, matrix: Dense, s: Fraction) -> Flat:
 
 
 def _of_plane(generator: Flat, positive: Sequence[str]) -> Flat | None:
-    """exp(P) − 1 if P³ = −sP, for s the half of the sum of squares of its eigenvalues, all of it, or 0."""
+    """Return exp(P) − 1 if P³ = −sP, where s is 0, −tr P² or −tr P²/2; None for other P."""
     square = multiplied(generator, generator)
     cube, trace = multiplied(square, generator), _trace(square, isqrt(len(square)))
     for s in (-_HALF * trace, -ONE * trace, ZERO):
@@ -172,5 +183,5 @@ def _of_plane(generator: Flat, positive: Sequence[str]) -> Flat | None:
 
 
 def _along_and_across(s: Expression) -> tuple[Expression, Expression]:
-    """sin(√s)/√s and (1 − cos √s)/s."""
+    """Return sin(√s)/√s and (1 − cos √s)/s."""
     return call("sinroot", s), _HALF * call("sinroot", s / 4) ** 2

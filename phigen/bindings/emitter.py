@@ -62,10 +62,11 @@ LANGUAGES = {
 
 
 def binding(compilation: Compilation, language: str) -> dict[str, str]:
-    """Return the text of each file of a binding, by file name. Raises `SpecError` for lattices."""
+    """Return the files of a binding for the language of that name (file name → text). Raises `SpecError` for
+    lattices."""
     spec, name = compilation.spec, compilation.spec.name
     if spec.lattice:
-        message = f"a binding of {name}: not for lattices in this version"
+        message = f"{name} is a lattice, for which there are no bindings yet"
         hint = "the header of the C declares what can be called; phigen show --expand SIZES writes an ordinary spec"
         raise SpecError([spec.diagnostic(("lattice",), message, hint)])
     target = LANGUAGES[language]
@@ -127,7 +128,7 @@ def _described(description: str, unit: str) -> str:
 
 
 def _fields(names: Iterable[str], language: BindingLanguage) -> list[str]:
-    """Return names of fields in the order of ``names``.
+    """Return the names of the fields of a struct, in the order of ``names``.
 
     A reserved name, or one that equals an earlier field, gets trailing underscores. In languages that do not
     distinguish case, such as Fortran, a name that begins with an underscore gets the prefix "p".

@@ -1,1 +1,1 @@
-"""Certificates of steps: rigorous bounds for the distance between computed steps and the exact Poisson map."""
+"""Certificates: rigorous bounds for the distance between a computed step and the exact Poisson map."""

@@ -1,4 +1,4 @@
-"""Checker of certificates: python checker.py NAME.bounds.json NAME.c. It needs only python-flint."""
+"""Checker of certificates, a script without phigen: python checker.py NAME.bounds.json NAME.c. Needs python-flint."""
 
 from __future__ import annotations
 
@@ -18,26 +18,29 @@ from flint import arb, arb_mat, ctx, fmpq, fmpq_poly
 Ball: TypeAlias = Any  # flint.arb; sequences of flint.arb; flint.arb_mat
 Balls: TypeAlias = Any
 Matrix: TypeAlias = Any
-BITS = 80  # precision of the balls in bits, far above that of doubles
+BITS = 80  # precision of balls in bits; doubles have 53
 U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(0), arb(1), arb(0.5)
-ROUNDED = arb("1.000001")  # factor for the rounding of a size that the C computes and compares
+ROUNDED = arb("1.000001")  # margin for the rounding of sizes that the C computes and compares
 KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
-POINTS = (0.318309886, 0.577215665, 0.869604401)  # places in a box at which derivatives are compared
-LESS_ACCURATE = ("sinh", "cosh", "tanh")  # glibc documents twice the error of the other functions
-LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {  # functions with their derivatives
+POINTS = (0.318309886, 0.577215665, 0.869604401)  # positions in a box, modulo 1, at which derivatives are compared
+LESS_ACCURATE = ("sinh", "cosh", "tanh")  # functions for which glibc documents twice the error of others
+# functions of libm, each with its derivative
+LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {
     "sqrt": (arb.sqrt, lambda x: 1 / (2 * x.sqrt())), "exp": (arb.exp, arb.exp), "expm1": (arb.expm1, arb.exp),
     "log": (arb.log, lambda x: 1 / x), "log1p": (arb.log1p, lambda x: 1 / (1 + x)), "sin": (arb.sin, arb.cos),
     "cos": (arb.cos, lambda x: -x.sin()), "tan": (arb.tan, lambda x: 1 + square(x.tan())), "sinh": (arb.sinh, arb.cosh),
     "cosh": (arb.cosh, arb.sinh), "tanh": (arb.tanh, lambda x: 1 - square(x.tanh())),
 }  # fmt: skip
 EXACT = {"add": operator.add, "sub": operator.sub, "mul": operator.mul}
-OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # operations with derivatives by their operands
+OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # operations: value, and derivatives by the operands
     "add": lambda x, y: (x + y, ONE, ONE), "sub": lambda x, y: (x - y, ONE, -ONE), "neg": lambda x: (-x, -ONE),
     "mul": lambda x, y: (x * y, y, x), "square": lambda x, _: (square(x), x, x), "max": lambda x, y: (x.max(y),),
     "div": lambda x, y: (x / y, 1 / y, -x / (y * y)), "abs": lambda x: (x.abs_lower().union(x.abs_upper()),),
 }  # fmt: skip
-TERMS = 90  # the coefficients of all series are at most 2^(1-n), so for |s| < ROUNDED the rest is at most 2^(3-TERMS)
-SERIES: Mapping[str, Callable[[int], fmpq]] = {  # coefficient n of functions that the C computes by polynomials
+# number of terms of power series: coefficients are at most 2^(1-n), so for |s| < ROUNDED the rest is at most
+# 2^(3-TERMS)
+TERMS = 90
+SERIES: Mapping[str, Callable[[int], fmpq]] = {  # coefficient n of each function that the C computes by a polynomial
     "cosroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n)),
     "sinroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n + 1)),
     "arcroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n + 3)),
@@ -63,18 +66,18 @@ def demand(condition: bool, message: str) -> None:
 
 
 def mag(x: Ball) -> Ball:
-    """Return the largest absolute value in a ball."""
+    """Return an upper bound for the absolute values in a ball."""
     demand(x.is_finite(), "a value is not bounded")
     return x.abs_upper()
 
 
 def square(x: Ball) -> Ball:
-    """Return the square of a ball, which is not negative."""
+    """Return the square of a ball, without negative values."""
     return (x.abs_lower() * x.abs_lower()).union(x.abs_upper() * x.abs_upper())
 
 
 def top(values: Iterable[Ball]) -> Ball:
-    """Return the largest of some balls, or a ball that contains it."""
+    """Return a ball that contains the maximum of numbers in the given balls."""
     return reduce(arb.max, values)
 
 
@@ -84,12 +87,12 @@ def middle(x: Ball) -> Ball:
 
 
 def below(a: Matrix, b: Matrix) -> bool:
-    """Return whether all entries of a matrix are below those of another matrix."""
+    """Return whether each entry of a matrix is below the corresponding entry of another matrix."""
     return all(v < w for v, w in zip(a.entries(), b.entries(), strict=True))
 
 
 def interval(ends: Sequence[float]) -> Ball:
-    """Return the ball around an interval."""
+    """Return a ball that contains the interval between two doubles."""
     return arb(ends[0]).union(arb(ends[1]))
 
 
@@ -99,7 +102,7 @@ def column(values: Iterable[Ball]) -> Matrix:
 
 
 def each(f: Callable[..., Ball], *matrices: Matrix) -> Matrix:
-    """Return a function applied to the corresponding entries of matrices of one shape."""
+    """Return the matrix of f(a_ij, b_ij, …) for matrices of one shape."""
     entries = [f(*v) for v in zip(*(m.entries() for m in matrices), strict=True)]
     return arb_mat(matrices[0].nrows(), matrices[0].ncols(), entries)
 
@@ -110,9 +113,11 @@ def identity(n: int) -> Matrix:
 
 
 class Evaluation:
-    """Operations evaluated at balls: enclosures, derivatives by operands, and bounds for single errors.
+    """Evaluation of a list of operations at balls: values, derivatives by the operands, and bounds for single rounding
+    errors.
 
-    Enclosures contain the exact and the computed values. ``inputs`` are the balls of operations that read values.
+    Each value is a ball that contains the exact and the computed result. ``inputs`` has the balls that input operations
+    read.
     """
 
     def __init__(self, c: Any, operations: Any, inputs: Mapping[str, Any], exact: bool = False) -> None:
@@ -123,7 +128,8 @@ class Evaluation:
         powers, v = set[int](), self.x
         for k, (op, *a) in enumerate(operations):
             error, slopes = ZERO, list[tuple[int, Ball]]()
-            if op in ("number", "exact", "constant"):  # literals, rounded if long; constants of the C
+            # number: a decimal literal, which rounds if it is no double; constant: a value of the certificate
+            if op in ("number", "exact", "constant"):
                 value = a[0] if op != "constant" else c[a[0]] if len(a) == 1 else c[a[0]][a[1]]
                 x, error = arb(value), U * abs(value) * (op == "number" and Fraction(repr(value)) != value)
                 powers |= {k} if abs(math.frexp(value)[0]) == 0.5 else set()  # powers of 2 multiply exactly
@@ -135,7 +141,9 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            elif op == "rest":  # rest of a Taylor series: three times its terms, as the bound also covers derivatives
+            # Remainder of a Taylor series, bounded by three times its next terms, since the bound also covers
+            # derivatives.
+            elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
             elif op in LIBM:
@@ -150,9 +158,10 @@ class Evaluation:
             v.append(x if exact else x + BALL * error)
 
     def outputs(self, indices: Sequence[int], by: Mapping[str, int]) -> tuple[Matrix, ...]:
-        """Return values of outputs, error bounds by the mean value theorem, and derivatives by some inputs."""
+        """Return the balls of some outputs, error bounds by the mean value theorem, and Jacobians by the inputs named
+        in ``by``."""
         errors, rows = list[Ball](), list[list[Ball]]()
-        for output in indices:  # reverse differentiation
+        for output in indices:  # reverse-mode differentiation
             row = [ZERO] * output + [arb(1)] + [ZERO] * (len(self.x) - output)
             for k in range(output, -1, -1):
                 for i, slope in self.slopes[k] if not row[k].is_zero() else ():
@@ -166,9 +175,10 @@ class Evaluation:
 
 
 def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
-    """Return the function that a polynomial approximates, its derivative, and rounding and truncation errors."""
+    """Return value and derivative of the function that a polynomial approximates, and a bound for rounding and
+    truncation."""
     name, beyond = series["name"], series["beyond"]
-    if beyond and mag(s) >= series["radius"]:  # there the C calls the function of libm
+    if beyond and mag(s) >= series["radius"]:  # for such arguments the C calls the function of libm
         x, slope, ulps = LIBM[name][0](s), LIBM[name][1](s), c["ulps"] * (1 + 9 * U)
         inside = s.intersection(BALL * arb(series["radius"])) if s.overlaps(BALL * arb(series["radius"])) else None
         error = polynomial(c, {**series, "beyond": False, "inside": True}, inside)[2] if inside is not None else ZERO
@@ -188,16 +198,19 @@ def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
 
 
 def carries(c: Any, X: Iterable[Ball]) -> list[Ball]:
-    """Return the largest compensation terms of states."""
+    """Return upper bounds for the compensation terms of states in X."""
     return [c["carry"] * U * mag(x) for x in X]
 
 
 def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exact: bool = False) -> Evaluation:
-    """Evaluate the operations of a stage for states in X, times in T and unknowns u, with rests of Taylor series."""
+    """Evaluate the operations of a stage for states in X, times in T and unknowns u.
+
+    Remainders of Taylor series are bounded along the paths of the stage, unless the evaluation is ``exact``.
+    """
     rests = [op[3] for op in stage["operations"] if op[0] == "rest"]
     demand("path" in stage or not rests, "a Taylor series has no path")
     carry, tail, along = [BALL * r for r in carries(c, X)], [ZERO] * len(X), "path" in stage and not exact
-    if along:  # the path dm/dt = field from x stays in the box P
+    if along:  # paths dm/dt = field that start in X must stay in the box P
         P, path = [interval(p) for p in leaf["path"]], stage["path"]
         run = Evaluation(c, path["operations"], {"m": P, "u": u, "t": [T]})
         reached = [x + r + ZERO.union(run.x[k]) for x, r, k in zip(X, carry, path["field"], strict=True)]
@@ -205,7 +218,7 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
         tail = [mag(run.x[k]) for k in path["next"]]
     inputs = {"x": X, "start": X, "carry": carry, "t": [T], "u": u, "tail": tail}
     run = Evaluation(c, stage["operations"], inputs, exact)
-    if along:  # the C stops after two terms that are below rounding
+    if along:  # the C stops a series after two terms that are below rounding
         demand(bool(stage["seen"]) or max(rests) <= 4, "a Taylor series may end early")
         hidden = [mag(run.x[a]) < run.x[b].abs_lower() / ROUNDED for a, b in stage["hidden"]]
         demand(len(hidden) == 2 * len(X) and all(hidden), "a Taylor series may end late")
@@ -213,7 +226,8 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
 
 
 def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
-    """Return outputs of a stage by the mean value theorem, with errors: narrower than in `run_of` over small boxes."""
+    """Return the outputs ``of`` a stage by the mean value theorem, errors included; narrower than `run_of` over small
+    boxes."""
     _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
     x, u = ([arb(v.mid()) for v in values] for values in (X, box))
     at = run_of(c, stage, x, T, leaf, u, exact=True)
@@ -222,7 +236,8 @@ def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: E
 
 
 def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls) -> None:
-    """Raise an error unless derivatives in the C agree with exact ones to 20 digits at some points."""
+    """Refuse the certificate unless the Jacobians printed in the C agree with exact ones to 20 digits at some
+    points."""
     precision, ctx.prec = ctx.prec, 300
     for point in POINTS:
         *at, t = (
@@ -237,9 +252,10 @@ def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Ba
 
 
 def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ...]:
-    """Return change, error and derivative of an implicit stage: u - base + d(u) = 0, by corrections M^-1 residual.
+    """Return change, error and derivative of an implicit stage, whose unknowns solve u - base + d(u) = 0.
 
-    The last result is a bound for the part of the change that the C adds to the compensation term.
+    The C solves it by corrections M^-1 residual. The fourth result bounds the part of the change that the C adds to the
+    compensation term.
     """
     box = [interval(v) for v in leaf["u"]]
     m, n, Y, centre = len(box), len(X), column(map(mag, box)), column(arb(v.mid()) for v in box)
@@ -251,11 +267,12 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     bends, reach, low = arb_mat(m * m, m), column(map(arb, leaf["reach"])), each(arb.abs_lower, scale)
     if solves:
         J, errors, bends = run.outputs(matrix, {"u": m})
-        pivots = top(map(mag, (*J.entries(), *A.entries()))) * 4 * m * m * 2 ** (m - 1) * U  # error of elimination
+        # rounding errors of the elimination
+        pivots = top(map(mag, (*J.entries(), *A.entries()))) * 4 * m * m * 2 ** (m - 1) * U
         M, M_error = arb_mat(m, m, J.entries()), each(lambda e: e + pivots, arb_mat(m, m, errors.entries()))
     if derived:
         expect_derivatives(c, stage, X, T, leaf, box)
-    elif solves:  # the C may then use differences of residuals instead of the matrix
+    elif solves:  # the C may use differences of residuals instead of the printed matrix
         least = -top(-v for v in low.entries())
         demand(least > 0, "the unknowns, in whose sizes residuals are measured, may be 0")
         noise = (d_error + U * Y) * (2 / (stage["difference"] * least))
@@ -264,17 +281,17 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inverse, measured = each(mag, M.inv()), each(mag, M) * high if derived else high
 
     def residual_error(e: Matrix) -> Matrix:
-        """Return bounds for rounding errors of the residual, at a distance e from the solution."""
+        """Return bounds for the rounding errors of the residual at a distance e from the solution."""
         first = d_error + U * (size + e + c["carry"] * U * Y) * based
         return first + 2 * U * (A_size * e + first + U * size + c["carry"] * U * Y * based) if solves else first
 
     def missed(e: Matrix) -> Matrix:
-        """Return the error of u after a correction of an error e."""
+        """Return a bound for the error of u after a correction, from the error e before it."""
         bent = arb_mat(m, m, (each(mag, bends) * e * HALF).entries()) + M_error if derived else each(mag, M - A)
         return inverse * (bent * e + residual_error(e))
 
     def worst_of(size: Ball) -> Matrix:
-        """Return the largest error if corrections or residuals, as measured by the C, are at most a size."""
+        """Return the largest error for which corrections or residuals, as the C measures them, are at most ``size``."""
         return each(mag, A.inv()) * (measured * (size * ROUNDED) + residual_error(reach))
 
     C = each(middle, each(middle, A).inv())
@@ -288,14 +305,14 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inside = zip(box, K.entries(), beyond.entries(), strict=True)
     demand(all(v.contains_interior(k + BALL * r) for v, k, r in inside), KRAWCZYK)
     demand(below(missed(reach) + U * Y * solves, reach), "the iteration may diverge")
-    if stage.get("seen"):  # series may end two terms after one above rounding
+    if stage.get("seen"):  # a series may end if two terms after one above rounding are small
         (seen,) = centred(c, stage, X, T, leaf, box, run, "seen").entries()
         demand(seen.abs_lower() > ROUNDED * mag(run.x[stage["seen_above"]]), "a Taylor series may end early")
 
     noise = 2 * (residual_error(reach) + A_size * Y * U * solves)
     q, shaken, share = stalling(stage, each(mag, identity(m) - A * M.inv()), noise, low, high)
     e, rest = column([ZERO] * m), column([ZERO] * m)
-    for stop in stage["stops"]:  # by a size, by that of the previous correction, or at stagnation
+    for stop in stage["stops"]:  # rules to stop: by a size, by the size of the previous correction, or at stagnation
         errors = [worst_of(share * stop["now"] / stop.get("rate", 1))] if "now" in stop else []
         before = [share * stop["before"]] if "before" in stop else []
         before += [share * shaken / (stop["part"] - q)] if q < arb(stop.get("part", 0)) else []
@@ -314,7 +331,10 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
 
 def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matrix) -> tuple[Ball, Ball, Ball]:
-    """Return contraction and noise of sizes in the norm of the C: mean square over stages, or maximum."""
+    """Return the contraction rate and the noise of the sizes that the C measures, and the weight of their norm.
+
+    The C measures the mean square over the stages of a Gauss method, or the maximum.
+    """
     m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
     scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]
     across, down = (top(sum(r, ZERO) for r in rows) for rows in (scaled, zip(*scaled, strict=True)))
@@ -327,7 +347,7 @@ def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matri
 
 
 def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
-    """Return error bounds and image of a step, stage by stage."""
+    """Return error bounds of a step and balls that contain its results, computed stage by stage."""
     total, n = column([ZERO] * len(X)), len(X)
     for stage, part in zip(c["stages"], leaf["stages"], strict=True):
         if "equation" in stage:
@@ -336,14 +356,14 @@ def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
             change, error, by_x, by_start = run_of(c, stage, X, T, part).outputs(stage["change"], {"x": n, "start": n})
             slope, small = identity(n) + by_x + by_start, column([ZERO] * n)
         parts = [*zip(X, change.entries(), small.entries(), carries(c, X), strict=True)]
-        lost = column(8 * U * (U * mag(x + v) + w + r) for x, v, w, r in parts)  # by the compensated sum
+        lost = column(8 * U * (U * mag(x + v) + w + r) for x, v, w, r in parts)  # rounding of the compensated sum
         total = error + lost + each(mag, slope) * total
         X = [x + v + BALL * (e + r) for (x, v, _, r), e in zip(parts, total.entries(), strict=True)]
     return total.entries(), X
 
 
 def check(c: Any, domain: Sequence[Sequence[float]], node: Any) -> tuple[int, list[float]]:
-    """Check the boxes below a node of the tree; return their number, and the largest values of coordinates."""
+    """Check all boxes below a node of the tree; return their number and the largest absolute values of coordinates."""
     if "at" in node:
         low, high = [list(d) for d in domain], [list(d) for d in domain]
         demand(domain[node["axis"]][0] < node["at"] < domain[node["axis"]][1], "a box is divided outside")
@@ -358,13 +378,13 @@ def check(c: Any, domain: Sequence[Sequence[float]], node: Any) -> tuple[int, li
 
 
 def digest(c: Mapping[str, Any]) -> str:
-    """Return the digest of a certificate without its entry of the digest."""
+    """Return the digest of a certificate, computed without the entry that holds the digest."""
     text = json.dumps({k: v for k, v in c.items() if k != "sha256"}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def replayed(c: Any, text: bytes) -> str:
-    """Check a certificate of a C file; return its statement. Raises `RefusedError`."""
+    """Check the certificate of a C file and return the statement that it proves. Raises `RefusedError`."""
     demand(digest(c) == c["sha256"], "the certificate was changed")
     demand(hashlib.sha256(text).hexdigest() == c["c_sha256"], "the certificate is about another C file")
     boxes, largest = check(c, [*c["domain"], c["time"]], c["tree"])

@@ -1,4 +1,4 @@
-"""Construction of the `StepProblem` of a compilation and its C; refusals of what certificates do not cover."""
+"""Construction of the `StepProblem` of a compilation, and refusals of solvers that certificates do not cover."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from phigen.scheme.program import Program
     from phigen.spec.model import Spec
 
-#: Functions of exact flows, with the motions that they follow.
+#: Exact flows by special functions, by the name of the function, with the motion for messages.
 _FLOWS = {
     **dict.fromkeys(ELLIPTIC, "a free rigid body"),
     **dict.fromkeys((*REMAINDERS, *QUOTIENTS), "linear equations with conserved coefficients"),
     ANOMALY: "a Kepler motion",
 }
 
-#: Motions that a named composition splits further.
+#: Motions that a named composition splits into further parts.
 _SPLIT = ("a free rigid body", "a Kepler motion")
 
 
@@ -40,9 +40,9 @@ def problem_of(
     ulps: float,
     tolerance: float,
 ) -> StepProblem:
-    """Return the problem of a solver, with the gauge of the trajectory from ``start``.
+    """Return the problem of a solver; the gauge is that of the trajectory from ``start``.
 
-    Raises `SpecError` for what certificates do not cover.
+    Raises `SpecError` for solvers that certificates do not cover.
     """
     program, spec = compilation.program, compilation.spec
     _expect_covered(program, spec)
@@ -62,7 +62,7 @@ def problem_of(
 
 
 def _expect_covered(program: Program, spec: Spec) -> None:
-    """Refuse noise, single precision, and flows by functions for which the checker has no enclosures."""
+    """Raise `SpecError` for noise, single precision, and flows by functions for which the checker has no enclosures."""
     refusals = list[tuple[tuple[str, ...], str, str]]()
     if program.noise:
         refusals.append((("noise",), "certificates do not cover noise", "a spec without it"))
@@ -77,7 +77,8 @@ def _expect_covered(program: Program, spec: Spec) -> None:
 
 
 def _gauge(compilation: Compilation, parameters: Mapping[str, float], start: Sequence[float]) -> list[float]:
-    """Return an approximation of the gauge for the trajectory from a state: multiples of Casimirs, or e."""
+    """Return an approximation of the gauge for the trajectory from a state: multiples of Casimirs, or the energy level
+    e."""
     program = compilation.program
     values = {**parameters, **dict(zip(compilation.spec.coordinates, start, strict=True))}
     if program.monitor and program.held:

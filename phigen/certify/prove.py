@@ -29,32 +29,33 @@ from phigen.certify.checker import (
 from phigen.certify.reader import read
 from phigen.certify.stages import CARRY, stages_of
 
-#: Largest number of passes in which the box of the unknowns of a stage grows until it is proved to contain the
-#: solution.
+#: Largest number of attempts to find a box of unknowns that is proved to contain the solution.
 PASSES = 8
 
-#: Growth factor of that box per pass: a smaller factor needs more passes, a larger one makes contraction harder to
-#: prove.
+#: Factor by which the radii of the box of unknowns exceed their estimates. A smaller factor needs more attempts; a
+#: larger one makes contraction harder to prove.
 GROWTH = 1.25
 
 #: Largest compensation term after a Gauss step, in 2^-53 of the largest value of the coordinate. It contains the
 #: rounding of the state and that of its change, which is at most twice as large.
 GAUSS_CARRY = 3.03
 
-#: Least reach of iterates of an unknown in Gauss steps, relative to the largest reach, as sweeps couple all unknowns.
+#: Least assumed distance of an iterate from the solution, for each unknown of a Gauss step, relative to the largest
+#: distance; sweeps couple all unknowns.
 LEAST_REACH = 0.05
 
-#: Additional relative reach of iterates of steps along paths; the C uses finite differences over smaller displacements.
+#: Distance that is added for steps along paths, relative to the unknowns; the C uses finite differences over shorter
+#: distances.
 DIFFERENCES = arb(2) ** -20
 
-#: Number of bisections after which the search fails: the parts have 2^-40 of the volume of the box.
+#: Number of bisections after which the search fails; the volume is then 2^-40 of the volume of the domain.
 MAX_DEPTH = 40
 
 Box = Sequence[Sequence[float]]
 
 
 class NoCertificateError(RefusedError):
-    """Refusal of a problem that cannot be certified, with a hint for the user."""
+    """A problem cannot be certified; ``hint`` tells the user what to change."""
 
     def __init__(self, message: str, hint: str) -> None:
         super().__init__(message)
@@ -63,7 +64,12 @@ class NoCertificateError(RefusedError):
 
 @dataclass(frozen=True)
 class StepProblem:
-    """Subject of a certificate: a solver in C with its numbers, and a box of states, with the time last."""
+    """Problem to be certified: a solver in C, its parameters, and a domain of states and times.
+
+    ``text`` is the C; ``gauge`` are multiples of Casimirs, or e. ``ulps`` bounds the errors of libm in units in the
+    last place, and ``within`` the requested error bounds in the same unit. ``timed`` says that steps depend on the
+    time.
+    """
 
     name: str
     text: str
@@ -79,9 +85,9 @@ class StepProblem:
 
 
 def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
-    """Return the certificate without its boxes and bounds. Raises `RefusedError` for C that is not covered.
+    """Return the entries of a certificate other than boxes and bounds. Raises `RefusedError` for C that is not covered.
 
-    For the ``exact`` map, paths are expanded to the largest order of the C.
+    With ``exact``, these describe the exact map, for which paths are expanded to the largest order of the C.
     """
     facts = read(problem.text, problem.name)
     numbers = {
@@ -110,7 +116,7 @@ def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
 
 @contextmanager
 def precise() -> Iterator[None]:
-    """Set the precision of balls to `BITS` bits within the block."""
+    """Context in which balls have a precision of `BITS` bits."""
     previous_precision, ctx.prec = ctx.prec, BITS
     try:
         yield
@@ -119,7 +125,7 @@ def precise() -> Iterator[None]:
 
 
 def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
-    """Return the certificate of a problem. Raises `RefusedError` if none is found within a number of boxes."""
+    """Return the certificate of a problem. Raises `RefusedError` if none with at most ``max_boxes`` boxes is found."""
     certificate = described(problem)
     with precise():
         leaves = list[tuple[list[float], list[float]]]()
@@ -135,16 +141,17 @@ def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Search:
-    """Division of a box into parts in which the bounds hold and are at most ``within`` units in the last place."""
+    """Search of a certificate: bisects the domain until the bounds hold in each part and are at most ``within``."""
 
     certificate: dict[str, Any]
     within: float
     max_boxes: int
-    leaves: list[tuple[list[float], list[float]]]  # error bounds; largest absolute values of coordinates
-    divided: list[int]  # depths of the divided boxes
+    # for each part, error bounds and largest absolute values of coordinates
+    leaves: list[tuple[list[float], list[float]]]
+    divided: list[int]  # depth of each box that was divided
 
     def tree(self, domain: Box, depth: int = 0) -> dict[str, Any]:
-        """Return the tree of the boxes below a box. Raises `RefusedError`."""
+        """Return the tree of a box and of its parts. Raises `RefusedError`."""
         c = self.certificate
         *X, T = [interval(d) for d in domain]
         try:
@@ -175,7 +182,7 @@ def _refusal(c: dict[str, Any], domain: Box, failure: Exception, box_count: int)
 
 
 def _widest(domain: Box) -> int | None:
-    """Return the axis along which a box is to be divided; None if doubles cannot divide it further."""
+    """Return the index of the axis to be bisected; None if doubles cannot divide the box further."""
     widths = [(b - a) / max(abs(a), abs(b), 1.0) for a, b in domain]
     axis = max(range(len(domain)), key=widths.__getitem__)
     return axis if widths[axis] > 1e-12 else None
@@ -188,7 +195,7 @@ def _ends(x: Any) -> list[float]:
 
 
 def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """Return for each stage the box of unknowns, the reach of iterates from the solution, and boxes of paths."""
+    """Return for each stage the box of unknowns, the distances of iterates from the solution, and the box of paths."""
     parts, image = list[dict[str, Any]](), X
     for stage in c["stages"]:
         parts.append(_implicit_part(c, stage, image, T) if "equation" in stage else {})
@@ -198,7 +205,10 @@ def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
 
 
 def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """Return the box of unknowns of a stage: u = base - d(u) is iterated and the box enlarged until the proof holds."""
+    """Return the box of unknowns of a stage, whose equation is u = base - d(u).
+
+    The equation is iterated and the box enlarged until the proof holds. Raises `RefusedError` if it does not.
+    """
     base = X if stage["based"] else [arb(0)] * len(stage["equation"])
     start = run_of(c, stage, X, T, {}, base, exact=True)
     box = base if stage["based"] else [start.x[k] for k in stage["start"]]
@@ -231,7 +241,7 @@ def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: An
 
 
 def _path_box(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any, u: list[Any]) -> list[list[float]]:
-    """Return a box that contains the paths from X under u, by Picard's iteration."""
+    """Return a box that contains the paths from states in X for unknowns in u, by Picard's iteration."""
     P = X
     for _ in range(PASSES):
         run = Evaluation(c, stage["path"]["operations"], {"m": P, "u": u, "t": [T]})

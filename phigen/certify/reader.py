@@ -1,4 +1,4 @@
-"""Kernels of generated C as lists of operations, read from the text that the compiler reads."""
+"""Reader of kernels in generated C, as lists of operations."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from phigen.certify.checker import LIBM, SERIES, RefusedError
 
 _OPERATIONS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
 
-#: Array by which the parts of a long function exchange values.
+#: Name of the array by which the parts of a long function exchange values.
 _WORK = "work"
 
-#: Floating-point literal in C, with a point or an exponent; integer literals are indices.
+#: Pattern of floating-point literals in C, with a point or an exponent; integer literals are indices and do not match.
 _NUMBER = r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)"
 
 
 class GeneratedC:
-    """A generated C file, without comments and without the name of the solver before each name.
+    """Generated C file, without comments and without the solver's name as a prefix of names.
 
-    A function of the solver whose remaining name is that of a function of libm gets the prefix ``own_``.
+    Where a function would then have the name of a libm function, it gets the prefix ``own_``.
     """
 
     def __init__(self, text: str, name: str) -> None:
@@ -43,7 +43,7 @@ class GeneratedC:
         return self.function(name) is not None
 
     def numbers(self, name: str, text: str | None = None) -> list[float]:
-        """Return the numbers of a static array, or that of a macro or enumeration constant, in order."""
+        """Return the numbers of the static array of that name, or of the macro or enumeration constant, in order."""
         text = self.text if text is None else text
         matched = re.search(
             rf"\b{name}(?:\[\w+\])+ =\s*\{{(.*?)\}};|define {name} (.*)|\b{name} = (\d+)", text, re.DOTALL
@@ -54,15 +54,15 @@ class GeneratedC:
         return [float(v) for v in re.findall(r"-?\d[\d.]*(?:e[-+]?\d+)?", number_text)]
 
     def number(self, name: str) -> float:
-        """Return the number of a macro or of an enumeration constant."""
+        """Return the number of the macro or enumeration constant of that name."""
         return self.numbers(name)[0]
 
 
 class KernelReader:
-    """Operations of one function in their order in the C; values that the C reuses occur once.
+    """Operations of one C function in their order; a value that the C reuses occurs once.
 
-    ``outputs`` maps each array that the function writes to the indices of the operations that are its entries. The
-    functions that the C itself defines by polynomials are entered into ``series``.
+    ``outputs`` maps each array that the function writes to the indices of the operations that give its entries.
+    Functions that the C defines by polynomials are added to ``series``.
     """
 
     def __init__(self, source: GeneratedC, function: str, series: dict[str, Any]) -> None:
@@ -76,7 +76,7 @@ class KernelReader:
 
     @property
     def described(self) -> dict[str, Any]:
-        """The kernel in the format of a certificate."""
+        """The kernel in the format of certificates."""
         described_outputs = {name: entries for name, entries in self.outputs.items() if name != _WORK}
         outputs = {name: [entries[i] for i in range(len(entries))] for name, entries in described_outputs.items()}
         return {"operations": self.operations, "outputs": outputs}
@@ -152,9 +152,9 @@ class KernelReader:
 
 
 class PathReader(KernelReader):
-    """Taylor series of a path, to some order: operations for given coefficients of the coordinates.
+    """Operations of the Taylor series of a path, from given coefficients of the coordinates.
 
-    The coefficients of series i are ``outputs[f"s{i}"]``, by their orders.
+    ``outputs[f"s{i}"]`` has the indices of the coefficients of series i, by order.
     """
 
     def __init__(self, source: GeneratedC, series: dict[str, Any], coordinates: int, orders: int) -> None:
@@ -174,6 +174,7 @@ class PathReader(KernelReader):
 
     @property
     def described(self) -> dict[str, Any]:
+        """The series in the format of certificates."""
         outputs = {name: list(self.outputs[name].values()) for name in self._known}
         return {"operations": self.operations, "outputs": outputs}
 
@@ -213,7 +214,7 @@ class PathReader(KernelReader):
 
 
 def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
-    """Return the polynomial for small arguments of a function, and the radius up to which it is used."""
+    """Return the polynomial for small arguments of a function, and the radius up to which the C uses it."""
     (argument,), body = _expect(source.function(name), name)
     branch = re.search(r"if \(fabs\(\w+\) [<>] ([\d.]+)\)", body)
     library_name = name.removeprefix("own_")
@@ -253,9 +254,9 @@ def _expect(function: tuple[list[str], str] | None, name: str) -> tuple[list[str
 
 
 def read(text: str, name: str) -> dict[str, Any]:
-    """Return the facts about the C of a solver for a certificate: kind of step, kernels, and tables.
+    """Return the facts about the C of a solver that a certificate needs: kind of step, kernels, and tables.
 
-    Raises `RefusedError` for what certificates do not cover.
+    Raises `RefusedError` for C that certificates do not cover.
     """
     source, series = GeneratedC(text, name), dict[str, Any]()
     kind = next((kind for kind, functions in _FUNCTIONS.items() if source.has(functions[-1])), "")
@@ -274,7 +275,7 @@ def read(text: str, name: str) -> dict[str, Any]:
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
-#: Functions of each kind of step; the last function identifies the kind.
+#: Functions that the C of each kind of step has; the last one identifies the kind.
 _FUNCTIONS = {
     "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),
@@ -301,7 +302,7 @@ def _newton(source: GeneratedC) -> dict[str, Any]:
 
 def _gauss(source: GeneratedC) -> dict[str, Any]:
     weights, mixing = source.numbers("weights"), source.numbers("mixing")
-    lanes = len(weights)  # rows may be padded to full lanes
+    lanes = len(weights)  # rows may be padded to whole SIMD vectors
     nodes = len(mixing) // lanes
     rows = [mixing[j * lanes : j * lanes + nodes] for j in range(nodes)]
     names = {"solved": "SOLVED", "stalled": "STALLED", "rounding": "ROUNDING", "nearly_rounding": "NEARLY_ROUNDING"}
@@ -322,12 +323,12 @@ def _splitting(source: GeneratedC) -> dict[str, Any]:
 
 
 def _schedule(source: GeneratedC, function: str, names: dict[str, int]) -> list[list[int]]:
-    """Return the flows that a function calls, each with its row of coefficients."""
+    """Return the flows that a C function calls, each as [flow, row of coefficients]."""
     _, body = _expect(source.function(function), function)
     return _called(_block(iter(map(str.strip, body.splitlines()))), names, [])
 
 
-#: Largest number of flows of a step, including all iterations of loops.
+#: Largest number of flows in a step, with each iteration of a loop counted.
 MOST_FLOWS = 10_000
 
 
@@ -350,7 +351,7 @@ def _block(lines: Iterator[str]) -> list[tuple[str, Any]]:
 
 
 def _called(statements: list[tuple[str, Any]], names: dict[str, int], called: list[list[int]]) -> list[list[int]]:
-    """Add the flows that statements call to ``called``, each with its row of coefficients, and return it."""
+    """Append the flows that statements call to ``called``, each with its row of coefficients, and return ``called``."""
     for kind, about in statements:
         if kind == "call":
             called.append([about[0], _integer_value(about[1], names) // names["ROW"]])
@@ -390,7 +391,7 @@ def _integer_value(text: str, names: Mapping[str, int]) -> int:
 
 
 def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
-    """Return the coordinates to which a flow adds changes, with the indices of the changes."""
+    """Return pairs [coordinate, index]: the flow adds the increment of that index to the coordinate."""
     _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
     changes = re.findall(r"add\(x, displacement, start, (\d+), change\[(\d+)\]\);", body)
     if len(changes) != body.count(";") - 2:

@@ -1,4 +1,5 @@
-"""Comparison of steps of the compiled C with the exact map in many digits, which shows how tight a bound is."""
+"""Comparison of steps of the compiled C with the exact map in many digits, to measure how tight certified bounds
+are."""
 
 from __future__ import annotations
 
@@ -15,10 +16,10 @@ from phigen.certify.checker import identity, run_of
 #: Precision of the exact map in bits.
 BITS = 300
 
-#: Number of corrections, with the inverse of a matrix at the centre of the box, that reach this precision.
+#: Largest number of corrections in the solution of a stage; each uses the inverse matrix at the centre of the box.
 CORRECTIONS = 400
 
-#: Size of the last correction below which the remaining error is negligible.
+#: Size of a correction after which the remaining error is negligible.
 SOLVED = 1e-40
 
 Numbers = Sequence[Any]
@@ -34,14 +35,14 @@ def _precise() -> Iterator[None]:
 
 
 class ExactMap:
-    """Exact map of a certificate: `described` with ``exact``."""
+    """The exact map of a certificate, as a function; ``c`` is the result of `described` with ``exact``."""
 
     def __init__(self, c: Mapping[str, Any]) -> None:
         self._c = c
         self._inverses: dict[int, Any] = {}
 
     def __call__(self, x: Numbers, t: float) -> list[Any]:
-        """Return the map at a point, as balls of `BITS` bits."""
+        """Return the result of a step from (x, t), as balls of `BITS` bits."""
         with _precise():
             x, t = [arb(v) for v in x], arb(t)
             for number, stage in enumerate(self._c["stages"]):
@@ -51,7 +52,7 @@ class ExactMap:
             return x
 
     def _solve_stage(self, number: int, stage: Mapping[str, Any], x: Numbers, t: Any) -> list[Any]:
-        """Return the unknowns of a stage, by corrections."""
+        """Return the unknowns of a stage, found by corrections with a fixed matrix."""
         base = x if stage["based"] else [arb(0)] * len(stage["equation"])
         start = run_of(self._c, stage, x, t, {}, base, exact=True)
         u = [arb(start.x[k].mid()) for k in stage["start"]]
@@ -70,10 +71,11 @@ class ExactMap:
 
 
 def observed(c: Mapping[str, Any], exact: Mapping[str, Any], library: Any, count: int, seed: int = 0) -> list[float]:
-    """Return the largest error of each coordinate against the exact map, for steps from random states in the domain.
+    """Return the largest error of each coordinate in ``count`` steps of the compiled C from random states in the
+    domain.
 
-    ``exact`` describes that map, and ``library`` is the compiled C. Half of the states also have a
-    random compensation term. Raises `RuntimeError` if a step fails.
+    Errors are differences from the exact map, which ``exact`` describes. ``library`` is the compiled C. Half of the
+    states also have a random compensation term. Raises `RuntimeError` if a step fails.
     """
     exact_step = ExactMap(exact)
     draw, worst = random.Random(seed), [0.0] * len(c["domain"])
@@ -92,7 +94,7 @@ def observed(c: Mapping[str, Any], exact: Mapping[str, Any], library: Any, count
 def one_step(
     c: Mapping[str, Any], library: Any, x: Sequence[float], carry: Sequence[float], t: float
 ) -> tuple[list[float], list[float]]:
-    """Return state and compensation after one step of the compiled C. Raises `RuntimeError` if the step fails."""
+    """Return state and compensation term after one step of the compiled C. Raises `RuntimeError` if the step fails."""
     n, name = len(x), c["name"]
     numbers = ctypes.c_double * n
     size = getattr(library, f"{name}_solver_size")
@@ -108,7 +110,8 @@ def one_step(
         status = getattr(library, f"{name}_init_gauge")(*start, gauge)
     else:
         status = getattr(library, f"{name}_init")(*start)
-    solver = (ctypes.c_double * (2 * n)).from_buffer(room)  # the struct begins with state and compensation
+    # the struct of the solver begins with state and compensation term
+    solver = (ctypes.c_double * (2 * n)).from_buffer(room)
     solver[n:] = list(carry)
     if status or getattr(library, f"{name}_step")(room, ctypes.c_double(c["step"])):
         raise RuntimeError(f"a step of {name} fails at {list(x)}")

@@ -1,4 +1,4 @@
-"""Stages of a certified step: flat lists of operations, from the kernels and tables of the C."""
+"""Stages of a certified step as flat lists of operations, built from the kernels and tables of the C."""
 
 from __future__ import annotations
 
@@ -11,47 +11,50 @@ from flint import arb
 from phigen.certify.checker import Evaluation, RefusedError, column
 from phigen.certify.reader import GeneratedC, PathReader
 
-#: Largest compensation term after a step, in 2^-53 of the largest value of the coordinate.
+#: Largest compensation term after a step, in units of 2^-53 times the largest absolute value of the coordinate.
 CARRY = 1.01
 
 #: Smallest contraction rate that certificates assume in the stopping criterion of a Gauss solver, which estimates the
-#: rate from its sweeps; in runs of the corpus the rate is between 0.05 and 0.5.
+#: rate from its sweeps. In runs of the corpus the rate is between 0.05 and 0.5.
 LEAST_RATE = 0.05
 
 Stage = dict[str, Any]
 
 
 class Listing:
-    """Flat list of operations, into which kernels are copied; inputs are listed once."""
+    """Flat list of operations, to which kernels are appended; each input is listed once."""
 
     def __init__(self) -> None:
         self.operations: list[list[Any]] = []
         self._inputs: dict[tuple[Any, ...], int] = {}
 
     def add(self, *operation: Any) -> int:
-        """Append an operation, and return its index."""
+        """Append an operation (name, *operands), and return its index."""
         self.operations.append(list(operation))
         return len(self.operations) - 1
 
     def input(self, *operation: Any) -> int:
-        """Return the index of an operation that reads a value."""
+        """Return the index of an input operation, which is appended if it is new."""
         if operation not in self._inputs:
             self._inputs[operation] = self.add(*operation)
         return self._inputs[operation]
 
     def inputs(self, name: str, count: int) -> list[int]:
-        """Return the indices of operations that read an array."""
+        """Return the indices of the input operations for the first ``count`` entries of an array."""
         return [self.input(name, i) for i in range(count)]
 
     def sum(self, terms: Sequence[int]) -> int:
-        """Append a sum from the first term on."""
+        """Append additions of the terms, from the first on, and return the index of the sum."""
         total = terms[0]
         for term in terms[1:]:
             total = self.add("add", total, term)
         return total
 
     def copy(self, kernel: Mapping[str, Any], **inputs: Any) -> dict[str, list[int]]:
-        """Append the operations of a kernel with these indices as inputs; return the indices of its outputs."""
+        """Append the operations of a kernel; return the indices of its outputs.
+
+        ``inputs`` has the indices that replace the arrays which the kernel reads.
+        """
         operation_indices: list[int] = []
         for op, *a in kernel["operations"]:
             if op == "input":
@@ -64,7 +67,7 @@ class Listing:
 
 
 class _Parameters(dict[str, int]):
-    """Indices of parameters in a listing; a parameter is added when it is first read."""
+    """Indices of the parameters in a listing; a parameter is appended when it is first read."""
 
     def __init__(self, listing: Listing) -> None:
         self._listing = listing
@@ -74,18 +77,20 @@ class _Parameters(dict[str, int]):
 
 
 class _Gauge(_Parameters):
+    """Indices of the multiples of Casimirs in a listing."""
+
     def __missing__(self, index: int) -> int:  # type: ignore[override]
         return self._listing.input("constant", "gauge", index)
 
 
 def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int]:
-    """Append the coefficients of a stage or row, from parameters, step and time."""
+    """Append the coefficients of a stage or row, computed from parameters, step and time; return their indices."""
     step = listing.input("constant", "step")
     h = step
     if len(facts["fractions"]) > 1:
         h = listing.add("mul", listing.input("exact", facts["fractions"][stage]), step)
     kick = []
-    if facts.get("multiples"):  # coefficient of the modified potential, in units of h^2 of the whole step
+    if facts.get("multiples"):  # coefficient of the modified potential, in units of h² with the step h
         square = listing.add("mul", step, step)
         kick = [listing.add("mul", listing.input("exact", facts["multiples"][stage]), square)]
     kernels, inputs = facts["kernels"], {"params": _Parameters(listing), "gauge": _Gauge(listing)}
@@ -100,7 +105,10 @@ def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int
 def stages_of(
     facts: Mapping[str, Any], text: str, name: str, centre: Sequence[Any], exact: bool = False
 ) -> list[Stage]:
-    """Return the stages of a step from the facts about its C; path expansions suit a box or the ``exact`` map."""
+    """Return the stages of a step from the facts about its C.
+
+    Taylor series of paths have the number of terms that suits the box ``centre``, or the ``exact`` map.
+    """
     source, n = GeneratedC(text, name), len(centre)
     if facts["kind"] == "path":
         return _path(facts, source, n, centre, exact)
@@ -115,13 +123,14 @@ def _explicit(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 
 def _splitting(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Return the stages of flows, which add their changes to a sum that begins with the compensation term."""
+    """Return the one stage of a splitting: its flows add changes to a sum that begins with the compensation term."""
     return [_flows(facts, schedule, n) for schedule in facts["schedules"]]
 
 
 def _flows(facts: Mapping[str, Any], schedule: Sequence[Sequence[int]], n: int) -> Stage:
     listing, rows = Listing(), dict[int, list[int]]()
-    extra_coordinates = max(0, 1 + max(i for pairs in facts["moves"].values() for i, _ in pairs) - n)  # with a monitor
+    # a monitor adds a coordinate
+    extra_coordinates = max(0, 1 + max(i for pairs in facts["moves"].values() for i, _ in pairs) - n)
     zeros = [listing.input("exact", 0.0)] * extra_coordinates
     state, start = listing.inputs("x", n) + zeros, listing.inputs("start", n) + zeros
     displacements = listing.inputs("carry", n) + zeros
@@ -136,7 +145,8 @@ def _flows(facts: Mapping[str, Any], schedule: Sequence[Sequence[int]], n: int) 
 
 
 def _newton(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Return the stages of Newton's method for y, with the last correction of the increment to first order."""
+    """Return the stages of a Newton step; the unknowns are y, and the last correction changes the increment to first
+    order."""
     stages = []
     for k in range(len(facts["fractions"])):
         listing = Listing()
@@ -166,7 +176,8 @@ def _newton(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 
 def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Return the stage of sweeps of a Gauss method: the unknowns are the increments of all its stages."""
+    """Return the stage of a Gauss step, which is solved by sweeps; the unknowns are the increments of all Gauss
+    stages."""
     listing, kernels, nodes = Listing(), facts["kernels"], len(facts["weights"])
     width = len(kernels["stage_field"]["outputs"]["move"])
     coef = prepared(facts, listing, 0)
@@ -210,14 +221,16 @@ def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
     ]
 
 
-#: Safety factor for term sizes when the number of terms of a Taylor series is chosen, as later boxes of p are wider.
+#: Safety factor for the sizes of terms when the number of terms of a Taylor series is chosen, since later boxes of p
+#: are wider.
 MARGIN = 4.0
 
 
 def _path(
     facts: Mapping[str, Any], source: GeneratedC, n: int, centre: Sequence[Any], exact: bool = False
 ) -> list[Stage]:
-    """Return the stages of iterations for p, the mean gradient of S_h along a path with one expansion."""
+    """Return the stages of a step with one path expansion; its unknowns p are the mean gradient of S_h along the
+    path."""
     limit = int(facts["most_terms"])
     longest, stages = PathReader(source, facts["series"], n, limit).described, []
     for k in range(len(facts["fractions"])):
@@ -227,7 +240,7 @@ def _path(
 
 
 def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: Sequence[int], u: Sequence[int]) -> Any:
-    """Append Taylor series of a path from x under p = u, and return the terms of the coordinates, from order 1."""
+    """Append the Taylor series of a path from x for p = u; return the terms of each coordinate, from order 1."""
     starts = {f"s{i}": [j] for i, j in enumerate(x)}
     outputs = listing.copy(kernel, coef=prepared(facts, listing, k), p=u, **starts)
     return [outputs[f"s{i}"] for i in range(len(x))]
@@ -236,7 +249,7 @@ def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: 
 def _along_path(
     facts: Mapping[str, Any], source: GeneratedC, n: int, k: int, least: int, max_terms: int, coordinate: int
 ) -> Stage:
-    """Return stage k, whose series have ``least`` to ``max_terms`` terms, as the series of ``coordinate`` proves."""
+    """Return stage k; its series have ``least`` to ``max_terms`` terms, as the series of ``coordinate`` proves."""
     listing, kernels = Listing(), facts["kernels"]
     x, u, coef = listing.inputs("x", n), listing.inputs("u", n), prepared(facts, listing, k)
     terms = _series(facts, PathReader(source, facts["series"], n, max_terms).described, listing, k, x, u)
@@ -289,7 +302,7 @@ def _largest(listing: Listing, sizes: Sequence[int]) -> int:
 def _measured(
     facts: Mapping[str, Any], listing: Listing, x: Sequence[int], terms: Sequence[Sequence[int]], orders: Sequence[int]
 ) -> list[list[int]]:
-    """Append the sizes below which terms are negligible; return pairs of terms of some orders and these sizes."""
+    """Append the sizes below which terms are negligible; return pairs of a term and its size, for some orders."""
     starts = [listing.add("abs", i) for i in x]
     least = listing.add("mul", listing.add("exact", facts["least_share"]), listing.sum(starts))
     negligible, pairs = listing.add("exact", facts["negligible"]), []
@@ -301,7 +314,8 @@ def _measured(
 
 
 def _orders(facts: Mapping[str, Any], kernel: Any, n: int, k: int, box: Sequence[Any]) -> tuple[int, int, int]:
-    """Return least and largest number of terms of series of paths from a box; the coordinate that proves the least."""
+    """Return the least and the largest number of terms of series of paths from a box, and the coordinate that proves
+    the least."""
     listing = Listing()
     x = listing.inputs("x", n)
     p = listing.copy(facts["kernels"]["generate"], coef=prepared(facts, listing, k), y=x)["slope"]

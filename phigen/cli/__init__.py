@@ -1,7 +1,7 @@
-"""The command line: one module per command, imported when the command is used.
+"""The command line of phigen; each command has a module, which is imported when the command is used.
 
-``phigen --help`` and ``phigen --version`` import click and nothing heavier; so each module of a command imports
-the compiler inside its functions.
+``phigen --help`` and ``phigen --version`` only import click. Therefore the module of a command imports the compiler
+inside its functions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from phigen._version import __version__
 from phigen.cli import failures
 from phigen.cli.console import Console
 
-#: Commands in the order of the help page: name, module, one line.
+#: The commands in the order of the help page: name → module and one line of help.
 COMMANDS = {
     "new": ("phigen.cli.new", "Write a commented spec to start from."),
     "check": ("phigen.cli.check", "Prove the mathematics of a spec, or refute it."),
@@ -41,7 +41,7 @@ COMMANDS = {
 
 
 class Commands(click.Group):
-    """A group whose commands are imported on first use, and whose errors become exit codes."""
+    """Group of commands that are imported on first use. Errors of a command become messages and exit codes."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -79,7 +79,8 @@ class Commands(click.Group):
         """Run a command and end the process with its exit code; see `phigen.errors` for the codes."""
         console = extra.setdefault("obj", Console())
         if isinstance(sys.stdout, TextIOWrapper):
-            # As stderr does: a letter that a terminal does not have ends no work.
+            # A character that the terminal cannot show is written as an escape, as on stderr, and does not end the
+            # command.
             sys.stdout.reconfigure(errors="backslashreplace")
         try:
             interrupts.working = True
@@ -100,8 +101,8 @@ class Commands(click.Group):
             with console.heeding(), console.watching():
                 return super().invoke(ctx)
         except (BrokenPipeError, EOFError) as error:
-            # Not left to click, which would exit with 1, the code of a wrong spec, or take it for ^D at a prompt; of
-            # that its prompts make an Abort themselves.
+            # Reported here, since click would exit with 1, the code of a wrong spec, or treat an EOFError as ^D at a
+            # prompt. A real ^D needs no care: prompts of click turn it into Abort.
             return failures.report(error, console)
 
 
@@ -118,5 +119,5 @@ def group() -> None:
 
 
 def main() -> None:
-    """Run the command line of the console script ``phigen``."""
+    """Run the command line; entry point of the console script ``phigen``."""
     group.main(prog_name="phigen")

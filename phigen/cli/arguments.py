@@ -14,9 +14,9 @@ from phigen.registry import RUNNABLE
 from phigen.spec import limits
 from phigen.spec.names import PROFILES, SCHEMES
 
-#: Suffixes of files of figures.
+#: Suffixes of figures.
 FIGURES = (".png", ".svg", ".pdf")
-#: Suffixes of files of films, for lattices.
+#: Suffixes of films, which only lattices have.
 FILMS = (".gif", ".mp4")
 
 #: The type of ``--order``.
@@ -27,10 +27,10 @@ CORRECTIONS = click.IntRange(0, limits.CORRECTIONS)
 
 order_option = click.option("--order", metavar="K", type=ORDER, help="Order of the method; overrides the spec.")
 
-#: The options that select the random numbers of a run with noise.
+#: The type of ``--seed``, which selects the random numbers of a run with noise.
 SEED = click.IntRange(0, limits.SEED)
 
-#: The options of the solver of a run.
+#: The options that choose the solver of a run.
 target_option = click.option(
     "-t", "--target", type=click.Choice(["auto", *RUNNABLE]), default="auto", show_default=True
 )
@@ -39,17 +39,17 @@ settings_option = click.option(
     "--set", "settings", metavar="NAME=VALUE", multiple=True, help="Value of a parameter or of an initial coordinate."
 )
 
-#: The options of the one-step map, which override the spec.
+#: The options that choose the one-step map; they override the spec.
 scheme_option = click.option("--scheme", type=click.Choice(SCHEMES), help="Scheme of the steps; overrides the spec.")
 
-#: The profile of code that phigen itself runs; ``profile:`` of a spec is for code that ``phigen build`` writes.
+#: The option for the profile of code that phigen itself runs; ``profile:`` in a spec only applies to ``phigen build``.
 profile_option = click.option(
     "--profile",
     type=click.Choice(PROFILES),
     help="Optimisation of the C for speed or for size.  [default: fast]",
 )
 
-#: The option that names a run of a spec; the argument SPEC precedes it.
+#: The option that names a run of a spec, for commands with the argument SPEC.
 run_option = click.option(
     "--run", "name", metavar="NAME", shell_complete=runs, help="The run of the spec to use.  [default: the first]"
 )
@@ -61,12 +61,12 @@ many_specs = click.argument(
 
 
 def _one_of(choices: Sequence[str]) -> str:
-    """The words as in "a, b or c"."""
+    """Return the words as "a, b or c"."""
     return " or ".join([", ".join(choices[:-1]), choices[-1]]) if len(choices) > 1 else choices[0]
 
 
 def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:
-    """Return the callback of an option that names a file: it checks the suffix and the folder before any work is
+    """Return the callback of an option that names a file, which checks the suffix and the folder before any work is
     done."""
 
     def checked(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
@@ -75,7 +75,7 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
         if Path(value).suffix.lower() not in suffixes:
             raise click.BadParameter(f"{value!r} must end in {_one_of(suffixes)}")
         if Path(value).suffix.lower() == ".zarr" and Path(value).is_dir():
-            expect_writable(Path(value) / "zarr")  # a store is a folder, which is replaced as a whole
+            expect_writable(Path(value) / "zarr")  # a Zarr store is a folder, which is replaced as a whole
         else:
             expect_writable(Path(value))
             expect_replaceable(Path(value))
@@ -85,7 +85,7 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
 
 
 def expect_writable(path: Path, option: str | None = None) -> None:
-    """Raise `click.BadParameter` for a file that cannot be written after the work, as far as that can be known."""
+    """Raise `click.BadParameter` for a file that cannot be written, as far as this can be known before the work."""
     device = path.exists() and not path.is_file() and not path.is_dir()
     if path.is_dir():
         raise click.BadParameter(f"{str(path)!r} is a folder", param_hint=option)

@@ -1,4 +1,4 @@
-"""``phigen build --binding``: the generated C for other languages."""
+"""Option ``--binding`` of ``phigen build``: files by which other languages call the generated C."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from phigen.cli.outputs import Change
     from phigen.compilation import Compilation
 
-#: Those of `phigen.bindings.emitter`, repeated here so that the command line does not import it.
+#: The languages of `phigen.bindings.emitter`, repeated here so that the command line does not import that module.
 LANGUAGES = ("cpp", "fortran", "julia", "matlab", "rust")
 
 
 def with_bindings(
     planned: Sequence[tuple[Compilation, list[Change]]], options: Options
 ) -> list[tuple[Compilation, list[Change]]]:
-    """Return the files of the bindings of all systems, and the C that they call.
+    """Return the planned changes with the files of bindings, and with the C that they call.
 
     Raises `SpecError` that lists all systems without bindings.
     """

@@ -1,4 +1,4 @@
-"""``phigen build``: from specs to files."""
+"""``phigen build``: write the solvers of specs to files."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from phigen.cli.failures import Collector
 from phigen.cli.fmu import PLATFORMS, units_of, write_unit
 from phigen.cli.generation import DIRECTORY, Options, files_of, output_options
 from phigen.cli.left_out import FILE, names_left_out, unknown_names
-from phigen.cli.sources import found, load_all
+from phigen.cli.sources import load_all, spec_path
 from phigen.errors import CheckError
 from phigen.registry import TARGETS
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from phigen.compilation import Compilation
     from phigen.spec.model import Spec
 
-#: Flags in addition to those of every local library: phigen promises that its C compiles under them without warnings.
+#: Compiler flags in addition to those of every local library: generated C compiles without warnings under them.
 STRICT = ("-Wall", "-Wextra", "-Werror")
 
 
@@ -95,7 +95,7 @@ def command(
 
     SPEC is a file, a folder that is searched for *.yaml, or the name of a bundled spec. The statements of the spec
     are proved first; nothing is written if any spec has an error. Files that were edited by hand are not overwritten.
-    Of folders, the specs whose names are in DIR/left_out.txt are left out.
+    Specs found in folders are left out if DIR/left_out.txt has their names.
     """
     if (checking or diff) and (compiling or certify or fmu):
         writing = "--compile, --fmu and --certify write files"
@@ -153,17 +153,16 @@ def _compile_all(console: Console, spec_files: Sequence[str], options: Options, 
 def _to_build(
     console: Console, specs: Sequence[Spec], spec_files: Sequence[str], directory: Path, checking: bool
 ) -> list[Spec]:
-    """Leave out the specs of searched folders that the list in the output folder names; specs named by the user are
-    built.
+    """Return the specs to build: those in searched folders without the names in the list of the output folder.
 
-    With --check, raises CheckError if the list has names of no spec.
+    Specs that the user names are always built. With --check, raises CheckError if the list has names that no spec has.
     """
-    folders = [file for file in spec_files if Path(found(file)).is_dir()]
+    folders = [file for file in spec_files if Path(spec_path(file)).is_dir()]
     left_out = names_left_out(directory) if folders else {}
     unknown = unknown_names(left_out, {spec.name for spec in specs})
     if checking and unknown:
         raise CheckError("\n".join([*unknown, "  hint: remove these lines, or check the folder of these specs too"]))
-    named_files = {found(file) for file in spec_files}
+    named_files = {spec_path(file) for file in spec_files}
     chosen_specs = [spec for spec in specs if spec.name not in left_out or spec.file in named_files]
     if len(chosen_specs) < len(specs):
         console.note(f"{counted(len(specs) - len(chosen_specs), 'spec')} left out by {directory / FILE}")
@@ -185,16 +184,16 @@ def _plan(
 
 
 def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], options: Options) -> Iterator[Change]:
-    """Return files whose spec no longer exists; only a run over a folder can know."""
+    """Yield changes that remove files whose spec no longer exists, which only a build of a whole folder can know."""
     from phigen.cli.outputs import orphans
 
-    if any(Path(found(file)).is_dir() for file in spec_files):
+    if any(Path(spec_path(file)).is_dir() for file in spec_files):
         names = [c.spec.name for c in compilations]
         yield from orphans(options.directory, names, options.targets or TARGETS)
 
 
 def _compare(planned: Sequence[Change], command: str, diff: bool) -> None:
-    """Raise CheckError unless all files are as they should be."""
+    """Raise CheckError that lists the files which differ from what would be written."""
     outdated = [change for change in planned if change.state != "unchanged"]
     if diff:
         for change in outdated:
@@ -247,9 +246,12 @@ def _write(
 
 
 def _certify(console: Console, compilations: Sequence[Compilation], options: Options) -> None:
-    """Verify the written solvers; systems that miss a bound get no certificate, and lose an earlier one."""
+    """Verify the written solvers, and write a certificate for each system that meets all bounds.
+
+    Earlier certificates are removed. Raises the errors of the other systems.
+    """
     from phigen.cli import certificate
-    from phigen.cli.verify import fallen_short, verified, verified_lattice
+    from phigen.cli.verify import missed_bounds, verified, verified_lattice
     from phigen.compiler import compile_proved
     from phigen.writing import write
 
@@ -265,14 +267,14 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
             judged = verified_lattice if spec.lattice else verified
             verification = judged(subject, None, False, console, options.targets_of(compilation))
             if verification.failures:
-                raise fallen_short(verification)
+                raise missed_bounds(verification)
             write(path, certificate.text_of(compilation, files_of(compilation, options), verification))
             console.note(f"wrote {path}: {len(verification.checks)} measurements")
     collector.finish()
 
 
 def _expect_certificates(planned: Sequence[tuple[Compilation, list[Change]]], options: Options) -> None:
-    """Raise CheckError for an existing certificate that belongs to other files; it may be absent."""
+    """Raise CheckError for a certificate on disk that belongs to other files; a certificate may be absent."""
     from phigen.cli import certificate
 
     complaints = []
@@ -288,7 +290,7 @@ def _report(console: Console, folder: Path, compilation: Compilation, changes: S
     written_files = [_within(folder, c.path) for c in changes if c.state in ("missing", "different")]
     removed = [_within(folder, c.path) for c in changes if c.state == "stale"]
     sentences = [f"wrote {', '.join(written_files)}"] if written_files else []
-    sentences += [f"removed {', '.join(removed)}, which the spec no longer gives"] if removed else []
+    sentences += [f"removed {', '.join(removed)}, which are no longer generated from the spec"] if removed else []
     program = compilation.program
     method = compilation.named(f"order {program.order}, {compilation.label}")
     console.note(f"{folder}: {'; '.join(sentences) or 'unchanged'} ({method})")
@@ -298,7 +300,7 @@ def _report(console: Console, folder: Path, compilation: Compilation, changes: S
 
 
 def _within(folder: Path, path: Path) -> str:
-    """Return a path relative to the folder of a system, if it is in that folder."""
+    """Return a path relative to the folder of a system, or unchanged if it is not in that folder."""
     return path.relative_to(folder).as_posix() if path.is_relative_to(folder) else path.name
 
 

@@ -1,25 +1,24 @@
-"""Files that add a folder of vendored solvers to other build systems: CMake, Meson, a Python package."""
+"""Files for build systems in a folder of vendored solvers: CMake, Meson, and a Python package."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-#: The file of each build system, and the suffix of its sources.
+#: For each build system, the name of its file and the suffix of the sources that it lists.
 FILES = {"cmake": ("CMakeLists.txt", ".c"), "meson": ("meson.build", ".c"), "python": ("__init__.py", ".py")}
 
 
 def build_files(systems: Collection[str], solvers: Mapping[str, Collection[str]]) -> dict[str, str]:
-    """Return the texts of the files, by name; ``solvers`` maps the names of all solvers in the folder to their
-    files.
+    """Return the texts of the files (name → text) for build systems; a file without sources is empty.
 
-    A build system without sources still gets a file, which is empty.
+    ``solvers`` maps the name of each solver in the folder to its files.
     """
     return {FILES[system][0]: _text(system, solvers) for system in sorted(systems)}
 
 
 def sources_lack(systems: Collection[str], solvers: Mapping[str, Collection[str]]) -> list[str]:
-    """The build systems for which no solver has sources."""
+    """Return the build systems for which no solver has sources."""
     endings = {Path(file).suffix for files in solvers.values() for file in files}
     return [system for system in sorted(systems) if FILES[system][1] not in endings]
 

@@ -1,4 +1,7 @@
-"""Certificates: results of `phigen verify`, tied by hashes to the spec and to the files of one build."""
+"""Certificates of `phigen build --certify`: results of `phigen verify` for the files of one build.
+
+Hashes tie a certificate to the spec and to these files.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,8 @@ def path_of(folder: Path, name: str) -> Path:
 
 
 def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, Any]:
-    """Return the identity in a certificate: the version, the spec, and the checksum of the body of each file."""
+    """Return the part of a certificate that ties it to a build: version, hash of the spec, and checksums of the files'
+    bodies."""
     return {
         "phigen": __version__,
         "name": compilation.spec.name,
@@ -31,7 +35,7 @@ def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, An
 
 
 def text_of(compilation: Compilation, files: Mapping[str, str], verification: Verification) -> str:
-    """The certificate; apart from measured numbers it depends on spec and version alone."""
+    """Return the text of a certificate. It depends only on spec, files and version, apart from measured numbers."""
     from phigen.cli.verify import described
 
     data = {**identity(compilation, files), "verification": described(verification)}
@@ -39,7 +43,7 @@ def text_of(compilation: Compilation, files: Mapping[str, str], verification: Ve
 
 
 def obsolete(path: Path, compilation: Compilation, files: Mapping[str, str]) -> str:
-    """Return why a certificate on disk does not belong to these files; empty if it does, or if there is none."""
+    """Return why a certificate on disk does not belong to these files; "" if it does, or if there is none."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

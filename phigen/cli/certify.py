@@ -1,4 +1,4 @@
-"""``phigen certify``: a rigorous bound for the distance of computed steps from the exact Poisson map."""
+"""``phigen certify``: a rigorous bound for the distance between computed steps and the exact Poisson map."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from phigen.errors import CheckError
 if TYPE_CHECKING:
     from phigen.spec.model import Spec
 
-#: Half of the width of the box by default, in sizes of a coordinate at the start of the run, or of 1 for small ones.
+#: Default half-width of the box, relative to the size of a coordinate at the start, or absolute for sizes below 1.
 WIDTH = 0.01
 
 
@@ -100,10 +100,10 @@ def command(
 ) -> None:
     """Bound the distance of the steps of the C of profile small from the exact Poisson map, for a box of states.
 
-    The bound is proved by ball arithmetic: each rounding of each operation, the stop of Newton's method, and the errors
-    of libm are covered. The equation of an implicit step is shown to have one solution. DIR/NAME receives the C, the
-    certificate NAME.bounds.json, and a checker that replays it without phigen. Exit code 5 if there is no certificate
-    for the box; the message says what to try.
+    Ball arithmetic proves the bound. It covers each rounding of each operation, the stopping criterion of Newton's
+    method, and the errors of libm. The equation of an implicit step is shown to have one solution. DIR/NAME receives
+    the C, the certificate NAME.bounds.json, and a checker that replays it without phigen. Exit code 5 if there is no
+    certificate for the box; the message says what to try.
     """
     from phigen.certify.checker import RefusedError
     from phigen.certify.problem import problem_of
@@ -144,7 +144,7 @@ def command(
 
 
 def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[list[float]]:
-    """The box of states: that around the start of the run, with its ranges and those of the command line."""
+    """Return the interval of each coordinate: around the start of the run, or from the options."""
     domain = {
         name: [value - WIDTH * max(1.0, abs(value)), value + WIDTH * max(1.0, abs(value))]
         for name, value in zip(spec.coordinates, experiment.initial, strict=True)
@@ -160,7 +160,7 @@ def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[li
 
 
 def _time(spec: Spec, experiment: Experiment, times: str | None) -> list[float]:
-    """The range of times at which steps begin."""
+    """Return the interval of times at which steps begin."""
     if times and not spec.time:
         raise click.UsageError("--time: H does not depend on the time")
     if times:
@@ -183,7 +183,10 @@ def _range(text: str, option: str) -> list[float]:
 def _observed(
     certificate: dict[str, Any], exact: dict[str, Any], files: dict[str, str], samples: int, console: Console
 ) -> list[float]:
-    """The largest distances of steps of the C; nothing without a compiler. Raises `CheckError` beyond a bound."""
+    """Return the largest distance of each coordinate in sampled steps of the C; [] without a compiler.
+
+    Raises `CheckError` if a distance exceeds its bound.
+    """
     from phigen.certify.samples import observed
     from phigen.errors import ToolchainError
     from phigen.runtime import cache
@@ -210,7 +213,7 @@ def _observed(
 def _write(
     console: Console, folder: Path, name: str, files: dict[str, str], certificate: dict[str, Any], seconds: float
 ) -> None:
-    """Write the C, the certificate, and the checker."""
+    """Write the C, the certificate, and the checker to a folder."""
     from phigen.certify import checker
     from phigen.writing import write_all
 
@@ -246,5 +249,5 @@ def _lines(summary: dict[str, Any]) -> list[str]:
 
 
 def _two_digits(value: float) -> str:
-    """A number with two digits; 0 for subnormal numbers, the bounds of coordinates that do not move."""
+    """Return a number with two digits; "0" for subnormal numbers, the bounds of coordinates that do not move."""
     return f"{value:.2g}" if value > 1e-300 else "0"

@@ -1,4 +1,4 @@
-"""``phigen check``: the mathematics of specs, statement by statement."""
+"""``phigen check``: prove or refute the statements about specs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from phigen.spec.model import Spec
     from phigen.symbolic.verdict import Statement
 
-#: Larger starts of lattices are not computed: a check takes no time or memory that depends on the machine.
+#: Initial values of lattices with more sites are not computed, so that a check needs little time and memory.
 MOST_SITES = 1_000_000
 
 _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow", "undecided": "yellow"}
@@ -102,7 +102,7 @@ def _compared(
     *,
     shown: bool,
 ) -> list[Agreement]:
-    """Compare with the second derivation, and print each comparison as soon as it is complete."""
+    """Compare the compilation with a second derivation by sympy; each comparison is printed when it is complete."""
     from phigen.proofs.independent import SECONDS, compare
     from phigen.symbolic.verdict import REFUTED
 
@@ -148,14 +148,14 @@ def _collect(examination: Examination, collector: Collector, console: Console) -
 
 
 def _say_unexamined(collector: Collector, console: Console) -> None:
-    """Say of specs with errors that nothing was proved of them."""
+    """Report the specs with errors, about which nothing was proved."""
     places = [d.location for e in collector.errors if isinstance(e, SpecError) for d in e.diagnostics]
     for file in dict.fromkeys(place.file for place in places if place):
         console.note(f"{file}: nothing was proved, because the spec has errors")
 
 
 def _expect_starts(spec: Spec, collector: Collector, console: Console) -> None:
-    """Collect the refusals of runs of a lattice whose initial values or parameters do not fit."""
+    """Collect the errors of runs of a lattice, such as arrays of initial values or parameters of other sizes."""
     from phigen.lattice.states import start_of
 
     refused: dict[str, Diagnostic] = {}
@@ -172,7 +172,7 @@ def _expect_starts(spec: Spec, collector: Collector, console: Console) -> None:
 
 
 def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) -> None:
-    """Collect the refusals of the targets that the spec names."""
+    """Collect the errors with which targets in the spec refuse the system."""
     from phigen import registry
 
     for name in spec.targets:

@@ -1,4 +1,4 @@
-"""``phigen compare``: bi-realisations, schemes and classical methods side by side on a run."""
+"""``phigen compare``: bi-realisations, schemes and classical methods, compared on a run."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _orders(text: str) -> tuple[int, ...]:
 
 
 def _expect_comparable(spec: Spec) -> None:
-    """Refuse systems that have no conserved energy to compare by."""
+    """Raise `SpecError` for systems without a conserved energy by which methods could be compared."""
     for key, is_present in (("noise", spec.noise), ("time", spec.time), ("forces", spec.forces)):
         if is_present:
             place = ("damping",) if key == "forces" and ("damping",) in spec.locations else (key,)

@@ -1,4 +1,4 @@
-"""Completion of names in the shell: bundled specs, and the runs of the spec on the command line."""
+"""Shell completion of names: bundled specs, and the runs of the spec on the command line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from phigen.errors import PhigenError
 
 
 def specs(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[CompletionItem[str]]:
-    """Return bundled specs, and the spec files and folders here; if none match, the shell completes file names."""
+    """Return matching names of bundled specs and spec files and folders in the working directory.
+
+    If none match, the shell completes file names.
+    """
     bundled = bundled_names(ctx, parameter, prefix)
     if not bundled:
         return [CompletionItem(prefix, type="file")]
@@ -24,14 +27,14 @@ def specs(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[C
 
 
 def bundled_names(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[str]:
-    """Complete the names of bundled specs."""
+    """Return the names of bundled specs that begin with the prefix."""
     return [name for name in resources.bundled() if name.startswith(prefix)]
 
 
 def runs(ctx: click.Context, parameter: click.Parameter, prefix: str) -> list[str]:
-    """The runs of the specs given so far; none of a spec with errors, which a shell has no place for."""
+    """Return the names of runs of the specs on the command line; specs with errors are ignored."""
     run_names: list[str] = []
-    # click stops at an option without value, before it has told which parameter the other words belong to.
+    # When click completes an option, it has not yet assigned the other words to parameters.
     for source in ctx.args:
         try:
             run_names += load_one(source).runs

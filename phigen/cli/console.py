@@ -1,4 +1,4 @@
-"""Messages: stderr, filtered by -q and -v, in colour on terminals."""
+"""Messages on stderr, filtered by -q and -v, in colour on terminals; data on stdout."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 @dataclass
 class Console:
-    """The messages of one run of phigen. Data goes through `out`, `out_json` and `out_document`."""
+    """Messages of one command; data goes to stdout by `out`, `out_json` and `out_document`."""
 
     quiet: bool = False
     verbose: bool = False
@@ -32,31 +32,32 @@ class Console:
         self._display = Display(lambda: not self.quiet and sys.stderr.isatty(), self.detail)
 
     def _write_line(self, message: str) -> None:
-        with self._display.room(), suppress(OSError):  # stderr itself cannot be written
+        # suppressed, since errors of writing to stderr can be reported nowhere
+        with self._display.room(), suppress(OSError):
             click.echo(message, err=True, color=_colour())
 
     def error(self, message: str) -> None:
-        """Report a failure; never silenced."""
+        """Print an error message, even with -q."""
         self._write_line(_coloured(message))
 
     def warn(self, message: str) -> None:
-        """Report a warning: work continues."""
+        """Print a warning, after which work continues."""
         if not self.quiet:
             self._write_line(_coloured(f"warning: {message}"))
 
     def note(self, message: str) -> None:
-        """Report progress, unless the console is quiet."""
+        """Print a message, unless -q was given."""
         if not self.quiet:
             self._write_line(message)
 
     def detail(self, message: str) -> None:
-        """Report a detail that is shown with -v only."""
+        """Print a message if -v was given."""
         if self.verbose:
             self._write_line(message)
 
     @contextmanager
     def heeding(self) -> Iterator[None]:
-        """Within this context, warnings of phigen's library are messages like those of its commands."""
+        """Context in which warnings of phigen's library are printed like those of commands."""
         with warnings.catch_warnings():
             library_function = warnings.showwarning
 
@@ -72,12 +73,14 @@ class Console:
             yield
 
     def watching(self) -> AbstractContextManager[None]:
-        """Within this context, the stages of the compiler are shown: on a terminal, unless -q; with -v as messages."""
+        """Context in which stages of the compiler are shown: on a terminal without -q as a status line, with -v as
+        messages."""
         return self._display.watching()
 
     @contextmanager
     def progress(self, label: str, length: int) -> Iterator[Callable[[int], None] | None]:
-        """Show a progress bar on stderr; returns a function of the number of steps done, or None without a terminal."""
+        """Context with a progress bar on stderr; its value is a function of the number of steps done, or None without a
+        terminal."""
         if self.quiet or not sys.stderr.isatty():
             yield None
             return
@@ -96,7 +99,7 @@ pass_console = click.make_pass_decorator(Console, ensure=True)
 
 
 def verbosity(command: F) -> F:
-    """The options -q and -v, which every command has."""
+    """Add the options -q and -v to a command."""
 
     def store(name: str) -> Callable[[click.Context, click.Parameter, bool], None]:
         def callback(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
@@ -116,7 +119,7 @@ def verbosity(command: F) -> F:
 
 
 def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[str]:
-    """Rows as lines of aligned columns; the columns in ``right`` are flush right."""
+    """Return the rows as lines with aligned columns; the columns with indices in ``right`` are aligned at the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for row in rows:
@@ -126,17 +129,17 @@ def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[s
 
 
 def indented(lines: Sequence[str]) -> list[str]:
-    """The lines of a message below its first."""
+    """Return the lines of a message, after its first, with their indentation."""
     return [f"  {line}" for line in lines]
 
 
 def mend(commands: Sequence[str]) -> list[str]:
-    """Return the end of a message: the commands that correct the problem."""
+    """Return the last lines of a message: the commands that correct the problem."""
     return ["to mend it:", *indented(commands)]
 
 
 def counted(number: int, noun: str) -> str:
-    """Return a number with its noun, as ``3 files``."""
+    """Return a number with a noun in singular or plural, such as "3 files"."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
@@ -146,7 +149,7 @@ def heading(text: str) -> str:
 
 
 def out(text: str) -> None:
-    """Write lines to stdout, in colour on a terminal."""
+    """Write a line, or several, to stdout, in colour on a terminal."""
     with _stdout():
         click.echo(text, color=_colour())
 
@@ -159,7 +162,7 @@ def out_json(value: Any) -> None:
 
 
 def out_document(text: str) -> None:
-    """Write a whole file to stdout: in UTF-8 for any encoding of stdout, without additions."""
+    """Write a whole document to stdout, always in UTF-8, without a final line break or colour."""
     with _stdout():
         click.echo(text.encode("utf-8", "backslashreplace"), nl=False)
 
@@ -178,7 +181,7 @@ def _stdout() -> Iterator[None]:
 
 
 def _colour() -> bool | None:
-    """None: click decides by the stream; https://no-color.org."""
+    """Whether to use colour: False if NO_COLOR is set (https://no-color.org); None lets click decide by the stream."""
     return False if os.environ.get("NO_COLOR") else None
 
 

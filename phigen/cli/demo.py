@@ -1,4 +1,4 @@
-"""``phigen demo``: the paper's Lotka–Volterra system, up to just before its singularity."""
+"""``phigen demo``: the Lotka–Volterra system of the paper, integrated up to just before its singularity."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SPEC, RUN = "lotka_volterra", "blow_up"
 
-#: The method of the paper, and variants by one option.
+#: Orders that are compared: that of the paper, and a higher one.
 ORDERS = (2, 8)
 CLASSICAL = "rk2"
 
@@ -49,7 +49,7 @@ def command(console: Console, target: str) -> None:
     for order in ORDERS:
         compilation = compilation_of(source, order=order)
         solver = loaded(compilation, target, console)
-        target = solver.target  # reported once, if it differs from the request
+        target = solver.target  # The fallback from C to NumPy is reported once.
         run = experiment.run
         trajectory = solver.integrate(experiment.initial, experiment.h, run.steps, run.stride)
         solutions[f"phigen {order}"] = trajectory.x
@@ -83,13 +83,13 @@ def _print(
 
 
 def singularity(experiment: Experiment) -> float:
-    """When the first species becomes infinite: x1' = x1 (E − x1) with E = x1 + x2 + x3 constant."""
+    """Return the time at which x1 becomes infinite: x1' = x1 (E − x1), where E = x1 + x2 + x3 is constant."""
     total, first = sum(experiment.initial), experiment.initial[0]
     return math.log((total - first) / -first) / total
 
 
 def _errors(system: System, experiment: Experiment, t: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
-    """Relative errors (rows,) of the state and of the Casimir, and the exact states."""
+    """Return the relative errors (rows,) of the state and of the Casimir, and the exact states."""
     import numpy as np
 
     from phigen.study.summary import exact_solution

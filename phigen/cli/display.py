@@ -1,4 +1,4 @@
-"""The stages of the compiler on stderr: one line on a terminal, which changes as they do; with -v, a line for each."""
+"""Display of the compiler's stages on stderr: one changing line on a terminal, and with -v a line for each stage."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from contextlib import contextmanager
 from phigen import progress
 from phigen.progress import Stage
 
-#: Seconds before the line appears, and between two of its states.
-PATIENCE, PERIOD = 1.0, 0.2
+#: Seconds before the line appears, and seconds between two updates.
+DELAY, PERIOD = 1.0, 0.2
 
 
 class Display:
-    """Status line of the stages: ``shows`` returns whether to draw it, ``began`` is called at the start of a stage."""
+    """Status line of the active stages.
+
+    ``shows`` returns whether the line is drawn; ``began`` is called with the name of each stage that starts.
+    """
 
     def __init__(self, shows: Callable[[], bool], began: Callable[[str], None]) -> None:
         self._shows, self._began = shows, began
@@ -28,7 +31,7 @@ class Display:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Within this context, show the stages of this thread."""
+        """Context in which the stages of this thread are shown."""
         try:
             with progress.watched(self._receive_stages):
                 yield
@@ -37,13 +40,13 @@ class Display:
             self.erase()
 
     def erase(self) -> None:
-        """Clear the progress line on the terminal."""
+        """Clear the status line on the terminal."""
         with self.room():
             pass
 
     @contextmanager
     def room(self) -> Iterator[None]:
-        """Within this context, the line is cleared and not drawn, to make room for a message."""
+        """Context in which the status line is cleared and not drawn, so that a message can be written."""
         with self._lock:
             if self._visible:
                 sys.stderr.write("\r\x1b[K")
@@ -65,7 +68,7 @@ class Display:
         while not self._over.wait(PERIOD):
             with self._lock:
                 stages, time_now = self._stages, time.perf_counter()
-                if stages and time_now - self._start > PATIENCE and not self._over.is_set():
+                if stages and time_now - self._start > DELAY and not self._over.is_set():
                     self._draw(f"{_path(stages)}, {time_now - stages[0].began:.0f} s")
 
     def _draw(self, line: str) -> None:

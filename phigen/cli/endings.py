@@ -1,4 +1,4 @@
-"""Ends of runs, and the states that are stored: the interpretation of steps, until, stop, every and stride."""
+"""Ends of runs and times of stored states, from the keys or options steps, until, stop, every and stride."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 
-#: Largest number of requested times.
+#: Largest number of times at which states may be stored.
 _MOST_TIMES = 10_000_000
 
-#: An experiment of an ordinary system or a lattice, and its solver.
+#: An experiment of an ordinary system or of a lattice.
 E = TypeVar("E", bound=Experiment)
 AnySolver = Solver | LatticeSolver
 
 
 def ended(experiment: E, solver: AnySolver, console: Console) -> E:
-    """Return the experiment with its end, if that is at a time or at a zero of ``stop``."""
+    """Return the experiment with its end, if this is a time (``until``) or a zero of the expression ``stop``."""
     run, h = experiment.run, experiment.h
     end: End | None = None
     if run.until is not None:
@@ -44,7 +44,7 @@ def ended(experiment: E, solver: AnySolver, console: Console) -> E:
 
 
 def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: End | None) -> End | None:
-    """Return the zero of ``stop``, if it is before the end."""
+    """Return the first zero of ``stop``; None if the run ends before it."""
     run, names, h = experiment.run, solver.interface, experiment.h
     assert run.stop is not None
     g = experiment.function(run.stop, solver)
@@ -57,13 +57,13 @@ def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: E
         return zero
     try:
         last = _count(experiment, solver, end)
-    except BackendError:  # the final part of a step, which the run would make without a stop, fails
+    except BackendError:  # The partial last step up to ``until`` fails, but the run stops before it.
         return zero
     return zero if _count(experiment, solver, zero) < last else None
 
 
 def _count(experiment: Experiment, solver: AnySolver, end: End) -> float:
-    """Count the steps up to an end, including the fraction of the last. Raises `BackendError`."""
+    """Return the number of steps up to an end, with the fraction of the last step. Raises `BackendError`."""
     if not end.part:
         return float(end.steps)
     session = experiment.begun(solver)
@@ -72,7 +72,7 @@ def _count(experiment: Experiment, solver: AnySolver, end: End) -> float:
 
 
 def length(experiment: Experiment, solver: AnySolver) -> float:
-    """Length of a run up to its end, in the variable of equal steps, τ or t. Raises `StepError`."""
+    """Return the length of a run up to its end, in τ with a monitor, else in t. Raises `StepError`."""
     if experiment.end is None:
         return abs(experiment.h) * experiment.run.steps
     try:
@@ -82,13 +82,17 @@ def length(experiment: Experiment, solver: AnySolver) -> float:
 
 
 def timed(experiment: E, solver: AnySolver, every: float | None = None, at: str | None = None) -> E:
-    """Return the experiment with the times of stored states: equal distances, or a list, up to the end."""
+    """Return the experiment with times at which states are stored: at equal distances ``every``, or listed in ``at``.
+
+    Without these options, the keys of the run apply.
+    """
     if every is None and at is None and experiment.run.every is not None:
         every = float(experiment.run.every)
     time_list = _parse_times(at) if at is not None else [float(t) for t in experiment.run.at] if every is None else []
     if every is None and not time_list:
         return experiment
-    if experiment.end is None and solver.interface.monitored:  # the session itself measures the time of its steps
+    # with a monitor, only a session of the solver knows the time after the last step
+    if experiment.end is None and solver.interface.monitored:
         end_time = after_steps(experiment.begun(solver), experiment.h, experiment.run.steps)
         experiment = replace(experiment, end=end_time)
     times = (
@@ -100,10 +104,10 @@ def timed(experiment: E, solver: AnySolver, every: float | None = None, at: str 
 
 
 def _times_in_run(experiment: Experiment, solver: AnySolver, times: list[float], asked: bool) -> list[float]:
-    """Return the listed times in order, without the start and times beyond a stop.
+    """Return the listed times in order, without the start and without times after the end.
 
-    Times ``asked`` for on the command line must be before the end; those of the spec are dropped if the run ends
-    earlier.
+    Raises `click.BadParameter` if times on the command line (``asked``) are outside the run. Times in the spec are
+    dropped if the run ends earlier.
     """
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     too_late = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
@@ -118,7 +122,7 @@ def _times_in_run(experiment: Experiment, solver: AnySolver, times: list[float],
 
 
 def _regular(experiment: Experiment, solver: AnySolver, every: float) -> list[float]:
-    """Return times with equal distances, counted from the start."""
+    """Return times at equal distances from the start of the run, without those before the steps begin."""
     begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
     if not every > 0 or not math.isfinite(every):
         raise click.BadParameter("the time between states must be positive", param_hint="--every")
@@ -131,7 +135,8 @@ def _regular(experiment: Experiment, solver: AnySolver, every: float) -> list[fl
 
 
 def _expect_whole(experiment: Experiment, solver: AnySolver, times: Sequence[float], option: str) -> None:
-    """Check that all times are ends of steps: the path of the noise is known only there."""
+    """Raise `click.BadParameter` for times within a step of a system with noise, whose path is known only after whole
+    steps."""
     for time in times if solver.interface.noise else ():
         steps = (time - experiment.begin) / experiment.h
         if abs(steps - round(steps)) > 1e-9 * max(1.0, abs(steps)):

@@ -1,4 +1,4 @@
-"""The warning about a run whose energy error is too large for meaningful states."""
+"""Warnings about runs whose energy error is so large that their states mean nothing."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from phigen.tuning.equal_work import rk4_energy_error
 from phigen.tuning.problem import Problem
 from phigen.tuning.search import rounded_down
 
-#: Target energy error of the proposed step: small enough that orbits keep their shape.
-AIM = 1e-3
+#: Energy error for which a step is proposed; at this error, orbits keep their shape.
+TARGET_ENERGY_ERROR = 1e-3
 
-#: Smaller energy errors are not compared with those of RK4: orbits keep their shape.
+#: Least energy error of a run that is compared with RK4; at smaller errors, orbits keep their shape.
 LEAST_COMPARED_ERROR = 1e-3
-#: Longer runs are not compared with RK4: its error grows, that of the solver need not, and the comparison takes long.
+#: Most steps of a run that is compared with RK4. For longer runs the comparison would take long, and the error of RK4
+#: grows in any case.
 MOST_STEPS = 1_000_000
-#: Factor by which the energy error of RK4 must be smaller, so that the noise of clocks does not decide.
-CLEARLY = 2.0
+#: Factor by which RK4 must be more accurate before the warning appears; the times on which it rests are noisy.
+LEAST_RK4_ADVANTAGE = 2.0
 
 _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the start", SITES: "Σ |energy of a site|"}
 
 
 def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
-    """Return the warning about a run of an ordinary system; empty if there is none.
+    """Return the warning about the energy error of a run of an ordinary system; "" if there is none.
 
-    With forces or a time-dependent H it is about the energy balance, unless the integral in the balance is less
-    accurate.
+    With forces or a time-dependent H, the error is that of the energy balance. There is no warning if the integral in
+    the balance is too inaccurate.
     """
     energy = summary.energy
     uncertain = summary.is_balance and not summary.off < energy.error / 2
@@ -40,7 +41,7 @@ def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
 
 
 def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -> str:
-    """The warning about an energy error, with a smaller step to try; empty if the error is not large."""
+    """Return the warning about an energy error, with a smaller step as a hint; "" if the error is not large."""
     if not math.isfinite(error):
         warning = "H is not a finite number on all of this run: do not trust these states"
         return f"{warning}\n  hint: the run begins where H is not defined, or reaches such a point"
@@ -52,10 +53,10 @@ def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -
 
 
 def compares_with_rk4(compilation: Compilation, target: str, energy: Drift, steps: int) -> bool:
-    """Return whether the energy error of a run is compared with that of RK4.
+    """Return whether the energy error of a run is to be compared with that of RK4.
 
-    Only runs in C, with equal steps in t, of systems that conserve their energy, are compared; and only errors in the
-    range in which `rk4_warning` warns.
+    This holds for runs in C, with equal steps in t, of systems that conserve energy, if `rk4_warning` can apply to an
+    error of this size.
     """
     conserved = not compilation.system.driven and energy.unit.kind in _SCALES and not energy.unit.moves
     warnable = LEAST_COMPARED_ERROR < energy.error <= LARGE_ENERGY_ERROR and steps <= MOST_STEPS
@@ -63,13 +64,13 @@ def compares_with_rk4(compilation: Compilation, target: str, energy: Drift, step
 
 
 def rk4_warning(compilation: Compilation, problem: Problem, solver: Solver, energy: Drift) -> str:
-    """Return the warning about an energy error that RK4 with as much processor time does not make; else empty.
+    """Return the warning that RK4 with the same processor time has a smaller energy error; "" if it has not.
 
-    For runs of which `compares_with_rk4` is true.
+    The caller checks `compares_with_rk4` first.
     """
     spec = compilation.spec
     theirs = rk4_energy_error(compilation, solver.backend, problem)
-    if not theirs < energy.error / CLEARLY:
+    if not theirs < energy.error / LEAST_RK4_ADVANTAGE:
         return ""
     finding = f"the energy error reaches {energy.error:.1e} of {_SCALES[energy.unit.kind]}"
     order = f"--order {solver.order + 2 - solver.order % 2}"
@@ -79,7 +80,7 @@ def rk4_warning(compilation: Compilation, problem: Problem, solver: Solver, ener
 
 
 def sweep_warning(count: int, members: int, largest: float, h: float, order: int) -> str:
-    """The warning about ``count`` members of a sweep whose energy error is large; empty if there are none."""
+    """Return the warning about ``count`` members of a sweep with large energy errors; "" if ``count`` is 0."""
     if not count:
         return ""
     warning = f"{count} of {members} members have an energy error above {LARGE_ENERGY_ERROR:.0%} of their energy"
@@ -92,9 +93,9 @@ def _multiple(error: float) -> str:
 
 
 def advised_step(error: float, h: float, order: int) -> float:
-    """An estimate of the step whose energy error is `AIM`, since errors are proportional to h^order.
+    """Return an estimate of the step with energy error `TARGET_ENERGY_ERROR`; errors are proportional to h^order.
 
-    An error above 1 only shows that the step is too large: it counts as 1.
+    Errors above 1 count as 1, since they only show that the step is too large.
     """
-    step = abs(h) * (AIM / min(error, 1.0)) ** (1 / order)
+    step = abs(h) * (TARGET_ENERGY_ERROR / min(error, 1.0)) ** (1 / order)
     return rounded_down(step, 1) * (1 if h > 0 else -1)

@@ -1,4 +1,4 @@
-"""Files that exist where a command writes: files written by phigen are replaced, others with ``--force`` only."""
+"""Existing files in places where a command writes: files of phigen are replaced, other files only with ``--force``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _keep(ctx: click.Context, parameter: click.Parameter, value: bool) -> None:
     ctx.meta[_FORCE] = value
 
 
-#: The option that allows to replace files that phigen did not write. It is read before the options that name files.
+#: The option ``--force``; click reads it before the options that name files.
 force_option = click.option(
     "--force",
     is_flag=True,
@@ -31,7 +31,7 @@ force_option = click.option(
 
 
 def expect_replaceable(path: Path, option: str | None = None) -> None:
-    """Raise `click.BadParameter` for a file that phigen did not write, unless ``--force`` was given."""
+    """Raise `click.BadParameter` for an existing file that phigen did not write, unless ``--force`` was given."""
     if not path.is_file() or path.stat().st_size == 0:
         return
     meta = click.get_current_context().meta
@@ -42,9 +42,9 @@ def expect_replaceable(path: Path, option: str | None = None) -> None:
 
 
 def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, continued: bool = False) -> None:
-    """Raise `click.BadParameter` for a file by option that another run wrote, unless ``--force`` was given.
+    """Raise `click.BadParameter` if a file was written by another run, unless ``--force`` was given.
 
-    A run that is ``continued`` in its file may find it without an origin.
+    ``files`` maps options to their files. The file of a run to be ``continued`` may lack an origin.
     """
     from phigen.runtime.lattice_frames import is_store
     from phigen.runtime.origin import companion, read_origin
@@ -59,9 +59,9 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
         if path is None or force or not path.exists() or not (path.is_dir() or path.is_file()):
             continue
         if path.with_name(f"{path.name}.checkpoint").exists() or (path.is_file() and path.stat().st_size == 0):
-            continue  # of an interrupted run
+            continue  # file of an interrupted run
         if path.is_dir() and not is_store(path):
-            continue  # which no option replaces
+            continue  # no option allows to replace such a file
         file_origin = read_origin(path)
         hint = "" if continued else "; --force replaces it"
         if file_origin is None and not continued:
@@ -74,14 +74,14 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
 
 
 def wrote(path: Path) -> str:
-    """Return the note on a file: that it was written, or replaced if it existed and the run does not continue it."""
+    """Return the message that a file was written or replaced; "" if the run continues it."""
     ctx: Any = click.get_current_context()
     continued = ctx.params.get("resume") or ctx.params.get("extend")
     return f"{'replaced' if path in ctx.meta.get(_REPLACED, ()) and not continued else 'wrote'} {path}"
 
 
 def _is_of_phigen(path: Path) -> bool:
-    """Whether a file has the form of phigen's: tables begin with the time, figures and pages name phigen."""
+    """Whether a file looks like one of phigen: a table has a column of the time, a figure or a page names phigen."""
     match path.suffix.lower():
         case ".csv":
             with path.open("rb") as file:

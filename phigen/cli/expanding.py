@@ -1,4 +1,4 @@
-"""``phigen show --expand`` and ``--lattice``: a small lattice as an ordinary spec, and back."""
+"""Options ``--expand`` and ``--lattice`` of ``phigen show``: a small lattice as an ordinary spec, and the reverse."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ OPTION = "--expand"
 
 
 def expanded_text(spec: Spec, sizes: str) -> str:
-    """The text of a spec for the lattice at sizes such as ``3x3``, or at those of the run of that name."""
+    """Return the text of an ordinary spec for a lattice.
+
+    ``sizes`` are sizes such as ``3x3``, or the name of a run with the sizes.
+    """
     from phigen.lattice.cell_building import cell_from_spec
     from phigen.spec.yaml_text import spec_text
 
@@ -40,7 +43,7 @@ def expanded_text(spec: Spec, sizes: str) -> str:
 
 
 def lattice_text(spec: Spec) -> str:
-    """The text of a spec of one site, for an ordinary spec in which identical sites are written out."""
+    """Return the text of a lattice spec for an ordinary spec in which identical sites are written out."""
     from phigen.lattice.recognition import MIN_SITES_PER_AXIS, recognised_lattice
     from phigen.spec.yaml_text import spec_text
 
@@ -54,13 +57,13 @@ def lattice_text(spec: Spec) -> str:
 
 
 def typed_sizes(text: str) -> tuple[int, ...] | None:
-    """Sizes as they are typed, ``3x3``; None for another text."""
+    """Return the sizes in a text such as ``3x3``; None for other texts."""
     match = re.fullmatch(r"[1-9][0-9]{0,9}(x[1-9][0-9]{0,9})*", text)
     return tuple(map(int, text.split("x"))) if match else None
 
 
 def too_small(cell: Cell, sizes: Sequence[int], text: str) -> str:
-    """Refusal of sizes that are too small for the stencil; empty if they are large enough."""
+    """Return the error message for sizes that are too small for the stencil; "" if they are large enough."""
     from phigen.lattice.cell_building import least_sizes
 
     least = least_sizes(cell)
@@ -98,7 +101,7 @@ def _expansion(spec: Spec, cell: Cell, choice: str) -> Expansion:
 
 
 def _run(spec: Spec, expansion: Expansion, run: Run) -> Run | None:
-    """A run at other sizes; None where its arrays are of other sizes."""
+    """Return a run with the sizes of the expansion; None if its arrays have other sizes."""
     from phigen.lattice.expansion import run_of
     from phigen.lattice.states import start_of
 

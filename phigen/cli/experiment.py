@@ -1,4 +1,4 @@
-"""The run of a spec with the settings of the command line, and its solver."""
+"""A run of a spec with the changes that the command line makes, and its solver."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Experiment:
-    """A run with the settings of the command line.
+    """Run with the changes of the command line.
 
-    ``end`` is an end between two steps, ``times`` are those of stored states, in place of a stride, in addition to
-    the first and the last. ``past`` is a finished run (`phigen.cli.past.StoredRows`) that this run continues,
-    ``first`` an attitude at its start.
+    ``end`` is an end within a step. ``times`` are the times of stored states, which replace the stride; the first and
+    the last state are stored too. ``past`` is a finished run (`phigen.cli.past.StoredRows`) that this run continues.
+    ``first`` is the attitude at the start, if it is not the identity.
     """
 
     run: Run
@@ -39,7 +39,7 @@ class Experiment:
     parameters: Mapping[str, Any]
     end: End | None = None
     times: tuple[float, ...] | None = None
-    past: Any = None  # `StoredRows`
+    past: Any = None  # StoredRows, whose module is not imported here
     first: Floats | None = None
 
     @property
@@ -49,45 +49,45 @@ class Experiment:
 
     @property
     def t0(self) -> float:
-        """The time at the start."""
+        """The time at the start of the run."""
         return float(self.run.start)
 
     @property
     def begin(self) -> float:
-        """The time at which its steps start: at the start, or where the past run ends."""
+        """The time at which the steps start: the start of the run, or the end of the past run."""
         return self.past.t if self.past else self.t0
 
     @property
     def made(self) -> int:
-        """Number of steps of noise that the past run has used; a part of a step counts as one."""
+        """Number of steps of noise that the past run has used; a partial step counts as one."""
         steps = (self.begin - self.t0) / self.h
         return math.ceil(steps - 1e-9 * max(1.0, steps))
 
     def begun(self, solver: Any) -> Any:
-        """Return a session of the solver at the start of the steps. Raises `StepError`."""
+        """Return a session of the solver at the point where the steps start. Raises `StepError`."""
         from phigen.cli.past import begun
 
         return begun(solver, self)
 
     def function(self, expression: Expression, solver: Any) -> Function:
-        """An expression of the run as a function of states, and of their times where there is a time."""
+        """Return an expression of the spec as a function of states, and of times if H depends on the time."""
         from phigen.runtime.sections import function_of
 
         return function_of(expression, solver.interface.coordinates, self.parameters, solver.interface.time)
 
     @property
     def spans(self) -> tuple[float, ...]:
-        """The times of states that are stored, from where steps begin."""
+        """The times of stored states, relative to the time at which the steps start."""
         return tuple(time - self.begin for time in self.times or ())
 
     @property
     def until(self) -> float:
-        """The time where it ends, of steps that are equal in time or with an end in time."""
+        """The time at which the run ends; only for steps that are equal in t, or with an ``end``."""
         return self.begin + (self.end.span if self.end else self.h * self.run.steps)
 
     @property
     def rows(self) -> int:
-        """Number of states that are stored: those of every stride-th step or at given times, and the last."""
+        """Number of states to be stored, with the rows of the past run, the first and the last state."""
         first_rows = len(self.past.rows) if self.past else 1
         if self.times is not None:
             last = self.times[-1] if self.times else self.begin
@@ -96,12 +96,12 @@ class Experiment:
 
     @property
     def has_part(self) -> bool:
-        """Whether a part of a step follows the whole steps."""
+        """Whether the run ends with a partial step."""
         return bool(self.end and self.end.part)
 
 
 def expect_system(spec: Spec) -> None:
-    """Refuse lattices, with the way to one of a few sites."""
+    """Raise `SpecError` for lattices; the hint says how to expand one."""
     if spec.lattice:
         from phigen.geometry.system import system_of_lattice
 
@@ -109,7 +109,7 @@ def expect_system(spec: Spec) -> None:
 
 
 def run_of(spec: Spec, name: str | None) -> Run:
-    """The run of that name, the first by default."""
+    """Return the run of that name, by default the first. Raises `SpecError` if there is no run."""
     if not spec.runs:
         hint = "add one under runs:, with initial, step and steps; phigen new shows how"
         raise SpecError([Diagnostic(f"{spec.file}: the spec has no runs", hint=hint)])
@@ -127,7 +127,10 @@ def prepared(
     settings: Iterable[str] = (),
     until: float | None = None,
 ) -> Experiment:
-    """The run of that name, the first by default, with changes of the command line; not of a lattice."""
+    """Return the run of that name, by default the first, with the options of the command line; lattices are refused.
+
+    ``settings`` are texts NAME=VALUE of initial values and parameters.
+    """
     expect_system(spec)
     run = changed(spec, name, step, steps, until)
     initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
@@ -146,7 +149,7 @@ def changed(
     steps: int | None = None,
     until: float | None = None,
 ) -> Run:
-    """The run of that name, the first by default, with the step and the end that the command line says."""
+    """Return the run of that name, by default the first, with step and end from the command line."""
     run = run_of(spec, name)
     if until is not None:
         run = replace(run, duration=None)
@@ -160,8 +163,7 @@ def changed(
 
 
 def _expect_room_for_members(spec: Spec, run: Run) -> None:
-    """Raise `LimitError` if the states of the members of a run with noise, and copies of them, do not fit into
-    memory."""
+    """Raise `LimitError` if the states of all members of a run with noise do not fit into memory."""
     from phigen.memory import expect_room
 
     place = spec.diagnostic(("runs", run.name, "members"), "").location
@@ -170,7 +172,7 @@ def _expect_room_for_members(spec: Spec, run: Run) -> None:
 
 
 def with_steps(spec: Spec, run: Run, step: float | None, steps: int | None) -> Run:
-    """The run with the step and the number of steps that the command line says."""
+    """Return the run with step and number of steps from the command line."""
     from phigen.spec.runs import with_step
 
     if steps is not None:
@@ -187,14 +189,14 @@ def with_steps(spec: Spec, run: Run, step: float | None, steps: int | None) -> R
 
 
 def _expect_few(steps: float | Fraction, option: str) -> None:
-    """Refuse more steps than a spec may ask for."""
+    """Raise `LimitError` for more steps than a spec may have."""
     if steps > limits.STEPS:
         message = f"{option}: {float(steps):.9g} steps, more than the limit of {limits.STEPS}"
         raise LimitError([Diagnostic(message, hint="fewer or larger steps")])
 
 
 def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:
-    """The run with the seed that the command line says."""
+    """Return the run with the seed from the command line."""
     if seed is None:
         return run
     if not spec.noise:
@@ -203,7 +205,7 @@ def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:
 
 
 def with_stop(spec: Spec, run: Run, text: str | None) -> Run:
-    """The run with the expression of ``--stop``, by which it ends."""
+    """Return the run that stops at a zero of the expression of ``--stop``."""
     from phigen.spec.stops import stop_of
 
     if text is None:
@@ -216,7 +218,7 @@ def with_stop(spec: Spec, run: Run, text: str | None) -> Run:
 
 
 def expect_positive(spec: Spec, parameters: Mapping[str, Any]) -> None:
-    """Refuse numbers beyond the bounds of parameters; arrays are checked elsewhere."""
+    """Raise `click.BadParameter` for numbers outside the bounds of their parameters; arrays are checked elsewhere."""
     for p in spec.parameters:
         value = parameters.get(p.name)
         if isinstance(value, float | Fraction) and p.refuses(value):
@@ -224,7 +226,7 @@ def expect_positive(spec: Spec, parameters: Mapping[str, Any]) -> None:
 
 
 def setting_of(setting: str) -> tuple[str, float]:
-    """The name and the number of NAME=VALUE."""
+    """Return name and number of a text NAME=VALUE."""
     name, equals, text = (part.strip() for part in setting.partition("="))
     try:
         value = float(Fraction(text)) if "/" in text else float(text)
@@ -247,7 +249,7 @@ def _set(setting: str, initial: dict[str, float], parameters: dict[str, float]) 
 
 
 def loaded(compilation: Compilation, target: str, console: Console) -> Solver:
-    """The solver; where auto falls back to NumPy, stderr says so."""
+    """Return the loaded solver; a fallback from C to NumPy is reported."""
     from phigen.api import chosen_target, solver_of
 
     target_name = chosen_target(target, console.note)

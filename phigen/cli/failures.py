@@ -1,4 +1,4 @@
-"""Messages on stderr and exit codes for exceptions."""
+"""Messages on stderr and exit codes of exceptions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ USAGE = 2
 
 
 class SeveralError(PhigenError):
-    """Errors of several specs, reported in one run; the exit code is the smallest of theirs."""
+    """Errors of several specs in one command; the exit code is the smallest of their codes."""
 
     def __init__(self, errors: Sequence[PhigenError]) -> None:
         super().__init__(f"{len(errors)} errors")
@@ -31,14 +31,14 @@ class SeveralError(PhigenError):
 
 
 class Collector:
-    """Continues after the error of one spec, to report those of all; `finish` raises the collected errors."""
+    """Collector of errors, so that a command reports the errors of all its specs; `finish` raises them."""
 
     def __init__(self) -> None:
         self.errors: list[PhigenError] = []
 
     @contextmanager
     def collecting(self) -> Iterator[None]:
-        """Store an error of phigen for later."""
+        """Context in which an error of phigen is collected instead of raised."""
         try:
             yield
         except PhigenError as error:
@@ -53,7 +53,7 @@ class Collector:
 
 
 def report(error: BaseException, console: Console) -> int:
-    """Report a failure, and return the exit code."""
+    """Print the message of an exception, and return the exit code."""
     if isinstance(error, click.exceptions.Abort) or _is_interrupt(error):
         console.error("interrupted")
         return interrupts.CODE
@@ -63,7 +63,7 @@ def report(error: BaseException, console: Console) -> int:
                 error.show()
             return error.exit_code if isinstance(error, click.UsageError) else USAGE
         case BrokenPipeError():
-            return BROKEN_PIPE  # the reader of our output has closed it
+            return BROKEN_PIPE  # the reader of stdout has closed it
         case SeveralError():
             for part in error.errors:
                 report(part, console)
@@ -84,8 +84,10 @@ def report(error: BaseException, console: Console) -> int:
 
 
 def drop_unprinted() -> None:
-    """Discard output that stdout and stderr did not accept, which was reported: otherwise Python reports it again
-    and exits with 120."""
+    """Discard output that stdout and stderr did not accept.
+
+    The failure was reported already; Python would report it again at exit, with exit code 120.
+    """
     for stream in (sys.stdout, sys.stderr):
         try:
             if stream is not None:
@@ -96,7 +98,7 @@ def drop_unprinted() -> None:
 
 
 def _place(error: OSError) -> str:
-    """The file an error is about; a working directory that was removed names none."""
+    """Return the file that an OSError names, or the working directory if that was removed; else ""."""
     if error.filename is not None:
         return os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else str(error.filename)
     try:
@@ -107,7 +109,7 @@ def _place(error: OSError) -> str:
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
-    """Whether Ctrl-C caused the exception: libraries may convert it to an error of their own, for instance during an
+    """Whether Ctrl-C caused the exception; libraries may convert an interrupt to an error of their own, e.g. in an
     import."""
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
@@ -118,7 +120,7 @@ def _is_interrupt(error: BaseException | None) -> bool:
 
 def _described(error: PhigenError) -> str:
     text = str(error)
-    # The diagnostics of a spec contain "error:" after the place.
+    # Messages about specs contain "error:" after the location already.
     return text if isinstance(error, SpecError) or ": error:" in text.split("\n")[0] else f"error: {text}"
 
 

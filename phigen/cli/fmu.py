@@ -1,4 +1,4 @@
-"""``phigen build --fmu``: solvers as functional mock-up units."""
+"""Option ``--fmu`` of ``phigen build``: solvers as functional mock-up units."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ if TYPE_CHECKING:
     from phigen.compilation import Compilation
     from phigen.fmu.archive import MockupUnit
 
-#: The folders of `phigen.fmu.platforms.PLATFORMS`, repeated here so that the command line does not import it.
+#: The platforms of `phigen.fmu.platforms.PLATFORMS`, repeated here so that the command line does not import that
+#: module.
 _SYSTEMS, _MACHINES = ("linux", "windows", "darwin"), ("x86_64", "aarch64")
 PLATFORMS = tuple(f"{machine}-{system}" for system in _SYSTEMS for machine in _MACHINES)
 
 
 def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str, MockupUnit]:
-    """Return the FMU of each system by its name. Raises `SpecError` that lists all systems without one."""
+    """Return the FMU of each system by name. Raises `SpecError` that lists all systems without one."""
     from phigen.fmu.archive import unit_of
 
-    # A stack that --stack measured is that of the C alone, without the functions of FMI.
+    # The stack measured by --stack is that of the C alone, without the functions of FMI.
     collector, units, of_c = Collector(), {}, replace(options, single_file=False, stack=None)
     for compilation in compilations:
         with collector.collecting():
@@ -36,7 +37,7 @@ def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str,
 
 
 def write_unit(console: Console, folder: Path, unit: MockupUnit, platforms: Sequence[str]) -> None:
-    """Compile an FMU and write it to a folder, once for FMI 3.0 and once for 2.0. Raises `ToolchainError`."""
+    """Compile an FMU, and write it to a folder for FMI 3.0 and for 2.0. Raises `ToolchainError`."""
     from phigen.fmu.archive import archive, binaries
     from phigen.fmu.platforms import compilers
     from phigen.writing import write_all

@@ -1,4 +1,4 @@
-"""Files that commands generate, and the options that decide them."""
+"""Generation of files, with the options on which these depend."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DIRECTORY = "generated"
 
 @dataclass(frozen=True)
 class Options:
-    """The options of one run that reach the output, and where it goes."""
+    """Options of one command that change the generated files, and the output folder."""
 
     directory: Path = Path(DIRECTORY)
     targets: tuple[str, ...] = ()
@@ -48,7 +48,7 @@ class Options:
             raise click.UsageError("single precision needs the profile small: leave out --profile fast")
 
     def compiled(self, spec: Spec) -> Compilation:
-        """The compilation of a spec with these options, proved; see `phigen.compiler.compile_proved`."""
+        """Return the compilation of a spec with these options, proved; see `phigen.compiler.compile_proved`."""
         from phigen.compiler import compile_proved
 
         compilation = compile_proved(
@@ -75,7 +75,7 @@ class Options:
         return compilation.including(part)
 
     def _measured(self, compilation: Compilation, flags: str) -> Compilation:
-        """The compilation whose header states the stack of its C, compiled with these flags."""
+        """Return the compilation whose header states the stack use of its C, measured under some compiler flags."""
         from phigen.compiler import emit
         from phigen.runtime.stack import stack_bound
 
@@ -88,11 +88,11 @@ class Options:
         return compilation.with_stack(stack_bound(files, spec.name, flags))
 
     def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
-        """The targets to write: those of the command line, else those of the spec."""
+        """Return the targets to write: those on the command line, or else those of the spec."""
         return self.targets or compilation.spec.targets
 
     def command(self, spec_files: Sequence[str]) -> str:
-        """The command line that writes the same files."""
+        """Return the command line that writes the same files."""
         arguments = ["phigen", "build", *spec_files]
         if str(self.directory) != DIRECTORY:
             arguments += ["-o", str(self.directory)]
@@ -100,7 +100,7 @@ class Options:
 
     @property
     def words(self) -> list[str]:
-        """The options that reach the output, as on the command line."""
+        """Return the options that change generated files, as words of a command line."""
         arguments = [word for target in self.targets for word in ("-t", target)]
         arguments += ["--order", str(self.order)] if self.order else []
         arguments += ["--scheme", self.scheme] if self.scheme else []
@@ -117,7 +117,7 @@ class Options:
 
 
 def output_options(command: F) -> F:
-    """The options that decide what is generated: those of `Options`."""
+    """Add the options of `Options` to a command."""
     for option in (
         click.option(
             "--modified", type=CORRECTIONS, metavar="N", help="Also generate modified_hamiltonian, with N corrections."
@@ -150,7 +150,8 @@ def output_options(command: F) -> F:
 
 
 def generate(compilation: Compilation, target: str, options: Options) -> dict[str, str]:
-    """The files of one target. Their header names a command that gives the same bytes on any machine."""
+    """Return the files of one target (name → text). Their header has a command that writes the same bytes on any
+    machine."""
     from phigen.compiler import emit
 
     spec, single = compilation.spec.written or compilation.spec, options.single_file and TARGETS[target].single_file
@@ -166,19 +167,20 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     arguments += ["--adjoint"] if options.adjoint and not spec.extras.adjoint else []
     arguments += ["--modified", str(options.modified)] if options.modified is not None else []
     if not compilation.spec.extras.offers("parameters", compilation.program.profile):
-        arguments += [f"--binding {language}" for language in options.bindings]  # whose C has this part nevertheless
+        # the C for a binding has this part, although the options leave it out
+        arguments += [f"--binding {language}" for language in options.bindings]
     arguments += [shlex.quote(f"--stack={options.stack}")] if options.stack is not None and target == "c" else []
     return emit(compilation.program, target, " ".join(arguments), single_file=single)
 
 
 def _is_bundled(spec: Spec) -> bool:
-    """Whether the bundled spec of that name has this text, wherever it was read from."""
+    """Whether the text of a spec is that of the bundled spec of this name, wherever the file is."""
     file = resources.bundled().get(spec.name)
     return file is not None and file.read_text(encoding="utf-8") == spec.source
 
 
 def files_of(compilation: Compilation, options: Options) -> dict[str, str]:
-    """All files of a compilation."""
+    """Return the files of a compilation for all its targets (name → text)."""
     files: dict[str, str] = {}
     for target in options.targets_of(compilation):
         files |= generate(compilation, target, options)

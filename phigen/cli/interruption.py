@@ -1,4 +1,4 @@
-"""Ctrl-C in the middle of a long run: the work stops at a consistent state, and results are kept."""
+"""Ctrl-C in a long run: the run stops at a consistent state, and its results are kept."""
 
 from __future__ import annotations
 
@@ -14,25 +14,24 @@ from phigen.errors import PhigenError
 
 
 class InterruptedRunError(PhigenError):
-    """A run was stopped by the user or the system."""
+    """A run was stopped by the user or by the operating system."""
 
     exit_code = interrupts.CODE
 
 
 @dataclass
 class Stop:
-    """Whether the user or the system has requested an end."""
+    """Flag that the user or the operating system has requested an end."""
 
     requested: bool = False
 
 
 @contextmanager
 def interruptible() -> Iterator[Stop]:
-    """Within this context, SIGINT and SIGTERM request a stop at a consistent state; a second signal ends the process
-    at once."""
+    """Context in which SIGINT and SIGTERM set the flag of a `Stop`; a second signal ends the process at once."""
     stop = Stop()
     if threading.current_thread() is not threading.main_thread():
-        yield stop  # only the main thread receives signals
+        yield stop  # other threads do not receive signals
         return
 
     def handle(number: int, frame: FrameType | None) -> None:

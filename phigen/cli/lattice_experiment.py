@@ -1,4 +1,4 @@
-"""The run of a lattice with the settings of the command line, and the runs that it continues."""
+"""A run of a lattice with the changes that the command line makes, and runs that it continues."""
 
 from __future__ import annotations
 
@@ -27,15 +27,16 @@ if TYPE_CHECKING:
     from phigen.spec.model import Run
     from phigen.symbolic.expression import Expression
 
-#: The contents of a file of another run, or the reason why it is not one.
+#: Errors of reading a file that is not of a run.
 _UNREADABLE = (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)
 class LatticeExperiment(Experiment):
-    """An `Experiment` of a lattice: its ``start`` has the state, ``past`` is a `phigen.runtime.lattice_rows.Past`.
+    """`Experiment` of a lattice.
 
-    ``origin`` is the provenance text that is written into output files.
+    ``start`` has the initial state, ``past`` is a `phigen.runtime.lattice_rows.Past`, and ``origin`` is the provenance
+    text for output files.
     """
 
     start: Start | None = None
@@ -43,11 +44,11 @@ class LatticeExperiment(Experiment):
 
     @property
     def begin(self) -> float:
-        """The time at which the steps of the run start."""
+        """The time at which the steps start: the start of the run, or the end of the past run."""
         return float(self.past.t[-1]) if self.past else self.t0
 
     def beginning(self, solver: LatticeSolver) -> Beginning:
-        """Return the initial state of the run, with everything that its steps depend on."""
+        """Return the state at which the steps start, with everything else on which they depend."""
         assert self.start is not None
         state = solver.state(self.start.state if self.past is None else self.past.last, "x0")
         values = solver.values(self.parameters, {}, state.shape[1:])
@@ -58,15 +59,15 @@ class LatticeExperiment(Experiment):
         return Beginning(state, self.h, values, self.begin if solver.interface.time else 0.0, draws, level=level)
 
     def begun(self, solver: LatticeSolver) -> ObservedCourse:
-        """Return a course at the start of the steps. Raises `StepError`."""
+        """Return an integration at the start of its steps. Raises `StepError`."""
         return ObservedCourse.begun(solver, self.beginning(solver))
 
     def function(self, expression: Expression, solver: LatticeSolver) -> Function:
-        """An expression of the run as a function of observables."""
+        """Return an expression of the spec as a function of observables."""
         return solver.function(expression, self.parameters)
 
     def plan(self, solver: LatticeSolver) -> IntegrationPlan:
-        """Return the start, the rows, and the outputs of the integration that the run requests."""
+        """Return the plan of the integration: start, rows, and outputs."""
         beginning, run = self.beginning(solver), self.run
         if self.times is None:
             rows = strided(beginning.h, run.steps, run.stride, self.end)
@@ -81,9 +82,9 @@ class LatticeExperiment(Experiment):
 
 
 def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) -> tuple[Run, Start]:
-    """Return a run that starts at the last state in a file of another run, with its time where there is one.
+    """Return the run from the last state in a file of another run; its time becomes the start if H depends on the time.
 
-    Raises `click.BadParameter` for other files, and for states of other sizes.
+    Raises `click.BadParameter` for files of other kinds, and for states of another shape.
     """
     try:
         state, t = _last_of(source, solver.interface, start.state.shape)
@@ -98,7 +99,7 @@ def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) ->
 
 
 def _last_of(source: Path, interface: LatticeInterface, shape: tuple[int, ...]) -> tuple[Floats, float]:
-    """The last state in a file, and its time."""
+    """Return the last state in a file of a run, and its time."""
     if source.suffix.lower() == ".csv":
         table = _table(source, interface, shape)
         return table.last, float(table.t[-1])
@@ -108,7 +109,7 @@ def _last_of(source: Path, interface: LatticeInterface, shape: tuple[int, ...]) 
 
 
 def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -> LatticeExperiment:
-    """The experiment after the rows of a finished run of it."""
+    """Return the experiment that continues a finished run, whose rows are in the file ``path``."""
     run, start = experiment.run, experiment.start
     assert start is not None
     if run.records_numbers and path.suffix.lower() == ".csv":
@@ -123,12 +124,12 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
         complaint = f"its first row, at t = {float(earlier_run.t[0])!r}, is not the start of the run {run.name}"
         raise click.BadParameter(f"{path} is of another run: {complaint}", param_hint="--extend")
     steps = earlier_run.steps or round((float(earlier_run.t[-1]) - experiment.t0) / experiment.h)
-    steps = earlier_run.steps if solver.interface.monitored else steps  # a .csv has the times, not the steps
+    steps = earlier_run.steps if solver.interface.monitored else steps  # A .csv has times but no steps.
     return replace(experiment, past=replace(earlier_run, steps=steps))
 
 
 def _past_of(path: Path, run: Run, interface: LatticeInterface, shape: tuple[int, ...]) -> Past:
-    """Read the rows of a finished run."""
+    """Return the rows of a finished run. Raises one of `_UNREADABLE` for other files."""
     if path.suffix.lower() == ".csv":
         return _table(path, interface, shape)
     numbers = run.record if run.records_numbers else ("energy", *interface.observables)
@@ -146,7 +147,7 @@ def _past_of(path: Path, run: Run, interface: LatticeInterface, shape: tuple[int
 
 
 def _table(path: Path, interface: LatticeInterface, shape: tuple[int, ...]) -> Past:
-    """Read a ``.csv`` of states; the number of steps is not in it."""
+    """Return the rows of a ``.csv`` of states, which does not contain the number of steps."""
     columns = state_columns(interface, shape[1:])
     expected = [name for column in columns for name in column.names]
     with opened_text(path) as file:
@@ -171,7 +172,7 @@ def _rows(values: Any, name: str, count: int | None = None) -> Floats:
 
 
 def _checked(earlier_run: Past, shape: tuple[int, ...]) -> Past:
-    """Return the finished run. Raises `ValueError` if its last state has another shape or is not finite."""
+    """Return the finished run unchanged. Raises `ValueError` if its last state has another shape or is not finite."""
     if earlier_run.first.shape != shape or earlier_run.last.shape != shape:
         raise ValueError(f"its states have the shape {earlier_run.last.shape}, those of the run {shape}")
     if not (np.isfinite(earlier_run.last).all() and np.isfinite(earlier_run.t[-1])):

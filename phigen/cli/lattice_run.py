@@ -1,4 +1,4 @@
-"""``phigen run`` of a lattice."""
+"""``phigen run`` for lattices."""
 
 from __future__ import annotations
 
@@ -49,10 +49,9 @@ def run_lattice(
     at: str | None = None,
     origin: Origin,
 ) -> None:
-    """Integrate a run, and print the errors of conserved quantities. Then raises `StepError` if the run did not
-    reach its end.
+    """Integrate a run, and print the errors of conserved quantities. Raises `StepError` at the end if a step failed.
 
-    ``lyapunov`` also requests the largest Lyapunov exponent, by a second pass with a tangent vector.
+    ``lyapunov`` also requests the largest Lyapunov exponent, from a second pass with a tangent vector.
     """
     import numpy as np
 
@@ -163,7 +162,7 @@ def _integrated(
     *,
     resume: bool,
 ) -> tuple[LatticeTrajectory | LatticeSeries, StepError | None]:
-    """Return the frames or recorded numbers of a run, and the reason if it did not reach its end."""
+    """Return the frames, or the recorded numbers, of a run, and the failure if a step failed."""
     from phigen.runtime.checkpoint import MismatchError, objection
 
     run, first = experiment.run, output or section
@@ -187,7 +186,7 @@ def _integrated(
         except MismatchError as error:
             raise click.UsageError(str(error)) from None
         except StepError as error:
-            if error.trajectory is None:  # no step can be made
+            if error.trajectory is None:  # not even the first step was possible
                 raise
             return error.trajectory, error
     if section and result.crossings is not None:
@@ -196,7 +195,7 @@ def _integrated(
 
 
 def _expect_files(run: Run, start: Start, files: Mapping[str, Path | None]) -> None:
-    """Refuse files that cannot hold the rows of the run."""
+    """Raise `click.BadParameter` for files whose format cannot hold the rows of the run."""
     from phigen.runtime.lattice_frames import expect_columns, expect_store
 
     for option, path in files.items():
@@ -221,7 +220,7 @@ def _draw(
     plot: Path,
     origin: str,
 ) -> None:
-    """A film or a figure, by the suffix of the file."""
+    """Draw a film or a figure, by the suffix of the file."""
     from phigen.runtime.lattice_series import LatticeSeries
 
     title = f"{spec.name}, {run.name}"
@@ -245,7 +244,7 @@ def _draw(
 def exponents_of(
     console: Console, spec: Spec, run: Run, solver: LatticeSolver, start: Start, parameters: Mapping[str, Any]
 ) -> Spectrum:
-    """The largest Lyapunov exponent of a run. Raises `StepError`."""
+    """Return the largest Lyapunov exponent of a run. Raises `StepError`."""
     from phigen.study.lyapunov import lattice_spectrum
 
     t0, draws = float(run.start) if spec.time else None, {"seed": run.seed} if spec.noise else {}
@@ -256,7 +255,7 @@ def exponents_of(
 
 
 def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str, Any]:
-    """The parameters of a run, with those of the command line put in."""
+    """Return the parameters of a run, with those of the command line."""
     parameters: dict[str, Any] = dict(start.parameters)
     for setting in settings:
         name, value = setting_of(setting)
@@ -268,8 +267,8 @@ def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str
     return parameters
 
 
-def told_steps(trajectory: LatticeTrajectory) -> str:
-    """``60 steps of 0.1 and a part of one``."""
+def steps_text(trajectory: LatticeTrajectory) -> str:
+    """Return the number of steps in words, such as "60 steps of 0.1 and a part of one"."""
     whole_time, monitored = trajectory.steps * trajectory.h, trajectory.solver.interface.monitored
     elapsed = trajectory.t[-1] - trajectory.t[0]
     if monitored:
@@ -283,7 +282,7 @@ def _formatted_error(error: float) -> str:
 
 
 def section_text(run: Run) -> str:
-    """The expression of a section, for people."""
+    """Return the expression of a section as readable text; "" without a section."""
     from phigen.symbolic.readable import readable
 
     return readable([run.section])[0] if run.section is not None else ""
@@ -303,7 +302,7 @@ def _print(
 
     out(heading(f"{spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     sizes = " × ".join(map(str, start.sizes))
-    out(f"  {sizes} sites; {told_steps(trajectory)}, t = {trajectory.t[0]:.9g} … {trajectory.t[-1]:.9g}; {method}\n")
+    out(f"  {sizes} sites; {steps_text(trajectory)}, t = {trajectory.t[0]:.9g} … {trajectory.t[-1]:.9g}; {method}\n")
     kinds = dict.fromkeys(spec.casimirs, "at the worst site") | {name: unit.kind for name, unit in units.items()}
     kinds |= dict.fromkeys((ENERGY, BALANCE, CHANGE), units["energy"].kind)
     rows = [["largest" if BALANCE in errors else "largest change" if CHANGE in errors else "largest error", "", ""]]

@@ -1,4 +1,4 @@
-"""The list of specs that builds of whole folders leave out, ``DIR/left_out.txt`` in the output folder DIR."""
+"""The file ``left_out.txt`` in an output folder: names of specs that builds of whole folders leave out."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ SPEC_NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 
 
 def names_left_out(directory: Path) -> dict[str, Location]:
-    """Read the names of specs in the list of an output folder, each with its place; none where there is no list.
+    """Return the names in the list of an output folder, each with its location; {} if there is no list.
 
-    The list has one name a line; ``#`` begins a comment. Raises `SpecError` for lines that are no names, and for
+    The list has one name per line; ``#`` begins a comment. Raises `SpecError` for lines that are no names, and for
     names that occur twice.
     """
     path = directory / FILE
@@ -44,5 +44,5 @@ def names_left_out(directory: Path) -> dict[str, Location]:
 
 
 def unknown_names(places_by_name: Mapping[str, Location], specs: Collection[str]) -> list[str]:
-    """Describe the listed names that no spec has, one line each."""
+    """Return a message for each listed name that no spec has."""
     return [f"{place}: no spec has the name {name}" for name, place in places_by_name.items() if name not in specs]

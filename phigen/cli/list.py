@@ -42,7 +42,7 @@ def command(name: str | None, as_json: bool) -> None:
 
 
 def kind_of_structure(spec: Spec) -> str:
-    """The shape of π, recognised from its matrix; of a lattice how its sites are related."""
+    """Return the shape of π as text; for a lattice, the relation of its sites."""
     if spec.lattice:
         axes = len(spec.lattice.axes)
         return f"lattice, {axes}-dimensional" if axes else f"lattice, {spec.lattice.relation}"

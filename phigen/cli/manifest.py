@@ -1,7 +1,7 @@
-"""The manifest of a folder of vendored solvers: spec, options and version of phigen of each.
+"""The manifest of a folder of vendored solvers: spec, options and version of phigen for each solver.
 
-It is a function of the specs, the options and the version: it has no date, no host, and only paths of specs relative
-to the folder. It contains the text of each spec, so that a solver can be generated again without the file.
+The manifest depends only on the specs, the options and the version: it has no date, no host name, and only relative
+paths. It contains the text of each spec, so that solvers can be generated again without the spec files.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ _ABOUT = (
 
 @dataclass(frozen=True)
 class ManifestEntry:
-    """One vendored solver. ``spec_file`` is relative to the folder, or names a bundled spec; None if it is
-    elsewhere.
+    """Entry of one vendored solver.
 
-    ``files`` maps names to the sha256 of their bytes.
+    ``spec_file`` is a path relative to the folder, or the name of a bundled spec; None if the file is in another place.
+    ``files`` maps file names to the sha256 of their bytes.
     """
 
     name: str
@@ -51,7 +51,7 @@ class ManifestEntry:
 
     @property
     def command(self) -> str:
-        """The command that makes it again, for the folder itself."""
+        """The command that generates the solver again."""
         return shlex.join(["phigen", "vendor", *([self.spec_file] if self.spec_file else []), ".", *self._words])
 
     @property
@@ -59,7 +59,7 @@ class ManifestEntry:
         return self.options.words if self.spec_file else []
 
     def described(self) -> dict[str, Any]:
-        """The entry as plain data; options that were not given are left out."""
+        """Return the entry as plain data, without options that have their defaults."""
         changed_options = {
             key: value for key, value in asdict(self.options).items() if key != "directory" and value != _UNSET[key]
         }
@@ -78,14 +78,15 @@ _UNSET = asdict(Options())
 
 
 def sha256(content: str | bytes) -> str:
-    """The hash of a file: of its bytes, for text those of UTF-8."""
+    """Return the SHA-256 of bytes, or of a text in UTF-8, as hexadecimal digits."""
     return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
 def relative(spec_file: str, folder: Path) -> str | None:
-    """The path of a spec as seen from the folder, None if it leads through the root or somebody's home.
+    """Return the path of a spec relative to the folder.
 
-    Such a path means nothing on another machine.
+    Returns None if the relative path leads through the root or a home folder, since it would mean nothing on another
+    machine.
     """
     source, target = Path(os.path.abspath(spec_file)), Path(os.path.abspath(folder))  # noqa: PTH100  (".." as text)
     common = Path(os.path.commonpath([source, target]))
@@ -95,7 +96,7 @@ def relative(spec_file: str, folder: Path) -> str | None:
 
 
 def text_of(entries: Mapping[str, ManifestEntry], builds: Collection[str] = ()) -> str:
-    """The manifest as JSON; ``builds`` are the build systems that have files in the folder."""
+    """Return the manifest as JSON; ``builds`` are the build systems that have files in the folder."""
     solvers = {name: entry.described() for name, entry in sorted(entries.items())}
     build_files = {"build_files": sorted(builds)} if builds else {}
     data = {"manifest": FORMAT, "about": _ABOUT, **build_files, "solvers": solvers}
@@ -103,9 +104,9 @@ def text_of(entries: Mapping[str, ManifestEntry], builds: Collection[str] = ()) 
 
 
 def read(folder: Path) -> tuple[dict[str, ManifestEntry], tuple[str, ...]]:
-    """The entries of a folder's manifest and its build systems, none if there is no manifest.
+    """Return the entries of a folder's manifest by name, and its build systems; both empty if there is no manifest.
 
-    Raises `CheckError` if it is damaged.
+    Raises `CheckError` if the manifest is damaged.
     """
     path = folder / FILE
     try:
@@ -132,7 +133,7 @@ def _entry(name: str, part: Mapping[str, Any]) -> ManifestEntry:
     text, spec_file = "\n".join(lines), spec.get("file")
     if sha256(text) != spec["sha256"]:
         raise ValueError(f"{name}: the text of its spec was changed")
-    # Names from here are opened, written and removed.
+    # Names in the manifest become paths that are written and removed, so they are checked.
     if not re.fullmatch(SPEC_NAME, name) or not (spec_file is None or isinstance(spec_file, str)):
         raise ValueError(f"{name!r} is not the name of a solver, or its spec is not a file")
     files = {str(file): str(digest) for file, digest in part["files"].items()}

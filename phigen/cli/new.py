@@ -1,4 +1,4 @@
-"""``phigen new``: a commented spec to start from."""
+"""``phigen new``: write a commented spec to start from."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def command(console: Console, name: str, lattice: bool, output: str | None) -> N
     stem = name.removesuffix(".yaml")
     try:
         text = spec.starter(stem, lattice=lattice)
-    except SpecError as error:  # located in a file that does not exist yet
+    except SpecError as error:  # without a location, since the file does not exist yet
         (diagnostic,) = error.diagnostics
         raise click.UsageError(diagnostic.message + (f"; {diagnostic.hint}" if diagnostic.hint else "")) from None
     if output == "-":

@@ -1,4 +1,4 @@
-"""Generated files on disk: differences, permission to overwrite, and writing all or nothing."""
+"""Generated files on disk: differences, permission to overwrite, and atomic writing of all files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from phigen.writing import write_all
 
 @dataclass(frozen=True)
 class Change:
-    """One file: its text on disk, and its intended text; None for a file that does not (or should not) exist."""
+    """Change of one file: its text on disk and its intended text; None stands for a file that is absent."""
 
     path: Path
     before: str | None
@@ -24,7 +24,8 @@ class Change:
 
     @property
     def state(self) -> str:
-        """``unchanged``, ``missing``, ``different``, or ``stale``: no spec of this build produces it."""
+        """The state of the file: ``unchanged``, ``missing``, ``different``, or ``stale`` if no spec of this build
+        produces it."""
         if self.before == self.after:
             return "unchanged"
         if self.after is None:
@@ -33,7 +34,7 @@ class Change:
 
     @property
     def obstacle(self) -> str:
-        """Return why the file must not be changed, empty if it may be."""
+        """Return why the file must not be changed; "" if it may be."""
         if self.before is None or self.before == self.after or not is_edited(self.before):
             return ""
         if split(self.before)[0] is None:
@@ -50,7 +51,8 @@ class Change:
 
 
 def changes(folder: Path, name: str, files: Mapping[str, str], targets: Iterable[str]) -> list[Change]:
-    """Changes that building NAME makes in its folder: files to write, and obsolete files of the same targets."""
+    """Return the changes that building NAME makes in its folder: files to write, and obsolete files of the same
+    targets."""
     _expect_own_folder(folder)
     result = [Change(folder / file, read(folder / file), text) for file, text in files.items()]
     for suffix in suffixes(targets):
@@ -63,7 +65,7 @@ def changes(folder: Path, name: str, files: Mapping[str, str], targets: Iterable
 
 
 def orphans(directory: Path, names: Iterable[str], targets: Iterable[str]) -> Iterator[Change]:
-    """Generated files ``DIR/NAME/NAME.*`` of names that are not among the given ones."""
+    """Yield removals of generated files ``DIR/NAME/NAME.*`` whose NAME is not among ``names``."""
     known_names = set(names)
     endings = suffixes(targets)
     for folder in sorted(directory.iterdir()) if directory.is_dir() else []:
@@ -74,7 +76,7 @@ def orphans(directory: Path, names: Iterable[str], targets: Iterable[str]) -> It
 
 
 def apply(planned: Iterable[Change]) -> None:
-    """Write all files or none, then remove the obsolete files; a reader never sees a part of a file."""
+    """Write all files or none, then remove obsolete files; readers never see a partly written file."""
     planned = list(planned)
     write_all({c.path: c.after for c in planned if c.after is not None and c.state != "unchanged"})
     for change in planned:
@@ -83,7 +85,10 @@ def apply(planned: Iterable[Change]) -> None:
 
 
 def read(path: Path) -> str | None:
-    """Return the text of a file, with undecodable bytes replaced: only files of phigen matter, and these are UTF-8."""
+    """Return the text of a file, None if it is absent.
+
+    Undecodable bytes are replaced, since files of phigen are in UTF-8, and other files are not compared.
+    """
     try:
         return path.read_bytes().decode("utf-8", "replace")
     except (FileNotFoundError, NotADirectoryError):
@@ -93,7 +98,7 @@ def read(path: Path) -> str | None:
 
 
 def _expect_own_folder(folder: Path) -> None:
-    # Through a link the files would be written outside the output folder.
+    # Through a symbolic link, files would be written outside the output folder.
     if folder.is_symlink():
         raise CheckError(f"{folder} is a symbolic link; phigen writes to folders of its own only")
     if folder.exists() and not folder.is_dir():

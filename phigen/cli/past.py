@@ -1,4 +1,4 @@
-"""Runs that start where others ended: their files, and sessions at that state."""
+"""Runs that start where another run ended: reading its file, and starting a session at its last state."""
 
 from __future__ import annotations
 
@@ -20,30 +20,31 @@ from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Column
 from phigen.runtime.trajectory import element_columns, trajectory_columns
 
-#: Times that differ by less than this fraction of the passed time are equal.
+#: Times are equal if they differ by less than this fraction of the elapsed time.
 _EQUAL = 1e-9
 
 
 @dataclass(frozen=True)
 class StoredRows:
-    """The rows of a finished run, as they are in its file, by the names of their columns."""
+    """Rows of a finished run, read from its file; ``columns`` has the names of the columns, the first of which is the
+    time."""
 
     columns: tuple[str, ...]
     rows: Floats
 
     @property
     def t(self) -> float:
-        """The time at which it ended."""
+        """The time at the end of the finished run."""
         return float(self.rows[-1, 0])
 
     def last(self, names: Sequence[str]) -> Floats:
-        """Values of the last row; raises `KeyError` for a column that is not there."""
+        """Return the values of some columns in the last row. Raises `KeyError` for a column that is absent."""
         column_numbers = {name: i for i, name in enumerate(self.columns)}
         return np.array([self.rows[-1, column_numbers[name]] for name in names])
 
 
 def columns_of(names: Interface) -> list[Column]:
-    """The columns of the rows of a run."""
+    """Return the columns of the rows of a run."""
     attitude_columns = element_columns(names.attitude, position=names.position)
     return trajectory_columns(
         names.coordinates, names.casimirs, attitude_columns, names.observables, monitored=names.monitored
@@ -51,7 +52,8 @@ def columns_of(names: Interface) -> list[Column]:
 
 
 def recorded_columns(names: Interface, record: Sequence[str]) -> list[Column]:
-    """Return the columns that a run records: times and the columns in ``record``, or all without ``record``."""
+    """Return the columns that a run records: times and the columns in ``record``, or all columns if ``record`` is
+    empty."""
     if not record:
         return columns_of(names)
     attitude_keys = [column.key for column in element_columns(names.attitude, position=names.position)]
@@ -61,7 +63,7 @@ def recorded_columns(names: Interface, record: Sequence[str]) -> list[Column]:
 
 
 def past_of(path: Path, names: Interface, option: str) -> StoredRows:
-    """Read the rows of a file that a run has written."""
+    """Return the rows in a file of a run. Raises `click.BadParameter`, which names ``option``, for other files."""
     try:
         stored_rows = _of_npz(path, names) if path.suffix.lower() == ".npz" else _of_csv(path)
         if len(stored_rows.rows):
@@ -74,7 +76,7 @@ def past_of(path: Path, names: Interface, option: str) -> StoredRows:
 
 
 def _expect_rows(stored_rows: StoredRows, needed_columns: Sequence[str]) -> None:
-    """`ValueError` for rows that no run has written, `KeyError` for a column that is needed and not there."""
+    """Raise `ValueError` for rows that no run has written, and `KeyError` if one of ``needed_columns`` is absent."""
     if (
         stored_rows.rows.dtype != np.float64
         or stored_rows.rows.ndim != 2
@@ -107,7 +109,8 @@ def _of_npz(path: Path, names: Interface) -> StoredRows:
 
 
 def started_from(experiment: Experiment, rows: StoredRows, solver: Solver) -> Experiment:
-    """Return the experiment from the last state of another run, with its time, if there is one, and its attitude."""
+    """Return the experiment that starts at the last state in ``rows``, with the attitude there, and with the time if H
+    has one."""
     names = solver.interface
     _, *columns = columns_of(names)
     state = next(rows.last(column.names) for column in columns if column.key == "x")
@@ -122,7 +125,7 @@ def started_from(experiment: Experiment, rows: StoredRows, solver: Solver) -> Ex
 def begun(solver: Solver, experiment: Experiment) -> Session:
     """Return a session at the start of the steps of an experiment.
 
-    If it continues a finished run, it has the gauge of that run's start, or its energy level e.
+    If the experiment continues a finished run, the session has the gauge, or the energy level e, of that run's start.
     """
     backend, stored_rows, names = solver.backend, experiment.past, solver.interface
     initial = np.array(experiment.initial)
@@ -143,7 +146,7 @@ def begun(solver: Solver, experiment: Experiment) -> Session:
 
 
 def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
-    """The experiment after the rows of a finished run of it."""
+    """Return the experiment that continues a finished run, whose rows are in the file ``path``."""
     names = solver.interface
     if experiment.run.record:
         message = f"the run {experiment.run.name} has record:, and its file lacks values that a continuation needs"

@@ -1,4 +1,4 @@
-"""Records of a run, written while it is integrated: rows in files, errors, sketches for figures, and checkpoints."""
+"""Records of a run, written during the integration: rows in files, errors, data for figures, and checkpoints."""
 
 from __future__ import annotations
 
@@ -39,28 +39,28 @@ from phigen.symbolic.readable import readable
 
 _NO_FILES = "--resume continues the files of an interrupted run: name them by --output or --section"
 
-#: Seconds between two checkpoints.
+#: Least time between two checkpoints, in seconds.
 CHECKPOINT_SECONDS = 2.0
-#: Rows of a finished run that are read at a time.
+#: Number of rows of a finished run that are read at once.
 _ROWS = 1 << 14
 
 
 @dataclass(frozen=True)
 class Files:
-    """Files of rows and crossings; None without files."""
+    """Files of the rows and of the crossings of a run; None for those that were not requested."""
 
     output: Path | None = None
     section: Path | None = None
 
     @property
     def checkpoint(self) -> Path | None:
-        """Companion of the first file; a run without files cannot be continued."""
+        """Path of the checkpoint, beside the first file; None without files, since such a run cannot be continued."""
         first = self.output or self.section
         return first.with_name(first.name + ".checkpoint") if first else None
 
 
 class Recorder:
-    """One run: the session that makes its steps, and everything that records its results."""
+    """Recorder of one run: its session, and everything that records results."""
 
     def __init__(self, compilation: Compilation, solver: Solver, experiment: Experiment, files: Files, lyapunov: bool):
         self.solver, self.experiment, self.files = solver, experiment, files
@@ -102,50 +102,51 @@ class Recorder:
             "solver": solver.backend.identity,
         }
         self.session: Session
-        self.number = 0.0  # of the last row, in steps from where these begin
-        self._whole: int | None = None  # steps, where the session has made a part of one at the end
+        self.number = 0.0  # number of the last row, in steps since the steps began
+        self._whole: int | None = None  # number of whole steps, once a partial step was made
         self._tables: dict[str, TableFile] = {}
         self._saved = time.monotonic()
 
     @property
     def label(self) -> str:
-        """The name of the method."""
+        """The name of the method, with its order."""
         return f"phigen, order {self.solver.order}"
 
     @property
     def time(self) -> float:
-        """The physical time of the state."""
+        """The physical time t of the current state."""
         monitored, experiment = self.solver.interface.monitored, self.experiment
         elapsed = experiment.h * (self.number if self._whole is not None else self.session.steps)
         return experiment.begin + (self.session.time() if monitored else elapsed)
 
     @property
     def steps(self) -> int:
-        """The number of whole steps made so far."""
+        """Number of whole steps made."""
         return self._whole if self._whole is not None else self.session.steps
 
     @property
     def section_text(self) -> str:
-        """The expression of the section, for people."""
+        """The expression of the section as readable text; "" without a section."""
         section = self.experiment.run.section
         return readable([section])[0] if section is not None else ""
 
     @property
     def spectrum(self) -> Spectrum | None:
-        """The Lyapunov exponents so far, if they were asked for and a step was made."""
+        """The Lyapunov exponents up to now; None if they were not requested, or before the first step."""
         if self.growth is None or not self.steps:
             return None
         return replace(self.growth.spectrum(), clock="τ" if self.solver.interface.monitored else "t")
 
     def start(self) -> None:
-        """Start at the initial state, with new files."""
+        """Begin the run at its initial state, with new files."""
         self.session = begun(self.solver, self.experiment)
         self._open({})
         if self.experiment.past:
-            self._take_in(self.experiment.past.rows)
+            self._record_past_rows(self.experiment.past.rows)
 
     def resume(self, path: Path) -> None:
-        """Start at the checkpoint, with the files as they were then. Raises `MismatchError`."""
+        """Continue from the checkpoint ``path``, with the files in their state at the checkpoint. Raises
+        `MismatchError`."""
         arrays = checkpoint.load(path, self.identity)
         for prefix, part in self._parts().items():
             part.state = {name: arrays[f"{prefix}.{name}"] for name in part.state}
@@ -163,7 +164,7 @@ class Recorder:
             raise MismatchError(f"cannot resume: {error}") from None
 
     def see(self, rows_piece: Piece) -> None:
-        """Record the results of a piece of the integration."""
+        """Record the results of a part of the integration."""
         experiment, monitored = self.experiment, self.solver.interface.monitored
         if len(rows_piece.numbers):
             self.number = float(rows_piece.numbers[-1])
@@ -182,14 +183,15 @@ class Recorder:
         self._record_crossings(rows_piece.crossings)
 
     def _record_crossings(self, section_points: Sequence[tuple[float, Floats]]) -> None:
-        """Record crossings: times and states."""
+        """Record crossings of the section, as pairs of time and state."""
         crossings = np.array([[t, *x] for t, x in section_points]).reshape(-1, 1 + self.solver.interface.dimension)
         self.points.see(crossings)
         if "section" in self._tables:
             self._tables["section"].append(crossings)
 
     def complete(self) -> None:
-        """Make the final part of a step; the last row is the last state, whichever rows are stored."""
+        """Make the partial step at the end, if there is one, and record the last state unless it is the last row
+        already."""
         end, number = self.experiment.end, float(self.session.steps)
         if end is not None:
             session_before = self.session
@@ -201,8 +203,8 @@ class Recorder:
             self.see(standing(self.session, number))
         self.number = number
 
-    def _take_in(self, rows: Floats) -> None:
-        """Return the rows of a finished run, which the file continues."""
+    def _record_past_rows(self, rows: Floats) -> None:
+        """Record the rows of the finished run that this run continues."""
         names = self.solver.interface
         times = 1 + names.monitored
         state, quantities = (
@@ -214,15 +216,18 @@ class Recorder:
             self.watch.see(part[:, 0], part[:, state])
             observed = part[:, part.shape[1] - len(names.observables) :]
             self.sketch.see(np.column_stack([part[:, 0], part[:, quantities], observed]))
-            if self.files.output and not self._goes_on(self.files.output):
+            if self.files.output and not self._is_appended(self.files.output):
                 self._tables["output"].append(part)
 
-    def _goes_on(self, path: Path) -> bool:
-        """Whether rows are appended to the file of a finished run; a ``.npz`` is rewritten when the run is complete."""
+    def _is_appended(self, path: Path) -> bool:
+        """Whether new rows are appended to the file of the finished run.
+
+        This holds for ``.csv``; a ``.npz`` is written again when the run is complete.
+        """
         return path.suffix.lower() == ".csv"
 
     def save(self, seconds: float = 0.0) -> None:
-        """Write all files to the disk with a checkpoint, if the last one is older than a number of seconds."""
+        """Write all files and a checkpoint to the disk, if the last checkpoint is older than a number of seconds."""
         path = self.files.checkpoint
         if path is None or time.monotonic() - self._saved < seconds:
             return
@@ -238,9 +243,9 @@ class Recorder:
         self._saved = time.monotonic()
 
     def means(self) -> dict[str, tuple[float, float]]:
-        """The means of coordinates and energy over all members where the run ended, with their statistical errors.
+        """Return mean and standard error of coordinates and energy over all members, at the end of the run.
 
-        The first member is the trajectory of the session itself. Raises `StepError`.
+        The first member is the trajectory of the session. Raises `StepError`.
         """
         experiment, names = self.experiment, self.solver.interface
         run, parameters, steps = experiment.run, experiment.parameters, experiment.made + self.steps
@@ -257,7 +262,7 @@ class Recorder:
         return dict(zip([*names.coordinates, "energy"], pairs, strict=True))
 
     def finish(self, keep: bool) -> None:
-        """Complete the files; ``keep`` retains the data needed to continue."""
+        """Complete the files; with ``keep``, retain the data from which the run can be continued."""
         run, names = self.experiment, np.array(self.solver.coordinates)
         time_before = 0.0
         if run.past:
@@ -279,12 +284,12 @@ class Recorder:
             self.files.checkpoint.unlink(missing_ok=True)
 
     def discard(self) -> None:
-        """Remove all files of a run that could not start."""
+        """Remove the files of a run that could not start."""
         for table in self._tables.values():
             table.discard()
 
     def trajectory(self, broken: bool) -> Trajectory:
-        """Return as many rows as a figure can show; ``broken`` marks the end of a run that failed."""
+        """Return the trajectory with the number of rows that a figure can show; ``broken`` says that the run failed."""
         names, experiment = self.solver.interface, self.experiment
         settings = experiment.h, self.steps, experiment.parameters
         return self.sketch.trajectory(names.coordinates, names.casimirs, *settings, broken, names.observables)
@@ -300,13 +305,16 @@ class Recorder:
         for name, path in (("output", self.files.output), ("section", self.files.section)):
             if path:
                 size = int(arrays[f"size.{name}"]) if arrays else None
-                if self.experiment.past and self._goes_on(path) and not arrays:
+                if self.experiment.past and self._is_appended(path) and not arrays:
                     size = path.stat().st_size
                 self._tables[name] = opened(path, columns[name], size)
 
 
 def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recorder:
-    """The recorder at its start, or where its checkpoint stands; `click.UsageError` where files say otherwise."""
+    """Return the recorder at the start of its run, or with ``resume`` at its checkpoint.
+
+    Raises `click.UsageError` if the existing files do not allow this.
+    """
     path, output = recorder.files.checkpoint, recorder.files.output or recorder.files.section
     if path is None or output is None:
         if resume:
@@ -334,7 +342,8 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
 
 @contextmanager
 def _disk_errors_as_interrupts(recorder: Recorder) -> Iterator[None]:
-    """A full disk ends a run like an interrupt: the run can be continued from its last checkpoint."""
+    """Context in which an error of the disk, such as lack of space, becomes a `FileError` that says how to resume the
+    run."""
     try:
         yield
     except OSError as error:
@@ -345,7 +354,10 @@ def _disk_errors_as_interrupts(recorder: Recorder) -> Iterator[None]:
 
 
 def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool]:
-    """Integrate to the end, to a failing step, which is returned, or to an interrupt, which is reported."""
+    """Integrate up to the end, a failing step, or an interrupt.
+
+    Returns the failure or None, and whether the run was interrupted.
+    """
     experiment, session, start = recorder.experiment, recorder.session, time.perf_counter()
     run, growth, failure = experiment.run, recorder.growth, None
     label = f"{recorder.solver.interface.name}, order {recorder.solver.order}"
@@ -382,7 +394,7 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
 
 
 def _at_times(recorder: Recorder, session: Session, see_tangent: Callable[[Floats], None] | None) -> Iterator[Piece]:
-    """Pieces of a trajectory at requested times, from the current state of a session."""
+    """Yield the parts of a trajectory at the requested times, from the current state of a session."""
     experiment = recorder.experiment
     if not recorder.watch.begun:
         yield standing(session, 0.0)
@@ -394,14 +406,14 @@ def _at_times(recorder: Recorder, session: Session, see_tangent: Callable[[Float
 
 @dataclass(frozen=True)
 class _Rows:
-    """Which states of a method to compare with are looked at: their numbers of steps, with a fraction between two."""
+    """Rows at which a classical method is compared, as numbers of steps; numbers with a fraction are within a step."""
 
     numbers: Iterable[float]
     count: int
 
 
 def _compared_rows(experiment: Experiment, h: float) -> _Rows:
-    """Rows of the run in units of steps of size h, which are equal in t."""
+    """Return the rows of the run in units of steps of size h, equal in t."""
     run, end = experiment.run, experiment.end
     last = end.span / h if end else float(run.steps)
     if experiment.times is not None:
@@ -415,10 +427,10 @@ def _compared_rows(experiment: Experiment, h: float) -> _Rows:
 def compared(
     compilation: Compilation, solver: Solver, experiment: Experiment, method: str, console: Console, end: float
 ) -> tuple[Watch, Trajectory]:
-    """A classical method on the same experiment: its errors, and its trajectory as far as a figure can show it.
+    """Integrate the experiment by a classical method; return its errors, and a trajectory for figures.
 
-    It makes as many steps, and parts of them to times between two; with a monitor they are equal in t, and end at the
-    same time.
+    The method makes the same number of steps, and partial steps to times within them. If the run has a monitor, the
+    steps of the method are equal in t and end at ``end``.
     """
     from phigen.study import classical
     from phigen.study.methods import extended, field_of

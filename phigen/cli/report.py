@@ -1,4 +1,4 @@
-"""``phigen report``: one HTML page about a spec, its solver, and what was proved and measured."""
+"""``phigen report``: an HTML page about a spec and its solver, with proofs and measurements."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ def command(
 ) -> None:
     """Write one self-contained HTML page about a spec, to be read by anyone.
 
-    The page has the solver, running beside RK4; formulas; the choices of the compiler with their reasons; the proofs of
-    `phigen check`; the measurements of `phigen verify`; figures of a run; errors against step and time, compared with
-    classical methods. It needs no network. Nothing is written if the mathematics of the spec is refuted. Exit code 5 if
-    a measurement misses its bound; the page shows which.
+    The page shows the solver running beside RK4, the formulas, the choices of the compiler with their reasons, the
+    proofs of `phigen check`, the measurements of `phigen verify`, figures of a run, and errors against step and time in
+    comparison with classical methods. It needs no network. Nothing is written if the mathematics of the spec is
+    refuted. Exit code 5 if a measurement misses its bound; the page shows which.
     """
     from phigen.cli.report_lattice import gathered_of_lattice
     from phigen.cli.report_material import gathered
@@ -96,7 +96,7 @@ def command(
 
 
 def write_panel(spec: Spec, name: str | None, output: str | None, measuring: bool, console: Console) -> None:
-    """Write the page of the live panel of a run, or print it. Raises `NoPanelError`."""
+    """Write the page with the live panel of a run, or print it. Raises `NoPanelError`."""
     from phigen.compiler import compile_proved
     from phigen.report.page import with_origin
     from phigen.report.panel import panel_page
@@ -122,7 +122,7 @@ def write_panel(spec: Spec, name: str | None, output: str | None, measuring: boo
 def command_of(
     spec_file: str, target: str, name: str | None, order: int | None, scheme: str | None, lyapunov: bool, quick: bool
 ) -> str:
-    """The command that makes the page again."""
+    """Return the command that writes the page again."""
     chosen = {"run": name, "order": order, "scheme": scheme}
     options = [part for key, value in chosen.items() if value for part in (f"--{key}", str(value))]
     options += ["--lyapunov"] * lyapunov + ["--quick"] * quick
@@ -130,7 +130,10 @@ def command_of(
 
 
 def write_page(text: str, figures: bool, output: str | None, target: str, console: Console) -> None:
-    """Write the page, or print it; a note where there ought to be figures, and are none."""
+    """Write the page to the file ``target``, or to stdout if ``output`` is "-".
+
+    A warning appears if ``figures`` are requested and matplotlib is missing.
+    """
     from phigen.report.drawable import NO_FIGURES, drawable
 
     if figures and not drawable():

@@ -1,4 +1,4 @@
-"""Material of ``phigen report`` for the page of a lattice: one run, integrated and verified."""
+"""Content of the page of ``phigen report`` for lattices: one run, integrated and verified."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def gathered_of_lattice(
     quick: bool,
     console: Console,
 ) -> tuple[LatticeMaterial, list[PhigenError]]:
-    """Collect the material of the page, with one run and its verification, and the failures of its parts."""
+    """Return the content of the page, with one run and its verification, and the errors of its parts."""
     from phigen.report.lattice_page import LatticeMaterial
 
     material = LatticeMaterial(examination, compilation, command_line)
@@ -43,7 +43,7 @@ def _measured(
     quick: bool,
     console: Console,
 ) -> tuple[LatticeMaterial, PhigenError | None]:
-    """Material with a run, its verification, and the failures of both."""
+    """Return the content with a run and its verification, and the error if one of them failed."""
     from dataclasses import replace
 
     import numpy as np
@@ -53,7 +53,7 @@ def _measured(
     from phigen.cli.endings import ended, timed
     from phigen.cli.lattice_experiment import LatticeExperiment
     from phigen.cli.lattice_run import exponents_of
-    from phigen.cli.verify import fallen_short, verified_lattice
+    from phigen.cli.verify import missed_bounds, verified_lattice
     from phigen.lattice.states import start_of
     from phigen.report.live_lattice import gathered_lattice
     from phigen.runtime import toolchain
@@ -88,4 +88,5 @@ def _measured(
     console.note(f"{spec.name}: verifying")
     targets = spec.targets if toolchain.available() else (registry.automatic(compiler=False),)
     verification = verified_lattice(compilation, run.name, quick, console, targets)
-    return replace(material, verification=verification), (fallen_short(verification) if verification.failures else None)
+    failure = missed_bounds(verification) if verification.failures else None
+    return replace(material, verification=verification), failure

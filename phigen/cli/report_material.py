@@ -1,4 +1,4 @@
-"""Material of ``phigen report`` for its page: one run, integrated and verified, and a study of its errors."""
+"""Content of the page of ``phigen report``: one run, integrated and verified, and a study of its errors."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from phigen.runtime.trajectory import Trajectory
     from phigen.study.verification import Verification
 
-#: So many first steps are all shown by the viewer.
+#: Number of steps at the beginning of a run that the viewer of the page shows without gaps.
 _OPENING = 4_000
 
 
@@ -37,7 +37,7 @@ def gathered(
     quick: bool,
     console: Console,
 ) -> tuple[Material, list[PhigenError]]:
-    """Collect the material of the page, and the failures of its parts."""
+    """Return the content of the page, and the errors of its parts."""
     from phigen.cli.endings import ended, timed
 
     material = Material(examination, compilation, command_line)
@@ -52,9 +52,9 @@ def gathered(
         return material, failures
     verification = _verified(compilation, experiment, quick, console)
     if verification.failures:
-        from phigen.cli.verify import fallen_short
+        from phigen.cli.verify import missed_bounds
 
-        failures.append(fallen_short(verification))
+        failures.append(missed_bounds(verification))
     material = _with_constancy(material, experiment)
     study, note = studied(compilation, experiment, quick, console)
     notes = (*material.notes, note) if note else material.notes
@@ -63,7 +63,7 @@ def gathered(
 
 
 def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, console: Console) -> Live:
-    """Solver that runs in the page, with its start."""
+    """Return the solver that runs in the page, with its start."""
     from phigen.report import live
 
     console.note(f"{compilation.spec.name}: compiling for the page")
@@ -74,9 +74,10 @@ def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, 
 def _integrated(
     material: Material, solver: Solver, experiment: Experiment, lyapunov: bool, console: Console
 ) -> tuple[Material, list[PhigenError]]:
-    """Add the trajectories of the solver and of the methods that the run compares with."""
+    """Return the content with the trajectories of the solver and of the methods that the run lists under
+    ``compare``."""
     from phigen.cli.recording import Files, Recorder, compared
-    from phigen.cli.run_summary import told_steps
+    from phigen.cli.run_summary import steps_text
     from phigen.study.classical import COMPARED
 
     compilation, run = material.compilation, experiment.run
@@ -92,7 +93,7 @@ def _integrated(
     integrated = replace(
         material,
         run=run,
-        steps=told_steps(recorder),
+        steps=steps_text(recorder),
         opening=opening,
         methods=methods,
         summaries=tuple(summaries),
@@ -104,7 +105,7 @@ def _integrated(
 
 
 def _recorded(recorder: Recorder, console: Console) -> StepError | None:
-    """Make the run; the failure that ended it, if one did."""
+    """Integrate the run; return the failure, or None."""
     from phigen.cli.recording import record
 
     recorder.start()
@@ -117,7 +118,10 @@ def _recorded(recorder: Recorder, console: Console) -> StepError | None:
 def _opening(
     compilation: Compilation, solver: Solver, experiment: Experiment, other_methods: Sequence[str], console: Console
 ) -> dict[str, Trajectory]:
-    """Trajectories of all first steps, by the solver and by other methods; empty if the run is not longer."""
+    """Return trajectories of the first steps, without gaps, by the solver and by other methods.
+
+    The result is empty if the run is short and its trajectory has every step already.
+    """
     from phigen.cli.recording import Files, Recorder, compared
 
     run, is_short = experiment.run, experiment.run.steps <= _OPENING
@@ -134,7 +138,7 @@ def _opening(
 
 
 def _with_constancy(material: Material, experiment: Experiment) -> Material:
-    """Add the constancy of the modified Hamiltonian, or the reason why it was not measured."""
+    """Return the content with the constancy of the modified Hamiltonian, or with the reason why it was not measured."""
     from phigen.cli.verify import constancy_of
     from phigen.study.backward import NotOfferedError
 

@@ -1,4 +1,4 @@
-"""Errors against step and time for ``phigen report``, and the machine on which they were measured."""
+"""Errors as functions of step and time for ``phigen report``, and the machine on which they were measured."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from phigen.runtime.interface import Floats
     from phigen.study.precision import Study
 
-#: Repetitions of a measurement of times, and with --quick.
+#: Number of repetitions when times are measured; the second number applies with --quick.
 _ROUNDS, _FEW_ROUNDS = 5, 2
-#: Steps over which precision is studied with --quick.
+#: Number of steps over which precision is studied with --quick.
 _FEW_STEPS = 256
-#: Where Linux names the processor.
+#: File in which Linux names the processor.
 _PROCESSOR = Path("/proc/cpuinfo")
 
 
 def studied(
     compilation: Compilation, experiment: Experiment, quick: bool, console: Console
 ) -> tuple[Study | None, str]:
-    """The study of precision and time, or why there is none."""
+    """Return the study of precision and time, or None and the reason why there is none."""
     import numpy as np
 
     from phigen.api import solver_of
@@ -55,7 +55,10 @@ def studied(
 
 
 def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[float], Floats] | None:
-    """The closed form of the run, if it gives every coordinate at the times of its steps, which a monitor hides."""
+    """Return the closed form of the solution as a function of t.
+
+    Returns None if the spec does not give every coordinate, or if a monitor hides the times of steps.
+    """
     import numpy as np
 
     from phigen.study.summary import exact_solution
@@ -72,7 +75,7 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
 
 
 def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
-    """The largest error of a Casimir at a state, in its unit."""
+    """Return a function of a state, the largest error of a Casimir in its unit; None without Casimirs."""
     from phigen.geometry.conservation import units
     from phigen.study.precision import ROUNDING
     from phigen.symbolic.arrays import evaluate
@@ -96,7 +99,7 @@ def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> C
 
 
 def environment() -> dict[str, str]:
-    """Environment on which measured times depend."""
+    """Return the properties of the machine on which measured times depend, by name."""
     import platform
 
     from phigen.runtime import toolchain

@@ -1,4 +1,4 @@
-"""``phigen reproduce paper``: the figures of the paper, and what they show in numbers."""
+"""``phigen reproduce paper``: the figures of the paper, with measured numbers."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def command(console: Console, what: str, folder: Path, suffix: str, names: tuple
 
 
 def described(plates: dict[str, Plate]) -> list[dict[str, Any]]:
-    """The titles and findings of figures, for JSON."""
+    """Return the titles and findings of figures as data for JSON."""
     return [
         {
             "figure": name,
@@ -66,7 +66,7 @@ def described(plates: dict[str, Plate]) -> list[dict[str, Any]]:
 
 
 def lines_of(figures: list[dict[str, Any]]) -> list[str]:
-    """One table per figure, from what `described` gives."""
+    """Return one table per figure, from the result of `described`."""
     lines: list[str] = []
     for figure in figures:
         rows = [("", "the paper", "measured")]
@@ -76,5 +76,5 @@ def lines_of(figures: list[dict[str, Any]]) -> list[str]:
 
 
 def _four_digits(value: float) -> str:
-    """Four digits of a number; one digit of a number near round-off."""
+    """Return a number with four digits, or with one digit near round-off."""
     return f"{value:.0e}" if 0 < abs(value) < 1e-11 else f"{value:.4g}"

@@ -1,4 +1,4 @@
-"""``--sizes``: a run of a lattice at other sizes than the spec gives it."""
+"""Option ``--sizes``: a run of a lattice with other sizes than those in the spec."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ sizes_option = click.option(
 
 
 def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
-    """The spec with other sizes in the run of that name, the first by default; the same spec without sizes.
+    """Return the spec with other sizes in the run of that name, by default the first; unchanged if ``text`` is None.
 
-    Raises `click.BadParameter` for what is no size, for systems that have none, and for sizes that the stencil does
-    not fit in.
+    Raises `click.BadParameter` for texts that are no sizes, for systems without sizes, and for sizes that are too small
+    for the stencil.
     """
     if text is None:
         return spec
@@ -48,7 +48,7 @@ def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
     if complaint := too_small(cell_from_spec(spec), sizes, text):
         raise click.BadParameter(complaint, param_hint=OPTION)
     resized_run = replace(run, lattice=replace(run.lattice, sizes=sizes))
-    # what is said of these sizes points at no line of the spec, which has others
+    # Errors about these sizes have no location in the spec, whose lines contain other sizes.
     elsewhere = {("runs",), ("runs", run.name), ("runs", run.name, "sizes")}
     locations = {path: location for path, location in spec.locations.items() if path not in elsewhere}
     return replace(spec, runs={**spec.runs, run.name: resized_run}, locations=locations)

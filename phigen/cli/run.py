@@ -1,4 +1,4 @@
-"""``phigen run``: integrate an experiment of a spec and sum up what was conserved."""
+"""``phigen run``: integrate a run of a spec, and print the errors of conserved quantities."""
 
 from __future__ import annotations
 
@@ -200,13 +200,13 @@ def command(
         raise InterruptedRunError(_interruption_message(recorder))
 
 
-#: Options that contradict each other, or that have no effect together.
+#: Pairs of options that exclude each other.
 _APART = [("--until", "--steps"), ("--every", "--at"), ("--extend", "--from")]
 _APART += [("--extend", "--section"), ("--extend", "--lyapunov")]
 
 
 def _expect_together(*options: dict[str, object]) -> None:
-    """Refuse options that exclude each other."""
+    """Raise `click.UsageError` for options that exclude each other."""
     used_options = {name for part in options for name, value in part.items() if value}
     for first, second in _APART:
         if {first, second} <= used_options:

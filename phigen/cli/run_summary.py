@@ -1,4 +1,4 @@
-"""Summary that ``phigen run`` prints at the end: a table for people, or plain data."""
+"""Summary of ``phigen run``: a table for people, or data for JSON."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 
 def print_summary(compilation: Compilation, recorder: Recorder, summaries: Sequence[Summary]) -> None:
-    """The table of a run: one column for each method; then crossings and exponents, if asked for."""
+    """Print the table of a run with a column for each method, then crossings and exponents if they were requested."""
     from phigen.geometry.conservation import stated
 
     run, solver = recorder.experiment.run, recorder.solver
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     method_text = f"{compilation.method}, target {solver.target}, 1 thread"
     times = f"{recorder.experiment.t0:.9g} … {recorder.time:.9g}"
-    past_note = " beyond what there was" if recorder.experiment.past else ""
-    out(f"  {told_steps(recorder)}{past_note}, t = {times}; {method_text}")
+    past_note = " after the finished run" if recorder.experiment.past else ""
+    out(f"  {steps_text(recorder)}{past_note}, t = {times}; {method_text}")
     state = recorder.session.state().tolist()
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, state, strict=True))
     out(f"  final state: {final}\n")
@@ -52,13 +52,13 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
 
 
 def counted_crossings(run: Run, count: int, section: str) -> str:
-    """``12 rising crossings of the section x1 = 0``."""
+    """Return a number of crossings in words, such as "12 rising crossings of the section x1 = 0"."""
     kind = "crossing" if run.direction == "both" else f"{run.direction} crossing"
     return f"{counted(count, kind)} of the section {section} = 0"
 
 
-def told_steps(recorder: Recorder) -> str:
-    """``60 steps of 0.1 in τ and a part of one``."""
+def steps_text(recorder: Recorder) -> str:
+    """Return the number of steps in words, such as "60 steps of 0.1 in τ and a part of one"."""
     unit = " in τ" if recorder.solver.interface.monitored else ""
     part = " and a part of one" if recorder.number > recorder.steps else ""
     return f"{recorder.steps} steps of {recorder.experiment.h:.9g}{unit}{part}"
@@ -94,7 +94,7 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
 
 
 def print_averages(names: Sequence[str], averages: Averages, observables: Sequence[str] = ()) -> None:
-    """Print the time averages of the observables over the rows of a run, ``observables`` some of them or of all."""
+    """Print the time averages of observables over the rows of a run; ``observables`` selects some, by default all."""
     if not averages.count:
         out("\n  observables have no means: no stored row is in the time that average: says")
         return
@@ -114,12 +114,12 @@ def print_averages(names: Sequence[str], averages: Averages, observables: Sequen
 
 
 def _time_shown(average: Average) -> str:
-    """``0.12``, or ``> 0.12`` for an estimate that is too small."""
+    """Return the correlation time of an average as text, with ">" if the estimate is too small."""
     return "> " * (not average.resolved and math.isfinite(average.error)) + f"{average.correlation_time:.2g}"
 
 
 def _print_means(recorder: Recorder) -> None:
-    """The means over all members where the run ended, with their statistical errors."""
+    """Print mean and standard error over all members at the end of the run."""
     run, means = recorder.experiment.run, recorder.means()
     out(f"\n  means over {run.members} members at t = {recorder.time:.9g}")
     for line in table([[name, f"{mean:.6g}", f"± {error:.1g}"] for name, (mean, error) in means.items()], right=[1]):
@@ -131,7 +131,7 @@ def _formatted_value(drift: Drift) -> str:
 
 
 def described_run(compilation: Compilation, recorder: Recorder, summaries: Sequence[Summary]) -> dict[str, Any]:
-    """The summary as plain data."""
+    """Return the summary as data for JSON."""
     from dataclasses import asdict
 
     experiment, solver, session = recorder.experiment, recorder.solver, recorder.session
@@ -170,7 +170,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
 
 
 def described_averages(names: Sequence[str], averages: Averages, observables: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the time averages as dictionaries for JSON, by the names of observables; ``observables`` selects some."""
+    """Return the time averages by the names of observables, as data for JSON; ``observables`` selects some."""
     from dataclasses import asdict
 
     named_results = zip(names, averages.results(), strict=True)
@@ -191,7 +191,7 @@ def described_spectrum(spectrum: Spectrum) -> dict[str, Any]:
 
 
 def finite(value: Any) -> Any:
-    """JSON has no NaN and no infinity: null stands for them."""
+    """Return data in which null replaces NaN and infinity, which JSON does not have."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""``phigen schema``: JSON Schema of spec files."""
+"""``phigen schema``: print the JSON Schema of spec files."""
 
 from __future__ import annotations
 

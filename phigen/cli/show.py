@@ -1,4 +1,4 @@
-"""``phigen show``: the formulas of one spec."""
+"""``phigen show``: print the formulas of a spec."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def _print_collocation(compilation: CompiledGauss) -> None:
 
 
 def _unfamiliar(lines: Sequence[str]) -> list[str]:
-    """Definitions of the functions in these lines that have no standard name."""
+    """Return the definitions of functions in these lines that have no standard name."""
     from phigen.symbolic.readable import UNFAMILIAR
 
     met = [
@@ -154,7 +154,7 @@ def _unfamiliar(lines: Sequence[str]) -> list[str]:
 
 
 def _noise(system: System, max_terms: int | None) -> list[tuple[str, str]]:
-    """σ and g of each source."""
+    """Return strength σ and function g of each source of noise, as pairs of name and text."""
     terms: dict[str, Expression] = {}
     for source in system.noise:
         terms |= {f"σ_{source.name}": source.amplitude, f"g_{source.name}": source.hamiltonian}
@@ -162,7 +162,7 @@ def _noise(system: System, max_terms: int | None) -> list[tuple[str, str]]:
 
 
 def _forces(system: System, max_terms: int | None) -> list[tuple[str, str]]:
-    """Print the covector ζ without damping, the vector f, and the damping."""
+    """Return the covector ζ without damping, the vector f, and the damping, as pairs of name and text."""
     from phigen.spec.model import SpecForces
 
     forces = system.spec.forces if system.spec else SpecForces()
@@ -186,7 +186,7 @@ def _print_series(max_terms: int | None, compilation: CompiledSeries) -> None:
 
 
 def brackets(compilation: Compilation) -> list[tuple[str, str]]:
-    """The brackets of coordinates that are not 0."""
+    """Return the brackets of coordinates that are not 0, as pairs of name and text."""
     from phigen.symbolic.readable import readable
 
     system = compilation.system
@@ -197,7 +197,7 @@ def brackets(compilation: Compilation) -> list[tuple[str, str]]:
 
 
 def readable_one(expression: Any, max_terms: int | None) -> str:
-    """Return one expression as text."""
+    """Return an expression as readable text, with at most ``max_terms`` terms."""
     from phigen.symbolic.readable import readable
 
     return readable([expression], max_terms)[0]
@@ -208,14 +208,18 @@ def _named(formulas: Any, max_terms: int | None) -> list[tuple[str, str]]:
 
 
 def _casimirs(system: System, max_terms: int | None) -> list[tuple[str, str]]:
-    """The Casimirs, those of log-canonical structures as logarithms of products of powers."""
+    """Return the Casimirs as pairs of name and text; those of log-canonical structures as logarithms of products of
+    powers."""
     from phigen.notation.powers import as_powers
 
     return [(name, as_powers(e) or readable_one(e, max_terms)) for name, e in system.casimirs.items()]
 
 
 def _maps(compilation: CompiledSeries, max_terms: int | None) -> list[tuple[str, str]]:
-    """α and β, of a symmetric pair α alone and what β is; of a path they are series, of which this is the beginning."""
+    """Return α and β as pairs of name and text.
+
+    For a symmetric pair, β is shown as α(x, −p). For a path, both are series, of which the first terms are shown.
+    """
     from phigen.notation.named_parts import texts
 
     realisation, names = compilation.realisation, compilation.system.coordinates
@@ -228,7 +232,7 @@ def _maps(compilation: CompiledSeries, max_terms: int | None) -> list[tuple[str,
 
 
 def _modified(compilation: Compilation, count: int, max_terms: int | None) -> list[tuple[str, str]]:
-    """H̃ = H + h^p H_p + …, and its first corrections."""
+    """Return H̃ = H + h^p H_p + … and its first corrections, as pairs of name and text."""
     from phigen.notation.generating import modified_formulas
 
     corrections = modified_formulas(compilation, count, max_terms)
@@ -237,7 +241,7 @@ def _modified(compilation: Compilation, count: int, max_terms: int | None) -> li
 
 
 def _gauged(compilation: CompiledSeries) -> list[str]:
-    """Hamiltonian that S_h belongs to, if Casimirs are subtracted."""
+    """Return lines with the Hamiltonian that is discretised; [] if no Casimirs are subtracted from H."""
     gauge = compilation.gauge
     subtracted = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
     return [f"of H - {' - '.join(subtracted)}, which has the same flow as H"] if subtracted else []

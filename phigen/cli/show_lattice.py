@@ -1,4 +1,4 @@
-"""``phigen show`` of a lattice: its cell, as text, LaTeX or JSON."""
+"""``phigen show`` for lattices: the formulas of a cell as text, LaTeX or JSON."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def print_cell(spec: Spec, cell: Cell, max_terms: int | None) -> None:
-    """The formulas of a cell."""
+    """Print the formulas of a cell."""
     from phigen.notation.cell_formulas import described, sections
 
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))

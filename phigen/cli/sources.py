@@ -1,4 +1,4 @@
-"""Files and folders of specs named on a command line: search and loading."""
+"""Search and loading of the specs that a command line names."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ SUFFIXES = (".yaml", ".yml")
 
 
 def load_one(source: str) -> Spec:
-    """The spec in a file, or the bundled one of that name if there is no such file."""
+    """Return the spec in a file, or the bundled spec of that name if there is no such file."""
     from phigen import spec
 
-    path = found(source)
+    path = spec_path(source)
     if Path(path).is_dir():
         raise SpecError([Diagnostic(f"{path!r} is a folder; this command takes one spec file")])
     return spec.load(path)
 
 
-def found(source: str) -> str:
-    """The path itself if there is a file or a folder with specs; else that of the bundled spec of that name.
+def spec_path(source: str) -> str:
+    """Return the path of a spec file or of a folder with specs, or else that of the bundled spec of that name.
 
-    Raises `SpecError` if there is none of these.
+    Raises `SpecError` if there is neither.
     """
     path = Path(source)
-    # A folder that `phigen build kepler -o .` made must not hide the bundled kepler.
+    # A folder such as that of `phigen build kepler -o .` must not hide the bundled spec kepler.
     if source in resources.bundled() and (not path.exists() or (path.is_dir() and not any(_below(source)))):
         return str(resources.bundled()[source])
     if path.exists():
@@ -42,14 +42,14 @@ def found(source: str) -> str:
 
 
 def as_given(spec: Spec) -> str:
-    """Name of a spec on a command line: its file, or the name of a bundled one."""
+    """Return the name of a spec for a command line: its file, or the name of a bundled spec."""
     return resources.bundled_name(spec.file) or spec.file
 
 
 def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
-    """All specs in the files and below the folders, in natural order; errors go to the collector.
+    """Return the specs in files and below folders, in natural order; errors go to the collector.
 
-    Two specs of one name are an error: their output would be in the same place.
+    Two specs of the same name are an error, since their output would be in the same place.
     """
     specs: dict[str, Spec] = {}
     files: list[str] = []
@@ -68,8 +68,8 @@ def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
 
 
 def spec_files(source: str) -> Iterator[str]:
-    """The spec file or the bundled spec itself, or the spec files below it if it is a folder, hidden ones left out."""
-    path = found(source)
+    """Yield a spec file or a bundled spec itself; of a folder the spec files below it, without hidden ones."""
+    path = spec_path(source)
     if not Path(path).is_dir():
         yield path
         return

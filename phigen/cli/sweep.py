@@ -1,4 +1,4 @@
-"""``phigen sweep``: a run for many parameters and initial values, on all processes of a machine or a cluster."""
+"""``phigen sweep``: a run for many parameters and initial values, on the processes of a machine or a cluster."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def command(
 
 
 def _sweep_of(spec: Spec, name: str | None) -> SweepSettings:
-    """The sweep of that name, the first by default."""
+    """Return the sweep of that name, by default the first. Raises `SpecError` if the spec has no sweeps."""
     from phigen.errors import Diagnostic, SpecError
 
     if not spec.sweeps:

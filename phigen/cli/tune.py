@@ -1,4 +1,4 @@
-"""``phigen tune``: measure the settings of a spec, and propose the cheapest that is accurate enough."""
+"""``phigen tune``: measure the settings of a spec, and propose the cheapest with a requested accuracy."""
 
 from __future__ import annotations
 
@@ -128,7 +128,10 @@ def initial_value_problem(
     horizon: float | None,
     measure: str,
 ) -> tuple[Run, Problem]:
-    """Return the run of that name, the first by default, and its initial value problem; of a lattice on fewer sites."""
+    """Return the run of that name, by default the first, and its initial value problem.
+
+    The problem of a run of a large lattice has fewer sites than the run.
+    """
     spec = compilation.spec
     if spec.lattice:
         run = run_of(spec, name)
@@ -138,7 +141,7 @@ def initial_value_problem(
 
 
 def problem_of(compilation: Compilation, experiment: Experiment, horizon: float | None, console: Console) -> Problem:
-    """The initial value problem of an experiment, over its run by default; with a monitor in τ."""
+    """Return the initial value problem of an experiment, by default over the length of its run; in τ with a monitor."""
     import numpy as np
 
     from phigen.cli.endings import ended, length
@@ -157,7 +160,7 @@ def problem_of(compilation: Compilation, experiment: Experiment, horizon: float 
 def _of_lattice(
     console: Console, compilation: Compilation, run: Run, settings: tuple[str, ...], horizon: float | None, measure: str
 ) -> Problem:
-    """The problem of a run of a lattice, on fewer sites where it has many."""
+    """Return the initial value problem of a run of a lattice, on fewer sites if the run has many."""
     from phigen.api import chosen_target, lattice_solver_of
     from phigen.cli.endings import ended, length
     from phigen.cli.lattice_experiment import LatticeExperiment
@@ -188,7 +191,7 @@ def _of_lattice(
 
 
 def _time_scales(run: Run, horizon: float | None) -> tuple[float, float, float]:
-    """Return a first estimate of the step, the time of a run, and its direction."""
+    """Return a first estimate of the step, the length of a run in time, and the sign of its direction."""
     step = float(run.step)
     span = abs(step) * run.steps if horizon is None else horizon
     return min(abs(step), span), span, math.copysign(1.0, step)

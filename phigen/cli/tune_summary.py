@@ -1,4 +1,4 @@
-"""Summary of ``phigen tune``: a table and the lines to paste, or plain data."""
+"""Summary of ``phigen tune``: a table with lines to paste, or data for JSON."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ if TYPE_CHECKING:
     from phigen.tuning.search import Curve
     from phigen.tuning.study import Finalist, Tuning
 
-#: Other accuracies that are reported, as factors.
-_OTHERS = (1e4, 1e2, 1e-2, 1e-4)
-#: An error smaller than the accuracy by this factor did not decide the step.
-_SLACK = 20
-#: Number of monitors that are shown, and the smallest reduction of steps that is reported.
-_SHOWN, _GAINING, _LONGEST = 5, 2.0, 60
-#: States that the proposed run stores.
-_ROWS = 1000
+#: Further accuracies for which results are shown, relative to the requested one.
+_FURTHER_ACCURACIES = (1e4, 1e2, 1e-2, 1e-4)
+#: If an error is smaller than the accuracy by more than this factor, something other than the error decided the step.
+_UNDECIDED_FACTOR = 20
+#: Largest number of monitors that are shown, least factor by which a monitor must reduce the steps, and number of
+#: characters to which formulas are shortened.
+_MOST_MONITORS, _LEAST_GAIN, _FORMULA_LENGTH = 5, 2.0, 60
+#: Number of states that the proposed run stores.
+_STORED_STATES = 1000
 
 
 def print_tuning(tuning: Tuning, spec: Spec, run: Run) -> None:
@@ -52,19 +53,19 @@ def print_tuning(tuning: Tuning, spec: Spec, run: Run) -> None:
 
 
 def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
-    """Print the gain of each monitor, and the lines that select the best."""
+    """Print the savings by each monitor, and lines for the spec that select the best one."""
     from phigen.tuning.search import rounded_down
 
-    gaining = [t for t in monitors.found if monitors.gain(t) > _GAINING]
+    gaining = [t for t in monitors.found if monitors.gain(t) > _LEAST_GAIN]
     out(
         f"\nThe motion is much faster at some times than at others. Steps up to t = {monitors.span:.6g} "
         "with the same energy error:\n"
     )
     rows = [["monitor", "scheme", "steps", "fewer", "run, ms"]]
-    for trial in [*monitors.found[:_SHOWN], monitors.plain]:
+    for trial in [*monitors.found[:_MOST_MONITORS], monitors.plain]:
         gain = monitors.gain(trial)
         cells = [f"{trial.steps:.0f}", f"{gain:.3g} times", f"{1e3 * trial.seconds:.3g}"]
-        cells = cells if math.isfinite(trial.steps) else ["more than can be made", "", ""]
+        cells = cells if math.isfinite(trial.steps) else ["too many", "", ""]
         cells[1] = cells[1] * (trial is not monitors.plain and math.isfinite(gain))
         rows.append([_shortened(trial.setting.monitor or "none"), f"{trial.label}, order {trial.order}", *cells])
     for line in table(rows, right=[2, 3, 4]):
@@ -85,16 +86,16 @@ def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
 
 
 def _shortened(text: str) -> str:
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+    return text if len(text) <= _FORMULA_LENGTH else text[: _FORMULA_LENGTH - 1] + "…"
 
 
 def monitored_lines(trial: Trial) -> list[str]:
-    """Top-level lines of a spec that select a measured monitor."""
+    """Return top-level lines of a spec that select a measured monitor."""
     return replace(trial.setting, order=trial.order).lines()
 
 
 def listed(tuning: Tuning) -> Iterator[tuple[str, Finalist]]:
-    """All rows of the table with their labels."""
+    """Yield the rows of the table as pairs of label and result."""
     for finalist in tuning.finalists:
         yield finalist.curve.label + (", the spec's" if finalist is tuning.own else ""), finalist
     for peer in tuning.peers:
@@ -114,19 +115,19 @@ def _row(finalist: Finalist, label: str, tuning: Tuning) -> list[str]:
 
 
 def is_measured(finalist: Finalist, tuning: Tuning) -> bool:
-    """Whether the error was measured over the horizon, and not extrapolated."""
+    """Whether the error was measured over the whole horizon, not extrapolated."""
     return finalist.point.time > min(0.99 * tuning.horizon, tuning.horizon - finalist.point.step)
 
 
 def gauge_of(curve: Curve) -> str:
-    """The gauge that a method has."""
+    """Return the gauge of a method as text."""
     if curve.setting is None:
         return ""
     return curve.setting.gauge if curve.gauged else "none"
 
 
 def scheme_of(curve: Curve) -> str:
-    """Name of the construction that reaches the order."""
+    """Return the name of the construction by which the method reaches its order."""
     if curve.setting is None:
         return "explicit"
     composition = curve.composition or curve.setting.composition
@@ -136,7 +137,7 @@ def scheme_of(curve: Curve) -> str:
 
 
 def remarks(tuning: Tuning) -> Iterator[str]:
-    """Remarks on how the numbers were obtained, and on their limits."""
+    """Yield remarks on the conditions of the measurements and on their limits."""
     from phigen.geometry.conservation import ENERGY, stated
 
     best = tuning.winner
@@ -152,7 +153,7 @@ def remarks(tuning: Tuning) -> Iterator[str]:
         yield f"Errors were measured up to {measured_span}; phigen's grow linearly, and so does ~ up to {full_span}."
     if tuning.measure == "energy":
         yield stated({ENERGY: tuning.unit})
-    if best.point.error * _SLACK < tuning.accuracy and best.point.step > 0.9 * best.curve.largest:
+    if best.point.error * _UNDECIDED_FACTOR < tuning.accuracy and best.point.step > 0.9 * best.curve.largest:
         yield "The accuracy would allow a larger step, but larger steps fail or do not resolve the motion."
     if tuning.orbit_error is not None:
         yield (
@@ -175,7 +176,7 @@ def remarks(tuning: Tuning) -> Iterator[str]:
 
 
 def _automatic(tuning: Tuning) -> str:
-    """Sentence on the scheme that ``scheme: auto`` would take, compared with the measured best."""
+    """Return a sentence that compares the scheme of ``scheme: auto`` with the measured best."""
     assert tuning.winner is not None
     ratio, text = tuning.automatic_ratio, f"scheme: auto takes {tuning.automatic} at order {tuning.winner.curve.order}"
     if not math.isfinite(ratio):
@@ -189,11 +190,11 @@ def _extrapolated(tuning: Tuning) -> str:
 
 
 def _other_rows(tuning: Tuning) -> list[list[str]]:
-    """The cheapest candidate at other accuracies, those that the scans reached."""
+    """Return table rows with the cheapest candidate for each further accuracy that the scans reached."""
     from phigen.tuning.search import cheapest_step
 
     rows = []
-    for accuracy in (tuning.accuracy * factor for factor in _OTHERS):
+    for accuracy in (tuning.accuracy * factor for factor in _FURTHER_ACCURACIES):
         curves = [c for c in tuning.curves if c.setting and any(p.error <= accuracy for p in c.points)]
         curve = min(curves, key=lambda c: c.cost(accuracy), default=None)
         step, cost = cheapest_step(curve.points, accuracy, curve.order) if curve else (0.0, math.inf)
@@ -203,26 +204,28 @@ def _other_rows(tuning: Tuning) -> list[list[str]]:
 
 
 def lines_of(finalist: Finalist) -> list[str]:
-    """Top-level lines of a spec that select the measured setting."""
+    """Return top-level lines of a spec that select the measured setting."""
     setting = finalist.curve.setting
     assert setting is not None
     return replace(setting, order=finalist.curve.order).lines()
 
 
 def run_lines_of(tuning: Tuning, run: Run) -> list[str]:
-    """The lines of the run, up to the horizon, and a step beyond it where a ``stop`` is to be met there.
+    """Return the lines of the proposed run: step, number of steps up to the horizon, and stride.
 
-    Long enough strides let a solver take its steps in blocks.
+    With ``stop``, the run is one step longer, so that it reaches the stop. A large stride lets a solver make many steps
+    at once.
     """
     assert tuning.winner is not None
     step = tuning.winner.point.step
     steps = max(1, round(tuning.horizon / step)) + (run.stop is not None)
-    rows = max(1, run.steps // run.stride) if tuning.sizes else _ROWS  # states of lattices are large
+    # states of lattices are large, so no more of them are stored than the run asks for
+    rows = max(1, run.steps // run.stride) if tuning.sizes else _STORED_STATES
     return [f"step: {math.copysign(step, run.step)!r}", f"steps: {steps}", f"stride: {max(1, steps // rows)}"]
 
 
 def unreached(tuning: Tuning) -> str:
-    """Return why no setting reaches the accuracy, and the smallest error."""
+    """Return the message that no setting reaches the accuracy, with the reason and the smallest error."""
     from phigen.tuning.search import at_floor
 
     curve, point = tuning.closest
@@ -240,7 +243,7 @@ def unreached(tuning: Tuning) -> str:
 
 
 def described(tuning: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
-    """Everything that was measured, as plain data."""
+    """Return all measurements as data for JSON."""
     data: dict[str, Any] = {
         "name": spec.name,
         "run": run.name,

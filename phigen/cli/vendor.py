@@ -1,4 +1,4 @@
-"""``phigen vendor``: solvers copied into another project, with a manifest by which they can be checked."""
+"""``phigen vendor``: copy solvers into another project, with a manifest by which they can be checked later."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class VendorRequest:
-    """One solver to vendor or to check: its spec, its source, and the options.
+    """Request to vendor or to check one solver: its spec, the origin of the spec, and options.
 
-    ``found`` is false if the text of the spec comes from the manifest, because its file is not there.
+    ``found`` is false if the spec file is absent and the text of the spec comes from the manifest.
     """
 
     spec: Spec
@@ -45,7 +45,7 @@ class VendorRequest:
 
 @dataclass(frozen=True)
 class VendoredSolver:
-    """Files that belong in the folder for one order."""
+    """Files of one solver that belong in the folder, and the request for them."""
 
     order: VendorRequest
     compilation: Compilation
@@ -53,7 +53,7 @@ class VendoredSolver:
 
     @property
     def entry(self) -> ManifestEntry:
-        """Its entry of the manifest."""
+        """Return the entry of the solver in the manifest."""
         spec, order = self.order.spec, self.order
         files = {file: manifest.sha256(text) for file, text in self.files.items()}
         return ManifestEntry(spec.name, order.options, order.spec_file, spec.source, spec.license, files, __version__)
@@ -158,7 +158,7 @@ def _from_specs(
     checking: bool,
     collector: Collector,
 ) -> list[VendorRequest]:
-    """The orders of the command line. A check without options is about those of the manifest."""
+    """Return the requests of the command line; a check without options takes those in the manifest."""
     orders = []
     for spec in load_all(spec_files, collector) if spec_files else []:
         entry = entries.get(spec.name)
@@ -169,7 +169,8 @@ def _from_specs(
 
 
 def _from_manifest(folder: Path, entries: Mapping[str, ManifestEntry], collector: Collector) -> list[VendorRequest]:
-    """The orders of all that is in the folder, from the specs where they are, else from the manifest's copies."""
+    """Return requests for all solvers in the manifest, with the spec from its file or else from the copy in the
+    manifest."""
     from phigen import spec as specs
 
     orders = []
@@ -188,7 +189,7 @@ def _from_manifest(folder: Path, entries: Mapping[str, ManifestEntry], collector
 
 
 def _path_of_spec(folder: Path, entry: ManifestEntry) -> Path | None:
-    """The file of a spec, as seen from the working directory, or the bundled one, if it is there."""
+    """Return the path of a spec, as seen from the working directory; None if the file is absent."""
     if entry.spec_file is None:
         return None
     if bundled := resources.bundled().get(entry.spec_file):
@@ -247,8 +248,10 @@ def _write(
 
 
 def _obstacle(change: Change, entry: ManifestEntry | None) -> str:
-    """Return why a file must not be changed. The manifest also detects edits in headers, which the checksums do not
-    cover."""
+    """Return why a file must not be changed; "" if it may be.
+
+    The manifest also detects edits of headers of files, which their checksums do not cover.
+    """
     if change.obstacle or change.before is None or change.before == change.after:
         return change.obstacle
     stated = entry.files.get(change.path.name) if entry else None
@@ -274,7 +277,7 @@ def _changes_sentence(folder: Path, vendored: VendoredSolver, changes: Sequence[
 
 @dataclass(frozen=True)
 class VendorProblem:
-    """One file with a problem: its path, the problem, and the command that corrects it."""
+    """Problem with one file, and the command that corrects it."""
 
     path: Path
     what: str
@@ -284,7 +287,7 @@ class VendorProblem:
 def _problems(
     folder: Path, entries: Mapping[str, ManifestEntry], vendored: VendoredSolver, spec_files: Sequence[str]
 ) -> Iterator[VendorProblem]:
-    """Problems with the files of one solver."""
+    """Yield the problems with the files of one solver."""
     order = vendored.order
     arguments = [as_given(order.spec), str(folder), *order.options.words] if spec_files else [str(folder)]
     entry = entries.get(order.spec.name)
@@ -298,11 +301,15 @@ def _problems(
 
 
 def _complaint(path: Path, entry: ManifestEntry | None, vendored: VendoredSolver) -> tuple[str, bool]:
-    """Problem with a file, empty if there is none; and whether the file was edited by hand."""
+    """Return the problem with a file, "" if there is none, and whether the file was edited by hand."""
     content = path.read_bytes() if path.is_file() else None
     stated, expected = entry.files.get(path.name) if entry else None, vendored.files.get(path.name)
     if content is None:
-        return ("missing", False) if expected is not None else ("missing, and its spec no longer gives it", False)
+        return (
+            ("missing", False)
+            if expected is not None
+            else ("missing, and phigen no longer generates it from its spec", False)
+        )
     if stated is None:
         return "not in the manifest", content != (expected or "").encode()
     if manifest.sha256(content) != stated:
@@ -310,12 +317,12 @@ def _complaint(path: Path, entry: ManifestEntry | None, vendored: VendoredSolver
             return "its line endings were changed; for git, put '* -text' into .gitattributes beside it", True
         return "edited by hand", True
     if expected is None:
-        return "its spec no longer gives it", False
+        return "phigen no longer generates it from its spec", False
     return ("" if content == expected.encode() else f"stale: {_cause(entry, vendored)}"), False
 
 
 def _cause(entry: ManifestEntry | None, vendored: VendoredSolver) -> str:
-    """Return why phigen now generates something else."""
+    """Return why phigen would generate a different file now."""
     causes = []
     if entry and entry.spec_text != vendored.order.spec.source:
         causes.append("its spec has changed")
@@ -323,11 +330,11 @@ def _cause(entry: ManifestEntry | None, vendored: VendoredSolver) -> str:
         causes.append(f"it was generated by phigen {entry.version}, and this is {__version__}")
     if entry and entry.options != vendored.order.options:
         causes.append("it was generated with other options")
-    return "; ".join(causes) or "phigen makes something else of its spec"
+    return "; ".join(causes) or "phigen generates a different file from its spec"
 
 
 def _wrong_builds(folder: Path, entries: Mapping[str, ManifestEntry], builds: Sequence[str]) -> Iterator[VendorProblem]:
-    """Files of build systems that are not as the manifest wants them."""
+    """Yield the files of build systems that differ from what the manifest requires."""
     from phigen.cli.outputs import Change, read
 
     for file, text in build_files(builds, {name: entry.files for name, entry in entries.items()}).items():
@@ -339,7 +346,7 @@ def _wrong_builds(folder: Path, entries: Mapping[str, ManifestEntry], builds: Se
 
 
 def _extra(folder: Path, entries: Mapping[str, ManifestEntry]) -> Iterator[VendorProblem]:
-    """Return generated files that the manifest does not list; other files belong to the user."""
+    """Yield generated files that the manifest does not list; other files belong to the user."""
     from phigen.cli.outputs import read
     from phigen.targets.header import split
 
@@ -350,7 +357,7 @@ def _extra(folder: Path, entries: Mapping[str, ManifestEntry]) -> Iterator[Vendo
 
 
 def _judge(folder: Path, problems: Sequence[VendorProblem]) -> None:
-    """Raise CheckError that lists the problems and how to mend them."""
+    """Raise CheckError that lists the problems and the commands that correct them; do nothing if there are none."""
     if not problems:
         return
     lines = [f"{p.path}: {p.what}" for p in problems]

@@ -1,5 +1,4 @@
-"""``phigen verify``: build the targets of specs that Python can run, measure the promised properties of the solvers,
-and compare with bounds."""
+"""``phigen verify``: measure whether the solvers of specs keep the promised properties, and compare with bounds."""
 
 from __future__ import annotations
 
@@ -67,10 +66,10 @@ def command(
 ) -> None:
     """Build every target of specs and measure whether the solvers keep their promises.
 
-    Measured are the observed order, the errors of Casimirs and energy and their drift (the largest error in the last
-    tenth of the run over that in the first), the Poisson identity with the exact tangent map, reversibility, agreement
-    of the targets, and the largest step that converges. Classical methods are measured for comparison. Exit code 5 if
-    a measurement misses its bound.
+    The command measures the observed order, the errors of Casimirs and energy and their drift (the largest error in the
+    last tenth of the run over that in the first), the Poisson identity with the exact tangent map, reversibility,
+    agreement of the targets, and the largest step that converges. Classical methods are measured for comparison. Exit
+    code 5 if a measurement misses its bound.
     """
     from phigen.compiler import compile_proved
     from phigen.runtime.origin import origin_of
@@ -100,7 +99,7 @@ def command(
             if plot:
                 _draw(plot, compilation, prepared(spec, name), console)
             if verification.failures:
-                collector.errors.append(fallen_short(verification))
+                collector.errors.append(missed_bounds(verification))
     if as_json:
         out_json([described(v) for v in verifications])
     collector.finish()
@@ -122,7 +121,7 @@ def _draw(path: Path, compilation: Compilation, experiment: Experiment, console:
 
 
 def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
-    """Measure how constant the modified Hamiltonian is on a run. Raises `NotOfferedError` and `StepError`."""
+    """Return how constant the modified Hamiltonian is on a run. Raises `NotOfferedError` and `StepError`."""
     import numpy as np
 
     from phigen.api import chosen_target, solver_of
@@ -140,9 +139,10 @@ def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
 def verified(
     compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
 ) -> Verification:
-    """The verification of a compilation with its tangent map on a run of its spec; of the spec's targets by default.
+    """Return the verification of a compilation with its tangent map, on a run of its spec.
 
-    Targets that Python cannot run are left out. Of a run that ends between two steps all whole ones are made, or one.
+    ``targets`` are by default those of the spec; targets that Python cannot run are left out. If the run ends within a
+    step, its whole steps are made, at least one.
     """
     from phigen.api import chosen_target, solver_of
     from phigen.cli.endings import ended
@@ -166,7 +166,7 @@ def verified(
 def verified_lattice(
     compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
 ) -> Verification:
-    """Verification of the compilation of a lattice on a run of its spec."""
+    """Return the verification of the compilation of a lattice, on a run of its spec."""
     from phigen.api import chosen_target, lattice_solver_of
     from phigen.cli.endings import ended
     from phigen.cli.lattice_experiment import LatticeExperiment
@@ -189,14 +189,14 @@ def verified_lattice(
     return verify_lattice(compilation.by_sweeps(), solvers, run.name, start, float(run.step), steps, **run_options)
 
 
-def fallen_short(verification: Verification) -> CheckError:
-    """The error that names what fell short."""
+def missed_bounds(verification: Verification) -> CheckError:
+    """Return the error that lists the checks with missed bounds."""
     lines = [f"{verification.name}: verification failed", *(f"  {f}" for f in verification.failures)]
     return CheckError("\n".join(lines))
 
 
 def print_table(v: Verification) -> None:
-    """The checks as a table for people."""
+    """Print the checks as a table."""
     from phigen.geometry.conservation import stated
 
     out(heading(f"{v.name}, run {v.run}") + f": {v.label}")
@@ -223,7 +223,7 @@ def _formatted_value(value: float) -> str:
 
 
 def described(v: Verification) -> dict[str, Any]:
-    """Verification as plain data; numbers that are not finite become null."""
+    """Return the verification as data for JSON; numbers that are not finite become null."""
     from phigen.cli.run_summary import finite
 
     data: dict[str, Any] = finite(asdict(v))

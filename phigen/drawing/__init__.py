@@ -1,1 +1,1 @@
-"""Parts of figures: each module draws one kind of panel on a given figure."""
+"""Figures of runs, comparisons, tunings and sweeps, drawn with matplotlib."""

@@ -1,4 +1,4 @@
-"""Figure of a comparison: errors of energy and orbit against the CPU time of the run, one point per method."""
+"""Figure of a comparison of methods: errors of energy and orbit over CPU time, with a point for each method."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _MARKERS = "osD^vXP*"
 
 @styled
 def figure(comparison: Comparison, title: str) -> Figure:
-    """Return the figure: energy errors on the left, orbit errors on the right where they are known.
+    """Return the figure, with energy errors on the left, and orbit errors on the right if they are known.
 
-    Filled points are Poisson maps by construction.
+    Filled points are methods whose steps are Poisson maps.
     """
     from matplotlib.figure import Figure
 

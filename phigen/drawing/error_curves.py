@@ -1,4 +1,4 @@
-"""Errors of conserved quantities against time, on a logarithmic scale that also shows zeros."""
+"""Errors of conserved quantities over time, on a logarithmic scale with an additional tick for 0."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from phigen.symbolic.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
-#: Number of windows whose largest error is drawn, for runs of more rows.
+#: Number of windows of a long run; only the largest error in each window is drawn.
 WINDOWS = 400
-#: Title of the values of an energy that is not conserved.
+#: Title of the panel of an energy that is not conserved.
 HAMILTONIAN = "H(t)"
 #: Height of a row of panels in inches.
 ROW = 2.3
@@ -30,10 +30,10 @@ LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2,
 
 
 def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[Floats, Floats]:
-    """Return the largest value in each window of rows and its time, so that no peak is lost.
+    """Return the largest value in each window of rows, and its time.
 
-    A window with a non-finite value gives NaN. If there are at most twice as many rows as windows, all rows are
-    returned.
+    A window with a value that is not finite gives NaN. All rows are returned if there are at most twice as many rows as
+    windows.
     """
     if len(t) <= 2 * windows:
         return t, np.where(np.isfinite(values), values, np.nan)
@@ -60,10 +60,11 @@ def draw_errors(
     methods: Mapping[str, Trajectory],
     units: Mapping[str, Unit] | None = None,
 ) -> None:
-    """Draw a panel for the energy and each Casimir, with a curve for each method; the first method is on top.
+    """Draw a panel for the energy and for each Casimir, with a curve for each method; the first method is drawn on top.
 
-    Errors are in ``units``, or without these relative to the initial value, unless that is 0. For quantities that time,
-    forces or noise change, the values are drawn instead of errors: H(t) for the energy.
+    Errors are in ``units``. Without units, they are relative to the initial value, or absolute if this is 0. For
+    quantities that are not conserved, because of time, forces or noise, the panel shows values instead of errors, such
+    as H(t).
     """
     first = next(iter(methods.values()))
     panels = [ENERGY, *first.casimirs]
@@ -105,7 +106,7 @@ def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
     positive = np.concatenate([values[values > 0] for _, values in curves.values()])
     low, high = (positive.min(), positive.max()) if len(positive) else (ROUNDING, ROUNDING)
     lowest, highest = math.floor(math.log10(low)), max(math.ceil(math.log10(high)), math.floor(math.log10(low)) + 1)
-    # A logarithmic scale has no zero, so zeros are drawn one decade below all errors.
+    # A logarithmic scale has no zero, so zeros are drawn one decade below the smallest error.
     zeros = any((values == 0).any() for _, values in curves.values())
     zero = 10.0 ** (lowest - 0.8)
     axes.set(yscale="log", ylim=(10.0 ** (lowest - (1.4 if zeros else 0.1)), 10.0 ** (highest + 0.1)))
@@ -124,7 +125,7 @@ def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
 
 
 def _set_ticks(axes: Any, lowest: int, highest: int, zero: float | None) -> None:
-    """Set at most six ticks at powers of ten, and a tick 0 where zeros are drawn."""
+    """Set at most six ticks at powers of ten, and a tick 0 at the position ``zero`` unless this is None."""
     powers = range(highest, lowest - 1, -max(1, math.ceil((highest - lowest) / 5)))
     positions, labels = [10.0**p for p in powers], [f"$10^{{{p}}}$" for p in powers]
     axes.set_yticks([*positions, zero] if zero else positions, [*labels, "0"] if zero else labels)

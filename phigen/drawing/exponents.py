@@ -16,12 +16,12 @@ HEIGHT = 2.4
 
 
 def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
-    """Draw all exponents against the averaging time, with the largest on top."""
+    """Draw all Lyapunov exponents over the averaging time; the largest is drawn on top."""
     axes.axhline(0, **MARK)
     for values in spectrum.history.T[:0:-1]:
         axes.plot(spectrum.times, values, color=PALETTE["leaf"], linewidth=0.9, zorder=2)
     axes.plot(spectrum.times, spectrum.history[:, 0], color=SERIES[0], linewidth=1.4, zorder=3)
-    # The first values are transients, which would compress the scale of the rest of the curves.
+    # The scale ignores the first hundredth of the time, whose large transients would compress all later values.
     late_values = np.abs(spectrum.history[spectrum.times >= spectrum.t / 100])
     height = 1.2 * float(np.max(late_values)) or 1.0
     axes.set(xlim=(spectrum.t / 1000, 1.1 * spectrum.t), ylim=(-height, height))

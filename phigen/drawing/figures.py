@@ -1,8 +1,8 @@
 """Figures of runs: trajectories, errors of conserved quantities, Poincaré sections, convergence, work.
 
-Each function returns a `matplotlib.figure.Figure` and leaves matplotlib's global state as it was. The colours are those
-of `phigen.drawing.palette.PALETTE`; `save` and `svg` there write figures reproducibly: equal figures give equal
-bytes. matplotlib is the optional extra ``plot``; without it every function here raises `MissingPackageError`.
+Each function returns a `matplotlib.figure.Figure`, and does not change matplotlib's global state. Colours are those of
+`phigen.drawing.palette.PALETTE`; the functions `save` and `svg` of that module write equal figures with equal bytes.
+matplotlib is the optional extra ``plot``; without it every function raises `MissingPackageError`.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ __all__ = ["PALETTE", "SUFFIXES", "WIDTH", "constancy_figure", "convergence_figu
            "lyapunov_figure", "run_figure", "save", "section_figure", "svg", "trajectory_figure", "tuning_figure",
            "work_precision_figure"]  # fmt: skip
 
-#: Widths of a page and of a single panel, in inches; PNG files have 200 dots per inch.
+#: Widths of a page and of a single panel in inches. PNG files have 200 dots per inch.
 WIDTH, NARROW = 7.2, 4.8
 _SECTION, _SQUARE = 3.4, 3.8
 
 
 @styled
 def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> Figure:
-    """Return a figure of the curve in phase space: in a plane, in space or in several projections.
+    """Return a figure of a trajectory in phase space: in a plane, in space, or as several projections.
 
-    ``casimirs`` are the formulas of the Casimirs. In space the symplectic leaf is drawn: the surface on which the first
-    Casimir of the three coordinates is constant.
+    For three coordinates, the symplectic leaf is drawn too: the surface on which the first of the ``casimirs``
+    (formulas by name) is constant.
     """
     _, columns = phase_space.grid(trajectory.coordinates)
     figure = _figure(phase_space.height(trajectory.coordinates), WIDTH if columns > 1 else NARROW)
@@ -61,11 +61,10 @@ def trajectory_figure(trajectory: Trajectory, casimirs: Mapping[str, Expression]
 
 @styled
 def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | None = None) -> Figure:
-    """Return a figure of the errors of energy and Casimirs of several methods against time; one panel per quantity.
+    """Return a figure with the errors of energy and Casimirs of several methods over time, one panel per quantity.
 
-    Errors are in the ``units`` of `phigen.geometry.conservation.units_of`. For long
-    runs the largest errors of some hundred windows are drawn. Zeros have a separate tick 0; a cross marks the time at
-    which a method broke down.
+    Errors are in the ``units`` of `phigen.geometry.conservation.units_of`. For long runs, the largest errors in some
+    hundred windows of time are drawn. Zeros have a separate tick 0; a cross marks the time at which a method failed.
     """
     figure = _figure(error_curves.height(methods))
     error_curves.draw_errors(figure, methods, units)
@@ -74,7 +73,10 @@ def error_figure(methods: Mapping[str, Trajectory], units: Mapping[str, Unit] | 
 
 @styled
 def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figure:
-    """Return a figure of Poincaré sections: points (rows, DIM) by label, in the plane of two of the ``names``."""
+    """Return a figure of Poincaré sections, each an array of points (rows, DIM) by its label.
+
+    The figure shows the plane of two of the coordinates ``names``.
+    """
     figure = _figure(_SECTION, NARROW)
     section_plane.draw_section(figure.add_subplot(), sections, names)
     return figure
@@ -82,7 +84,7 @@ def section_figure(sections: Mapping[str, Floats], names: Sequence[str]) -> Figu
 
 @styled
 def convergence_figure(study: Study) -> Figure:
-    """Return a figure of final errors against the step size: per method a curve and a thin line of its order."""
+    """Return a figure of final errors over the step size: for each method a curve, and a thin line of its order."""
     figure = _figure(_SQUARE, NARROW)
     precision_curves.draw_convergence(figure.add_subplot(), study)
     return figure
@@ -90,7 +92,7 @@ def convergence_figure(study: Study) -> Figure:
 
 @styled
 def work_precision_figure(study: Study) -> Figure:
-    """Return a figure of the final errors of solution and Casimirs against the computing time."""
+    """Return a figure of the final errors of solution and Casimirs over the computing time."""
     panels = [precision_curves.draw_work, precision_curves.draw_conserved][: 1 + study.has_casimirs]
     figure = _figure(_SQUARE, WIDTH if len(panels) > 1 else NARROW)
     for axes, draw in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
@@ -100,7 +102,7 @@ def work_precision_figure(study: Study) -> Figure:
 
 @styled
 def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
-    """Return a figure of the errors of all candidates of a tuning against computing time, with the proposals."""
+    """Return a figure of errors over computing time for all candidates of a tuning, with the proposals."""
     figure = _figure(1.2 * _SQUARE, WIDTH)
     if title:
         figure.suptitle(title, fontsize=11)
@@ -110,7 +112,7 @@ def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
 
 @styled
 def constancy_figure(constancy: Constancy) -> Figure:
-    """Return a figure of changes of H and H̃: along a trajectory, and against the step size."""
+    """Return a figure of the errors of H and H̃: along a trajectory, and over the step size."""
     figure = _figure(_SQUARE)
     time_panel, step_panel = figure.subplots(1, 2)
     backward_curves.draw_along(time_panel, constancy)
@@ -127,10 +129,10 @@ def run_figure(
     spectrum: Spectrum | None = None,
     units: Mapping[str, Unit] | None = None,
 ) -> Figure:
-    """Return all figures of a run on one page.
+    """Return a page with all figures of a run.
 
     The page shows the trajectory of the first method with its sections and observables, the errors of all methods, and
-    the Lyapunov exponents if computed.
+    the Lyapunov exponents if there is a ``spectrum``.
     """
     first = next(iter(methods.values()))
 
@@ -143,7 +145,7 @@ def run_figure(
     rows: list[tuple[float, list[Callable[[FigureBase], None]]]]
     rows = [(phase_space.height(first.coordinates), [draw_trajectory])]
     if sections and phase_space.grid(first.coordinates) == (1, 1):
-        rows[0][1].append(draw_section)  # a single panel leaves space beside it
+        rows[0][1].append(draw_section)  # a trajectory of one panel leaves space for the section beside it
     elif sections:
         rows.append((_SECTION, [draw_section]))
     errors: Callable[[FigureBase], None] = partial(error_curves.draw_errors, methods=methods, units=units)
@@ -171,7 +173,7 @@ def run_figure(
 
 @styled
 def lyapunov_figure(spectrum: Spectrum) -> Figure:
-    """Return a figure of the convergence of the Lyapunov exponents of a trajectory."""
+    """Return a figure of the Lyapunov exponents of a trajectory, which converge with the averaging time."""
     figure = _figure(exponents.HEIGHT, NARROW)
     exponents.draw_exponents(figure.add_subplot(), spectrum)
     return figure

@@ -1,4 +1,4 @@
-"""Films of runs of lattices: chains as curves over the sites, planes and graphs as sequences of pictures."""
+"""Films of runs of lattices: chains as curves over the sites, planes and graphs as sequences of images."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from phigen.errors import MissingPackageError
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats
 
-#: Largest number of pictures of a film; pictures per second; dots per inch.
+#: Largest number of images of a film, images per second, and dots per inch.
 MOST_PICTURES, RATE, DOTS = 400, 20, 80
 
 
 @styled
 def film(run: LatticeTrajectory, title: str, path: Path, origin: str = "") -> None:
-    """Write a film of the coordinates, ``.gif`` or ``.mp4``, with the text ``origin`` as a comment.
+    """Write a film of all coordinates to a ``.gif`` or ``.mp4`` file; the text ``origin`` becomes a comment in the
+    file.
 
-    Raises `MissingPackageError` if ffmpeg is missing.
+    Raises `MissingPackageError` if ffmpeg is needed and missing.
     """
     from matplotlib.animation import FFMpegWriter, PillowWriter
     from matplotlib.figure import Figure
@@ -53,7 +54,7 @@ def film(run: LatticeTrajectory, title: str, path: Path, origin: str = "") -> No
 
 
 def expect_writer(path: Path) -> None:
-    """Raise `MissingPackageError` for a film that needs ffmpeg if ffmpeg is missing."""
+    """Raise `MissingPackageError` if the film needs ffmpeg, that is, if it is not a ``.gif``, and ffmpeg is missing."""
     from matplotlib.animation import FFMpegWriter
 
     if path.suffix.lower() != ".gif" and not FFMpegWriter.isAvailable():
@@ -61,19 +62,21 @@ def expect_writer(path: Path) -> None:
 
 
 def _commented(gif: bytes, comment: bytes) -> bytes:
-    """Return a GIF with a comment extension of up to 255 bytes before its trailer, the last byte."""
+    """Return the GIF with a comment before its last byte; unchanged if the comment is empty or longer than 255
+    bytes."""
     if not 0 < len(comment) < 256:
         return gif
     return gif[:-1] + b"\x21\xfe" + bytes([len(comment)]) + comment + b"\x00" + gif[-1:]
 
 
 def _flat(values: Floats) -> Floats:
-    """Return chains and planes unchanged, and the middle plane along the first axis of three-dimensional lattices."""
+    """Return values (sizes) of a chain or a plane unchanged; of a three-dimensional lattice the middle plane of the
+    first axis."""
     return values if values.ndim < 3 else values[values.shape[0] // 2]
 
 
 def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> Any:
-    """Draw a coordinate on a graph; return the function that updates the picture."""
+    """Draw a coordinate on a graph, and return the function that shows other values (sites,)."""
     values = run.column(name)
     picture = draw_sites(axes, run.parameters["bonds"], positions, values[0], shades_of(values))
     axes.set_title(name)
@@ -81,7 +84,7 @@ def _graph(axes: Any, name: str, run: LatticeTrajectory, positions: Floats) -> A
 
 
 def _displayed_values(axes: Any, name: str, values: Floats) -> Any:
-    """Return the function that extracts the displayed values from a coordinate (frames, *sizes)."""
+    """Draw a coordinate (frames, *sizes) of a chain or plane, and return the function that shows another frame."""
     first = _flat(values[0])
     axes.set_title(name)
     if first.ndim == 1:

@@ -1,4 +1,4 @@
-"""Groups of coordinates for a picture, by their names: (q, p), (x1, y1), (P1, P2, P3), …"""
+"""Groups of coordinates that a picture shows together, found by their names: (q, p), (x1, y1), (P1, P2, P3), …"""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ Group = tuple[str, ...]
 
 
 def groups(coordinates: Sequence[str]) -> list[Group]:
-    """Return the coordinates in groups of up to three, in order; a group of one is drawn against the time.
+    """Return the coordinates in groups of up to three, in order; a group of one is drawn over time.
 
-    Up to three coordinates are one group. Otherwise each position is paired with the momentum named after it (q and p,
-    q1 and p1, x and px). With exactly two positions, the positions are one group, the orbit in a plane, and the momenta
-    are another. Without such pairs, neighbours with the same letters or the same number form a group.
+    Up to three coordinates are one group. Otherwise each position is paired with its momentum, by names such as q and
+    p, q1 and p1, x and px. If there are exactly two positions, they form one group, the orbit in a plane, and the
+    momenta another. Without pairs, neighbours with the same letters or the same number form a group.
     """
     names = tuple(coordinates)
     if len(names) <= 3:
@@ -27,13 +27,13 @@ def groups(coordinates: Sequence[str]) -> list[Group]:
 
 
 def phase_planes(coordinates: Sequence[str]) -> list[Group]:
-    """Return the planes of Poincaré sections: positions paired with their momenta, else `groups`."""
+    """Return the planes of Poincaré sections: pairs of a position and its momentum, or else `groups`."""
     pairs = _pairs(tuple(coordinates))
     return pairs if len(coordinates) > 3 and 2 * len(pairs) == len(coordinates) else groups(coordinates)
 
 
 def is_orbit(coordinates: Sequence[str]) -> bool:
-    """Return whether the coordinates are two positions and their momenta: an orbit in a plane."""
+    """Return whether the coordinates are two positions and their momenta, which describe an orbit in a plane."""
     return len(coordinates) == 4 and len(_pairs(tuple(coordinates))) == 2
 
 
@@ -47,7 +47,7 @@ def _momentum(q: str, names: Group) -> str | None:
 
 
 def _runs(names: Group) -> list[Group]:
-    """Return neighbours with equal letters, or neighbours with equal numbers, whichever gives fewer groups."""
+    """Return groups of neighbours with equal letters, or of neighbours with equal numbers, whichever are fewer."""
     by_letters = _split(names, lambda name: re.sub(r"[\d_]+$", "", name))
     by_number = _split(names, lambda name: name[len(re.sub(r"\d+$", "", name)) :])
     return min(by_number, by_letters, key=len)
@@ -64,7 +64,10 @@ def _split(names: Group, kind: Callable[[str], str]) -> list[Group]:
 
 
 def _parts(run: Group) -> list[Group]:
-    """Split into threes if the names begin with x, y, z or divide by three; else into pairs and at most one three."""
+    """Return a run of names in threes if it begins with x, y, z or its length is divisible by 3, else in pairs.
+
+    If the length is odd, the first part has three names.
+    """
     if run[:3] == ("x", "y", "z") or len(run) % 3 == 0:
         return [run[i : i + 3] for i in range(0, len(run), 3)]
     first = 3 if len(run) % 2 and len(run) > 1 else 0

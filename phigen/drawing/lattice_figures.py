@@ -1,4 +1,4 @@
-"""Runs of lattices: space–time diagrams of chains, snapshots of planes and graphs, errors of invariants."""
+"""Figures of runs of lattices: space–time diagrams of chains, snapshots of planes and graphs, errors of invariants."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ if TYPE_CHECKING:
 
     from phigen.study.lyapunov import Spectrum
 
-#: Largest numbers of panels of coordinates, of times in a diagram, and of snapshots in a row.
+#: Largest number of panels of coordinates, of times in a diagram, and of snapshots in a row.
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
-#: Largest number of sites of a graph that is drawn as a graph; larger graphs, drawn several times, make large files.
+#: Largest number of sites of a graph that is drawn with its bonds; drawings of larger graphs, at several times, make
+#: large files.
 MOST_DRAWN = 100
-#: Numbers of colours of diagrams and of snapshots, limited to keep files small.
+#: Number of colours of diagrams and of snapshots, limited to keep files small.
 LEVELS = 48
-#: Height in inches of a panel with paths in a plane.
+#: Height in inches of a panel with the paths of bodies in a plane.
 ORBITS_HEIGHT = 5.0
-#: Largest number of sites with names; the names of more sites would overlap in a panel.
+#: Largest number of sites whose names are drawn; more names would overlap in a panel.
 MOST_NAMED = 24
 
 
@@ -47,15 +48,10 @@ def lattice_figure(
 ) -> Figure:
     """Return a figure of the coordinates over space and time, and of the ``errors`` (frames,) by quantity.
 
-    Where time, forces or noise change the energy, H(t) is drawn in place of its error.
-
-    For systems of pairs, the paths in the plane of the first two coordinates are drawn.
-
-    Sites of graphs and pairs may have names.
-
-    Further panels show observables against the time, S(q, ω), a correlation, and Lyapunov exponents, if available.
-
-    A diagram has at most ``dots`` dots along the time axis.
+    If time, forces or noise change the energy, H(t) is drawn instead of its error. For systems of pairs, the paths in
+    the plane of the first two coordinates are drawn. ``site_names`` are names of the sites of graphs and pairs. Further
+    panels show observables over time, S(q, ω), a correlation, and Lyapunov exponents, if available. A diagram has at
+    most ``dots`` dots along the time axis.
     """
     from matplotlib.figure import Figure
 
@@ -118,7 +114,8 @@ def series_figure(run: LatticeSeries, title: str) -> Figure:
 
 @styled
 def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
-    """Return a figure of the ``energies`` (frames, *sizes) of the sites and of the changes of their Casimirs."""
+    """Return a figure of the ``energies`` (frames, *sizes) of the sites, and of the changes of the Casimirs of the
+    sites."""
     from matplotlib.figure import Figure
 
     local = {name: values for name, values in run.casimirs.items() if values.ndim > 1}
@@ -146,7 +143,7 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
 
 
 def _draw_orbits(axes: Any, run: LatticeTrajectory, site_names: Sequence[str]) -> None:
-    """Draw the paths of bodies in the plane of their first two coordinates, with a dot at the end of each path."""
+    """Draw the paths of bodies in the plane of their first two coordinates, each with a dot at its end."""
     x, y = run.x[:, 0], run.x[:, 1]
     for site in range(x.shape[1]):
         colour = SERIES[site % len(SERIES)]
@@ -168,7 +165,7 @@ def _draw_diagram(
     dots: int = MOST_TIMES,
     site_names: Sequence[str] = (),
 ) -> None:
-    """Draw one coordinate of a chain: sites upwards, time to the right."""
+    """Draw one coordinate of a chain as a diagram: sites upwards, time to the right."""
     axes = part.add_subplot()
     times = _shown_frames(run, dots)
     image = axes.imshow(
@@ -184,8 +181,8 @@ def _draw_diagram(
 
 
 def _shown_frames(run: LatticeTrajectory, dots: int) -> Any:
-    """Return frame numbers at about equal intervals of time; each is the frame nearest to the desired time."""
-    apart = np.diff(run.t[:-1])  # the last frame may follow after a shorter interval
+    """Return the numbers of at most ``dots`` frames at about equal intervals of time."""
+    apart = np.diff(run.t[:-1])  # The last interval is ignored, since it may be shorter.
     if len(apart) < 2 or np.ptp(apart) <= 1e-6 * abs(apart[0]):
         return np.linspace(0, len(run) - 1, min(len(run), dots)).astype(int)
     order = np.argsort(run.t)
@@ -203,7 +200,7 @@ def places_of(run: LatticeTrajectory) -> Floats | None:
 def _draw_graph(
     part: Any, name: str, run: LatticeTrajectory, values: Floats, positions: Floats, site_names: Sequence[str] = ()
 ) -> None:
-    """Draw one coordinate of a graph at some times."""
+    """Draw one coordinate of a graph at several times."""
     frames, shades = _snapshots(run), shades_of(values, LEVELS)
     panels = np.atleast_1d(part.subplots(1, len(frames)))
     for axes, k in zip(panels, frames.tolist(), strict=True):
@@ -217,7 +214,10 @@ def _draw_graph(
 
 
 def draw_sites(axes: Any, bonds: Any, positions: Floats, values: Floats, shades: Mapping[str, Any]) -> Any:
-    """Draw the sites and bonds of a graph; the sites have the colours of `shades_of` for the values (sites,)."""
+    """Draw the sites and bonds of a graph, and return the matplotlib artist of the sites.
+
+    The sites have the colours ``shades`` (see `shades_of`) of the values (sites,).
+    """
     from matplotlib.collections import LineCollection
 
     lines = positions[np.asarray(bonds).reshape(-1, 2)]
@@ -233,12 +233,13 @@ def draw_sites(axes: Any, bonds: Any, positions: Floats, values: Floats, shades:
 
 
 def _snapshots(run: LatticeTrajectory) -> Any:
-    """Return the numbers of some frames, from the first to the last."""
+    """Return the numbers of `SNAPSHOTS` frames at about equal intervals, from the first to the last."""
     return np.unique(np.linspace(0, len(run) - 1, min(len(run), SNAPSHOTS)).astype(int))
 
 
 def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
-    """Draw one coordinate of a plane, or of the middle plane along the first axis, at some times."""
+    """Draw one coordinate of a plane at several times; of a three-dimensional lattice the middle plane of the first
+    axis."""
     frames = _snapshots(run)
     planes = values if values.ndim == 3 else values[:, values.shape[1] // 2]
     shades = shades_of(planes, LEVELS)

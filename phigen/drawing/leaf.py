@@ -1,4 +1,4 @@
-"""Surface in space on which a Casimir is constant, drawn as a net of its intersections with planes."""
+"""Symplectic leaf in space: the surface on which a Casimir is constant, drawn as a net of its sections with planes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient, symbols_of
 
-#: Number of planes per axis; grid points along a side of a plane; Newton steps that move lines onto the surface.
+#: Numbers of planes per axis, of grid points along a side of a plane, and of Newton steps that move lines onto the
+#: surface.
 CUTS, GRID, NEWTON_STEPS = 9, 41, 8
 
 
@@ -37,7 +38,10 @@ def leaf_of(
     start: Mapping[str, float],
     parameters: Mapping[str, float],
 ) -> Leaf | None:
-    """Return the leaf through ``start`` of the first Casimir of three names only; None if there is none."""
+    """Return the leaf through the point ``start`` of the first Casimir that depends on coordinates only.
+
+    Returns None if there is no such Casimir, or if there are not three coordinates.
+    """
     for casimir in casimirs.values():
         used_names = set(symbols_of(casimir)) & set(start)
         if len(names) == 3 and used_names and used_names <= set(names):
@@ -72,19 +76,22 @@ def net(leaf: Leaf, box: Floats) -> list[Floats]:
 
 
 def _lines_in_plane(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Floats]:
-    """Return lines of the leaf in the plane x_axis = place, linearly interpolated on a grid."""
+    """Return the lines of the leaf in the plane x_axis = ``level``, linearly interpolated on a grid."""
     from contourpy import contour_generator
 
     u, v = (np.linspace(box[0, i], box[1, i], GRID) for i in range(3) if i != axis)
     grid = np.insert(np.stack(np.meshgrid(u, v), axis=-1), axis, level, axis=-1)
     values, _ = leaf.value_and_gradient(grid)
-    # Grid cells where C is undefined contain no leaf.
+    # Where C is undefined, the grid is masked, and no lines are drawn.
     lines = contour_generator(u, v, np.ma.masked_invalid(values)).lines(0.0)
     return [np.insert(np.asarray(line, dtype=np.float64), axis, level, axis=-1) for line in lines]
 
 
 def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Floats]:
-    """Return the line moved onto the surface within its plane, split where Newton fails, as at a pole of C."""
+    """Return the line after Newton steps within its plane towards the surface.
+
+    The line is split into several where Newton's method fails, as at a pole of C.
+    """
     points = line.copy()
     with np.errstate(all="ignore"):
         for _ in range(NEWTON_STEPS):

@@ -1,4 +1,4 @@
-"""Ticks and axis names of panels in space, moved apart by measured text sizes; matplotlib only estimates positions."""
+"""Ticks and axis names of panels in space, placed by measured text sizes, since matplotlib only estimates positions."""
 
 from __future__ import annotations
 
@@ -10,17 +10,22 @@ from phigen.symbolic.arrays import Floats
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Fraction of an axis at both ends that has no ticks, as two axes meet there.
+#: Fraction of an axis, at both of its ends, that has no ticks, since two axes meet there.
 CORNER = 0.08
-#: Number of letters of ticks that fit beside the vertical axis, and width of each further letter in points.
+#: Number of characters of a tick label that fit beside the vertical axis, and width of each further character in
+#: points.
 LETTERS, WIDTH = 4, 2.2
-#: Distance of one move of a name, in points; largest number of moves; least distance between texts, in pixels.
+#: Distance of one move of a name in points, largest number of moves, and least distance between texts in pixels.
 PAD, MOST_MOVES, GAP = 3.0, 20, 3.5
 _SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def letter(axes: Any, names: tuple[str, ...], box: Floats, max_ticks: int) -> None:
-    """Label axes in space over a box (2, 3), with about ``max_ticks`` ticks; names contain their power of ten."""
+    """Set ticks and names of the axes of a panel in space that shows the ``box`` (2, 3), with about ``max_ticks`` ticks
+    each.
+
+    If the ticks show values divided by a power of ten, the power is added to the name of the axis.
+    """
     for axis, name, (low, high) in zip(_axes(axes), names, box.T.tolist(), strict=True):
         ticks = _ticks(low, high, max_ticks)
         axis.set_ticks(ticks)
@@ -44,14 +49,17 @@ def _ticks(low: float, high: float, max_ticks: int) -> list[float]:
 
 
 def move_apart(figure: Figure) -> None:
-    """Move axis names of panels in space outwards, within the figure, until they overlap no text of their axes."""
+    """Move axis names of panels in space outwards until they overlap no other text of their panel.
+
+    The panels shrink if names would leave the figure.
+    """
     spaces, layout = figure.findobj(lambda artist: hasattr(artist, "zaxis")), cast(Any, figure.get_layout_engine())
     left = right = 0.0
     for _ in range(MOST_MOVES if spaces else 0):
         figure.draw_without_rendering()
         names = [axis.label.get_window_extent() for axes in spaces for axis in _axes(axes)]
         meeting = [axis for axes in spaces for axis in _meeting(axes)]
-        # Layouts reserve space for ticks, but not for names.
+        # Layouts of matplotlib reserve space for ticks, but not for names of axes in space.
         overhang = min(name.x0 for name in names), max(name.x1 for name in names) - figure.bbox.x1
         left, right = max(left, left - overhang[0]), max(right, right + overhang[1])
         if not meeting and overhang[0] >= 0 and overhang[1] <= 0:
@@ -67,7 +75,7 @@ def _axes(axes: Any) -> tuple[Any, Any, Any]:
 
 
 def _meeting(axes: Any) -> Iterator[Any]:
-    """Return the axes whose names overlap another text."""
+    """Yield the axes whose names overlap another text of the panel."""
     ticks = [tick.label1.get_window_extent() for axis in _axes(axes) for tick in axis.get_major_ticks()]
     names = [axis.label.get_window_extent().padded(GAP) for axis in _axes(axes)]
     for k, (axis, name) in enumerate(zip(_axes(axes), names, strict=True)):

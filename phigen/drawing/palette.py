@@ -1,4 +1,4 @@
-"""Style of figures: colours, fonts, and files whose bytes depend on the content alone."""
+"""Style of figures: colours, fonts, and output files that are reproducible byte by byte."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 T = TypeVar("T")
 
-#: The role of each colour. No two are equal, and SVG files contain them literally, so that a page can replace them by
-#: variables of its own. The series colours have a contrast of at least 3 on white and on black, and are
-#: distinguishable with every kind of colour vision (Okabe and Ito, with the light colours darkened).
+#: Colours by their roles. No two are equal, and SVG files contain them literally, so that a page can replace them by
+#: its own variables. The colours of series have a contrast of at least 3 to white and to black, and are distinguishable
+#: with every kind of colour vision (Okabe and Ito, with the light colours darkened).
 PALETTE: Mapping[str, str] = {
     "paper": "#ffffff",
     "ink": "#24292f",
@@ -35,11 +35,11 @@ PALETTE: Mapping[str, str] = {
     "series-5": "#a6761d",
     "series-6": "#7a7a7a",
 }
-#: Colours of these roles on a dark page; all other colours are visible on light and dark pages.
+#: Colours of some roles on a dark page; the other colours are visible on light and dark pages.
 DARK: Mapping[str, str] = {"paper": "#0d1117", "ink": "#e6edf3", "muted": "#9198a1", "grid": "#30363d"}
 SERIES = tuple(colour for role, colour in PALETTE.items() if role.startswith("series"))
 
-#: Command that installs the packages of the extra ``plot``; valid in a checkout and for any release.
+#: Command that installs the packages of the extra ``plot``. It is valid in a checkout and for any release.
 INSTALLED_BY = "pip install matplotlib"
 
 #: Suffixes of files for figures.
@@ -96,7 +96,7 @@ def require_matplotlib() -> None:
 
 @contextmanager
 def _styled() -> Iterator[None]:
-    """Apply the settings of this module instead of those of the user within the block."""
+    """Context in which matplotlib has the settings of this module instead of those of the user."""
     require_matplotlib()
     import matplotlib as mpl
 
@@ -107,7 +107,7 @@ def _styled() -> Iterator[None]:
 
 
 def styled(draw: Callable[P, T]) -> Callable[P, T]:
-    """Decorate a function that draws or writes figures, so that it runs with `_styled`."""
+    """Decorate a function that draws or writes figures, so that it runs in `_styled`."""
 
     @wraps(draw)
     def drawn(*args: P.args, **kwargs: P.kwargs) -> T:
@@ -119,9 +119,9 @@ def styled(draw: Callable[P, T]) -> Callable[P, T]:
 
 @styled
 def save(figure: Figure, path: str | Path, origin: str = "") -> None:
-    """Write a figure to a file, PNG, SVG or PDF by its suffix; the bytes name phigen, and have no date or random id.
+    """Write a figure as PNG, SVG or PDF, by the suffix of the path; equal figures give equal bytes.
 
-    The text ``origin`` goes into its metadata.
+    The metadata name phigen and contain the text ``origin``, but no date.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
@@ -131,14 +131,14 @@ def save(figure: Figure, path: str | Path, origin: str = "") -> None:
 
 @styled
 def save_for_pages(figure: Figure, path: Path) -> None:
-    """Write an SVG file for a page in a browser: dark where the reader prefers dark pages."""
+    """Write an SVG file for web pages, with dark colours for readers who prefer dark pages."""
     write(path, in_both_themes(_rendered(figure, "svg").decode("utf-8")))
 
 
 def in_both_themes(svg_text: str) -> str:
-    """Replace the colours of an SVG file that depend on the theme by variables.
+    """Return the SVG text with variables in place of the colours that differ between light and dark pages.
 
-    Browsers choose the values by the reader's preference. Other programs do not support variables; files for them have
+    Browsers choose the values by the preference of the reader. Programs that do not support variables need files with
     literal colours.
     """
     for role in DARK:
@@ -152,7 +152,7 @@ def in_both_themes(svg_text: str) -> str:
 
 @styled
 def svg(figure: Figure) -> str:
-    """Return a figure as the text of an SVG file, without a background."""
+    """Return a figure as SVG text, without a background."""
     return _rendered(figure, "svg", transparent=True).decode("utf-8")
 
 
@@ -168,5 +168,5 @@ def _rendered(
 
 
 def _shortened(text: bytes) -> bytes:
-    """Round positions in an SVG file to a thousandth of a point, which saves bytes of long curves."""
+    """Round positions in an SVG file to a thousandth of a point, which makes long curves shorter."""
     return re.sub(rb"(?<=[ML ])(-?\d+\.\d{3})\d+", rb"\1", text)

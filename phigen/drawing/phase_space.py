@@ -1,4 +1,5 @@
-"""Trajectories in phase space: planes, space with the leaf of a Casimir, coordinates over time."""
+"""Drawings of trajectories in phase space: in planes, in space with the leaf of a Casimir, or as coordinates over
+time."""
 
 from __future__ import annotations
 
@@ -21,15 +22,15 @@ from phigen.symbolic.expression import Expression
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
-#: Largest number of coordinates drawn in separate panels; more coordinates are drawn as an image over time.
+#: Largest number of coordinates with separate panels; more coordinates are drawn as one image over time.
 MOST_COORDINATES = 24
-#: Rows are not joined by a line if the typical angle between successive chords exceeds the first limit, as the line
-#: would not show the orbit. The second limit is for long curves, whose chords cover the panel.
+#: Rows are not joined by a line if the typical angle between successive chords exceeds the first limit, since the line
+#: would not show the orbit. The second limit applies to long curves, whose chords would cover the panel.
 TURN, FINE_TURN = math.radians(40), math.radians(15)
-#: A curve is long if its length is this multiple of the size of its panel.
+#: Length, relative to the size of its panel, from which a curve is long.
 LONG = 60.0
-#: Elevation and azimuths of views of a panel in space, in degrees, the default first; number of bands of distance that
-#: fade towards the back.
+#: Elevation of the view in space, and azimuths to choose from with the default first, in degrees. Number of bands by
+#: distance from the viewer, in which a curve becomes paler towards the back.
 ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
 
 #: Fraction of a small panel that a box in space fills.
@@ -50,14 +51,14 @@ def height(coordinates: tuple[str, ...]) -> float:
 
 
 def draw_trajectory(figure: FigureBase, trajectory: Trajectory, casimirs: Mapping[str, Expression]) -> None:
-    """Draw all panels of a trajectory; non-finite rows are left out."""
+    """Draw all panels of a trajectory; rows that are not finite are left out."""
     finite = np.isfinite(trajectory.x).all(axis=1)
     t, x, names = trajectory.t[finite], trajectory.x[finite], trajectory.coordinates
     if len(names) > MOST_COORDINATES:
         _draw_image(figure, names, t, x)
         return
     rows, columns = grid(names)
-    zoom = 0.9 if columns < 3 else SMALL  # labels around the box do not shrink in small panels
+    zoom = 0.9 if columns < 3 else SMALL  # the labels around the box need more room in small panels
     start = dict(zip(names, x[0].tolist(), strict=True))
     for index, group in enumerate(groups(names), start=1):
         points = x[:, [names.index(name) for name in group]]
@@ -86,7 +87,7 @@ def draw_in_plane(axes: Any, names: Group, points: Floats) -> None:
 def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zoom: float) -> None:
     """Draw a curve (rows, 3), paler towards the back, with the net of its leaf and its first point."""
     box = around(leaf, box_of(points)) if leaf else box_of(points)
-    # All axes have the same unit of length, unless a coordinate would become too flat.
+    # All axes have the same scale, unless a coordinate would become too flat.
     size = box[1] - box[0]
     axes.set_box_aspect(size if size.max() < 2.2 * size.min() else (1, 1, 1), zoom=zoom)
     azimuth = _azimuth((points - points.mean(axis=0)) / size)
@@ -101,14 +102,14 @@ def draw_in_space(axes: Any, names: Group, points: Floats, leaf: Leaf | None, zo
         lines = [part for line in net(leaf, box) for part in (line, np.full((1, 3), np.nan))]
         if lines:
             _draw_faded(axes, box, towards, np.concatenate(lines), PALETTE["leaf"], 0.45, (0.2, 0.75), 1.0)
-    # For curves with many windings, bands would show the arbitrary ends of chords.
+    # A long curve has one shade: different shades of the bands would show where its chords happen to end.
     alphas = (0.3, 1.0) if _length(points) < LONG else (0.8, 0.8)
     _draw_faded(axes, box, towards, points, SERIES[0], _width(points), alphas, 1.5, joins(points))
     axes.plot(*points[0], "o", color=PALETTE["ink"], markersize=4, zorder=20)
 
 
 def _directions(azimuth: float) -> Floats:
-    """Return the directions to the right, up and towards the viewer, as rows."""
+    """Return the unit vectors to the right, upwards, and towards the viewer, as rows (3, 3)."""
     e, a = math.radians(ELEVATION), math.radians(azimuth)
     towards = np.array([math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e)])
     right = np.array([-math.sin(a), math.cos(a), 0.0])
@@ -116,8 +117,9 @@ def _directions(azimuth: float) -> Floats:
 
 
 def _azimuth(centred: Floats) -> float:
-    """Return the azimuth of a view that is not along the plane of the curve: the default, unless another is much
-    better.
+    """Return the azimuth of a view that does not look along the plane of the curve.
+
+    This is the default azimuth, unless another one shows a much larger area.
     """
     spread = centred.T @ centred
 
@@ -133,12 +135,12 @@ def _draw_faded(
     axes: Any, box: Floats, towards: Floats, points: Floats, colour: str, width: float,
     alphas: tuple[float, float], order: float, as_curve: bool = True,
 ) -> None:  # fmt: skip
-    """Draw points (rows, 3) as a curve, in bands by their distance from the viewer."""
+    """Draw points (rows, 3) as a curve in bands of equal colour, by their distance from the viewer."""
     centred = (points - box.mean(axis=0)) / (box[1] - box[0])
     depth = np.clip(centred @ towards / np.abs(towards).sum() * 2 + 0.5, 0, 1 - 1e-9)
     band = np.where(np.isfinite(depth), np.floor(depth * BANDS), -1)
     for level in range(BANDS):
-        # A band also contains the point after its last one, so that bands join without gaps.
+        # A band also contains the point after its last one, so that neighbouring bands join.
         in_band = band == level
         band_rows = in_band | np.r_[False, in_band[:-1]] if as_curve else in_band
         alpha = alphas[0] + (alphas[1] - alphas[0]) * level / (BANDS - 1)
@@ -150,7 +152,7 @@ def _draw_faded(
 def _draw_curve(
     axes: Any, points: Floats, colour: str, alpha: float, order: float, width: float, as_curve: bool
 ) -> None:
-    """Draw a line, or dots where the rows are too far apart for a line."""
+    """Draw points as a line; if ``as_curve`` is false, as dots."""
     if as_curve:
         axes.plot(*points.T, "-", color=colour, linewidth=width, alpha=alpha, zorder=order)
         return
@@ -162,12 +164,12 @@ def _draw_curve(
 
 
 def _width(points: Floats) -> float:
-    """Return the width of a line, smaller for longer lines."""
+    """Return the width of a line in points, which is smaller for longer lines."""
     return float(np.clip(1.5 * math.sqrt(LONG / 2 / max(_length(points), 1e-9)), 0.3, 1.5))
 
 
 def joins(points: Floats) -> bool:
-    """Return whether chords between the rows approximate the curve."""
+    """Return whether chords between the rows (rows, n) approximate the curve."""
     points = points[np.isfinite(points).all(axis=1)]
     size = np.ptp(points, axis=0) if len(points) else np.zeros(points.shape[1])
     chords = np.diff(points / np.where(size > 0, size, 1.0), axis=0)
@@ -196,7 +198,10 @@ def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
 
 
 def box_of(points: Floats) -> Floats:
-    """Return bounds (2, 3) around points with a margin; no direction is too flat, unless it has its own scale."""
+    """Return lower and upper bounds (2, 3) around points (rows, 3), with a margin.
+
+    A direction with little extent is widened, unless its values are so small that it has a scale of its own.
+    """
     low, high, largest = points.min(axis=0), points.max(axis=0), np.max(np.abs(points), axis=0)
     size = high - low
     comparable = largest > 0.01 * largest.max()

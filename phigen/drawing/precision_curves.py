@@ -1,4 +1,4 @@
-"""Plots of errors against step size and against computing time."""
+"""Plots of errors over step size and over computing time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MARKERS = "osD^vX"
 
 
 def draw_convergence(axes: Any, study: Study) -> None:
-    """Draw errors against step size with the observed orders, and a thin line of the order of the first method."""
+    """Draw errors over step size, labelled with observed orders, and a thin line of the order of the first method."""
     for index, curve in enumerate(study.curves):
         slope = f"slope {curve.slope:.2f}" if math.isfinite(curve.slope) else "slope unknown"
         _draw(axes, index, [p.step for p in curve.points], [p.error for p in curve.points], f"{label(curve)}: {slope}")
@@ -24,7 +24,7 @@ def draw_convergence(axes: Any, study: Study) -> None:
 
 
 def draw_work(axes: Any, study: Study) -> None:
-    """Draw errors of the solution against the seconds of a run."""
+    """Draw errors of the solution over the duration of a run in seconds."""
     for index, curve in enumerate(study.curves):
         _draw(axes, index, [p.seconds for p in curve.points], [p.error for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the solution at {study.clock} = {study.time:.4g}")
@@ -32,7 +32,7 @@ def draw_work(axes: Any, study: Study) -> None:
 
 
 def draw_conserved(axes: Any, study: Study) -> None:
-    """Draw the largest error of a Casimir against the seconds of a run."""
+    """Draw the largest error of a Casimir over the duration of a run in seconds."""
     for index, curve in enumerate(study.curves):
         _draw(axes, index, [p.seconds for p in curve.points], [p.casimirs for p in curve.points], label(curve))
     axes.set(xlabel="seconds of the run", title=f"relative error of the Casimirs at {study.clock} = {study.time:.4g}")
@@ -40,7 +40,7 @@ def draw_conserved(axes: Any, study: Study) -> None:
 
 
 def label(curve: PrecisionCurve) -> str:
-    """Return the name of the method with its stated order."""
+    """Return the name of a method with its order."""
     return f"{curve.label} (order {curve.order})"
 
 

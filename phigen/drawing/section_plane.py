@@ -1,4 +1,4 @@
-"""Plots of Poincaré sections: the crossings of a trajectory with a surface."""
+"""Plots of Poincaré sections: crossings of a trajectory through a surface."""
 
 from __future__ import annotations
 
@@ -13,17 +13,22 @@ from phigen.drawing.groups import phase_planes
 from phigen.drawing.palette import SERIES
 from phigen.symbolic.arrays import Floats
 
-#: A coordinate with less variation than this, relative to the largest, is treated as fixed by the section.
+#: Variation of a coordinate, relative to the largest variation, below which the section counts as fixing this
+#: coordinate.
 _CONSTANT = 1e-8
 
 
 def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
-    """Return the two columns (rows, names) to draw: if possible a conjugate pair without constant coordinates."""
+    """Return the indices of the two columns of ``points`` (rows, names) to draw.
+
+    These are a pair of conjugate coordinates without a constant one, if there is such a pair.
+    """
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
     varying = [name for name, is_constant in zip(names, constant, strict=True) if not is_constant]
     pairs = [moving for group in phase_planes(names) if len(moving := [n for n in group if n in varying]) >= 2]
-    # A closed orbit gives a single point; there a coordinate that is zero is probably the one fixed by the section.
+    # A closed orbit gives a single point, where all coordinates are constant. The section then probably fixes a
+    # coordinate that is 0.
     sizes = np.max(np.abs(points), axis=0, initial=0.0)
     by_size = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
     columns = (pairs[0] if pairs else [*varying, *by_size])[:2]
@@ -32,7 +37,7 @@ def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
 
 
 def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]) -> None:
-    """Draw each point (rows, names) of each section as a dot."""
+    """Draw the points (rows, names) of each section as dots."""
     point_sets = [points for points in sections.values() if len(points)]
     i, j = plane_of(names, np.concatenate(point_sets) if point_sets else np.empty((0, len(names))))
     for index, (label, points) in enumerate(sections.items()):
@@ -51,7 +56,7 @@ def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]
 
 
 def _widen(axes: Any) -> None:
-    """Widen the axes if all points agree up to rounding, so that rounding errors are not shown as a cloud."""
+    """Widen the axes if all points agree up to rounding, so that rounding errors do not fill the panel."""
     for kind in "xy":
         low, high = getattr(axes, f"get_{kind}lim")()
         middle, half_width = (low + high) / 2, (high - low) / 2

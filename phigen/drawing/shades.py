@@ -1,4 +1,4 @@
-"""Colour maps of values: diverging around 0 where the values have both signs, else from the least to the largest."""
+"""Colour maps: diverging around 0 for values of both signs, else from the least to the largest value."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 from phigen.symbolic.arrays import Floats
 
-#: Colour maps for values with both signs and for other values; the latter has no special colour for 0.
+#: Colour maps for values of both signs, and for other values.
 DIVERGING, SEQUENTIAL = "RdBu_r", "viridis"
 
 
 def bounds_of(values: Floats) -> tuple[float, float]:
-    """Return the ends of a scale of values, symmetric about 0 if the values have both signs."""
+    """Return the lower and upper end of a colour scale for values; symmetric about 0 if these have both signs."""
     least, largest = float(np.min(values)), float(np.max(values))
     if least < 0 < largest:
         return -max(-least, largest), max(-least, largest)
@@ -22,7 +22,7 @@ def bounds_of(values: Floats) -> tuple[float, float]:
 
 
 def shades_of(values: Floats, levels: int = 256) -> dict[str, Any]:
-    """Return a colour map with the given number of colours, and its bounds, as keyword arguments of matplotlib."""
+    """Return a colour map with ``levels`` colours, and the ends of its scale, as keyword arguments of matplotlib."""
     from matplotlib import colormaps
 
     low, high = bounds_of(values)

@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
     from phigen.runtime.spectra import Correlation, DynamicSpectrum
 
-#: Number of decades shown below the largest value; smaller values are leakage of the window and rounding errors.
+#: Number of decades that are shown below the largest value; smaller values are leakage of the window, and rounding.
 DECADES = 6
 
 
 @styled
 def spectrum_figure(spectrum: DynamicSpectrum, title: str) -> Figure:
-    """Return a figure of log S(q, ω) over q of the first axis and ω ≥ 0, at q = 0 of the other axes."""
+    """Return a figure of log S(q, ω) over ω ≥ 0 and q along the first axis; q = 0 along the other axes."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.6, 4.0), layout="constrained")
@@ -28,7 +28,7 @@ def spectrum_figure(spectrum: DynamicSpectrum, title: str) -> Figure:
 
 
 def draw_correlation(axes: Any, correlation: Correlation) -> None:
-    """Draw the correlation of two fields against the distance."""
+    """Draw the correlation of two fields over the distance."""
     axes.plot(np.arange(len(correlation.values)), correlation.values, ".-", linewidth=1.0)
     axes.axhline(0.0, color="0.6", linewidth=0.8)
     axes.set(

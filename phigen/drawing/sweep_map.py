@@ -1,4 +1,4 @@
-"""Figures of sweeps: curves and maps of stored results over the dimensions."""
+"""Figures of sweeps: stored results as curves or maps over the dimensions of the sweep."""
 
 from __future__ import annotations
 
@@ -15,23 +15,24 @@ from phigen.spec.names import KEPT
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Results other than observables, in the order in which the default to draw is chosen.
-_FIRST = ("lyapunov", "crossings", "energy_error", "casimir_error", "final")
+#: Results other than observables that are drawn by default, in the order of preference.
+_PREFERRED_RESULTS = ("lyapunov", "crossings", "energy_error", "casimir_error", "final")
 
-#: Values that span more than this factor are drawn on a logarithmic scale.
-_WIDE = 1e3
+#: Ratio of the largest to the smallest value above which a scale is logarithmic.
+_LOGARITHMIC_RATIO = 1e3
 
-#: Largest number of panels of a figure, and of panels side by side.
+#: Largest number of panels of a figure, and of panels in a row.
 _PANELS, _COLUMNS = 6, 3
 
-#: Marker of each curve of a family, so that curves differ without colours.
+#: Markers by which the curves of a panel differ, in addition to colours.
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
 def draw(store: Path, path: Path, requested: str | None = None, origin: str = "") -> None:
-    """Draw a variable of a store into a file; by default all kept observables, else the first other variable.
+    """Draw the variable ``requested`` of a store into a file; by default all observables, or else the first of
+    `_PREFERRED_RESULTS`.
 
-    The text ``origin`` goes into its metadata. Raises `FileError` if the store has no variable with this name.
+    The metadata of the file contain the text ``origin``. Raises `FileError` if the store has no such variable.
     """
     import xarray
 
@@ -40,9 +41,9 @@ def draw(store: Path, path: Path, requested: str | None = None, origin: str = ""
     with xarray.open_zarr(str(store), decode_cf=False) as data:
         plan = open_job(str(store)).plan
         observed = [word for word in plan.keep if word not in KEPT]
-        drawable = [name for name in (*observed, *_FIRST) if name in data]
+        drawable = [name for name in (*observed, *_PREFERRED_RESULTS) if name in data]
         if not drawable:
-            hint = f"keep one of {', '.join(_FIRST)}, or observables, in the sweep"
+            hint = f"keep one of {', '.join(_PREFERRED_RESULTS)}, or observables, in the sweep"
             raise FileError(f"{store} has nothing that can be drawn over the members\n  hint: {hint}")
         if requested and requested not in drawable:
             raise FileError(f"{store} has no {requested!r} to draw; it has {', '.join(drawable)}")
@@ -56,9 +57,9 @@ def draw(store: Path, path: Path, requested: str | None = None, origin: str = ""
 
 @styled
 def _figure(data: Any, names: Sequence[str], logarithmic: Set[str], varied: Set[str]) -> Figure:
-    """Return the figure of variables, one panel each; states have a panel for each coordinate.
+    """Return a figure with a panel for each variable; states have a panel for each coordinate.
 
-    ``varied`` names the variables in which members without a grid differ.
+    ``varied`` has the names of the quantities in which members without a grid differ.
     """
     from matplotlib.figure import Figure
 
@@ -67,7 +68,7 @@ def _figure(data: Any, names: Sequence[str], logarithmic: Set[str], varied: Set[
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(4.6 * columns, 3.8 * rows), layout="constrained")
     for axes, (title, values, errors) in zip(figure.subplots(rows, columns, squeeze=False).flat, panels, strict=False):
-        observed = values.name not in _FIRST
+        observed = values.name not in _PREFERRED_RESULTS
         subtitle = ""
         if values.dims == ("member",):
             _scatter(figure, axes, data, values, [n for n in data.data_vars if n in varied])
@@ -84,7 +85,7 @@ def _figure(data: Any, names: Sequence[str], logarithmic: Set[str], varied: Set[
 
 
 def _panels(data: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
-    """Yield title, values and standard errors, or None, of each panel of a variable."""
+    """Yield title, values, and standard errors or None, for each panel of a variable."""
     values = data[name]
     if "coordinate" not in values.dims:
         statistic, bracket, argument = name.partition("(")
@@ -100,11 +101,12 @@ def _panels(data: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors: Any, *, observed: bool) -> str:
-    """Draw curves or a map over the dimensions; return what the title says of errors and further dimensions.
+    """Draw values as curves or as a map; return a note on errors and further dimensions for the title.
 
-    Observables are curves over one dimension, or over two of which one has few values; with draws these are means with
-    standard errors over the draws. All other variables over two dimensions are maps, as are larger ones. The median is
-    taken over further dimensions, draws first.
+    Observables are drawn as curves over one dimension; a second dimension with few values gives several curves. If
+    there are draws of noise (dimension ``seed``), means over the draws are drawn with their standard errors. Other
+    variables over two dimensions, and observables with more curves, are drawn as maps. Over further dimensions the
+    median is taken.
     """
     note = " ± standard error" if errors is not None else ""
     if observed and panel.sizes.get("seed", 1) > 1 and len(panel.dims) > 1:
@@ -137,7 +139,7 @@ def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors
 
 
 def _curve(axes: Any, axis_dim: str, values: Any, errors: Any, colour: str, marker: str, label: str = "") -> None:
-    """Draw values over one dimension, with error bars if there are ``errors``."""
+    """Draw values over one dimension, with error bars unless ``errors`` is None."""
     style = {"color": colour, "linewidth": 1.2, "label": label or None}
     if errors is None:
         axes.plot(values[axis_dim], values, **style)
@@ -148,7 +150,7 @@ def _curve(axes: Any, axis_dim: str, values: Any, errors: Any, colour: str, mark
 
 
 def _edges(values: Any, *, logarithmic: bool) -> Any:
-    """Return the edges of cells around values: midpoints, or geometric midpoints on a logarithmic axis."""
+    """Return the edges of cells around coordinates: midpoints, or geometric means on a logarithmic axis."""
     positions = np.log(values) if logarithmic else values
     if len(positions) == 1:
         edges = positions[0] + np.array([-0.5, 0.5])
@@ -159,7 +161,7 @@ def _edges(values: Any, *, logarithmic: bool) -> Any:
 
 
 def _scatter(figure: Any, axes: Any, data: Any, panel: Any, names: Sequence[str]) -> None:
-    """Draw members without a grid as points over the first two quantities ``names`` in which they differ."""
+    """Draw members without a grid as points, over the first two quantities ``names`` in which they differ."""
     if len(names) < 2:
         axes.scatter(data[names[0]] if names else np.arange(panel.size), panel, s=4, color=SERIES[0])
         axes.set(xlabel=names[0] if names else "member")
@@ -170,7 +172,7 @@ def _scatter(figure: Any, axes: Any, data: Any, panel: Any, names: Sequence[str]
 
 
 def _colours(panel: Any) -> dict[str, Any]:
-    """Return the colour scale: logarithmic where values are positive and span a wide range. NaN is left out."""
+    """Return colour map and scale as keyword arguments: logarithmic for positive values that span a wide range."""
     from matplotlib.colors import LogNorm
 
     positive = _positive(panel)
@@ -178,11 +180,11 @@ def _colours(panel: Any) -> dict[str, Any]:
 
 
 def _positive(panel: Any) -> Any:
-    """Return the non-zero values if all of them are positive; else an empty array."""
+    """Return the finite values other than 0 if they are all positive; else an empty array."""
     values = np.asarray(panel)
     finite = values[np.isfinite(values) & (values != 0)]
     return finite if finite.size and finite.min() > 0 else finite[:0]
 
 
 def _is_wide(positive: Any) -> bool:
-    return bool(positive.size and positive.max() > _WIDE * positive.min())
+    return bool(positive.size and positive.max() > _LOGARITHMIC_RATIO * positive.min())

@@ -1,4 +1,4 @@
-"""Plot of error against computing time for all candidates of one tuning."""
+"""Plot of error over computing time for all candidates of a tuning."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from phigen.tuning.search import Curve
     from phigen.tuning.study import Tuning
 
-#: Larger errors are not drawn.
-_MOST = 1.0
+#: Largest error that is drawn.
+_LARGEST_ERROR = 1.0
 _MARKERS = "osD^vX"
 
 
@@ -48,12 +48,12 @@ def draw_tuning(axes: Any, tuning: Tuning) -> None:
 
 
 def _coordinates(curve: Curve, horizon: float) -> tuple[list[float], list[float]]:
-    points = [p for p in curve.points if p.error < _MOST]
+    points = [p for p in curve.points if p.error < _LARGEST_ERROR]
     return [1e-6 * p.cost * horizon for p in points], [p.error for p in points]
 
 
 def _basis(tuning: Tuning) -> str:
-    """Return a sentence about the measured part of the plot."""
+    """Return a sentence on the part of the run over which the errors were measured."""
     if tuning.piece > 0.99 * tuning.horizon:
         return "measured over all of it"
     best = tuning.winner

@@ -1,4 +1,4 @@
-"""Files of an FMU: sources, binaries and descriptions, in reproducible archives: equal contents give equal bytes."""
+"""The archive of an FMU with sources, binaries and descriptions; equal contents give equal bytes."""
 
 from __future__ import annotations
 
@@ -20,14 +20,15 @@ from phigen.runtime import toolchain
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
 
-#: Date of all files in an archive, so that the same contents give the same bytes: the earliest date of the zip format.
+#: Date of all files in an archive, for reproducible bytes: the earliest date of the zip format.
 _DATE = (1980, 1, 1, 0, 0, 0)
 _FILE, _PROGRAM = 0o100644 << 16, 0o100755 << 16
 
 
 @dataclass(frozen=True)
 class MockupUnit:
-    """An FMU: texts of its ``sources``, ``descriptions`` by version of FMI, and the ``build`` description of 3.0."""
+    """Contents of an FMU: the texts of the ``sources``, the ``descriptions`` by version of FMI, and the ``build``
+    description of FMI 3.0."""
 
     name: str
     sources: Mapping[str, str]
@@ -36,7 +37,7 @@ class MockupUnit:
 
 
 def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> MockupUnit:
-    """Return the FMU of a system; ``solver`` maps the names of its C header and source to their texts.
+    """Return the FMU of a system; ``solver`` has the texts of its C header and source by file name.
 
     Raises `SpecError` for lattices, and for a spec without runs.
     """
@@ -49,9 +50,10 @@ def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> MockupUnit:
 
 
 def binaries(unit: MockupUnit, platforms: Collection[str] = ()) -> dict[str, bytes]:
-    """Return the bytes of the shared library for each platform in ``platforms``; if empty, for each with a compiler.
+    """Return the shared library for each platform, as bytes by the name of the platform.
 
-    Raises `ToolchainError` if a compilation fails, or if a platform in ``platforms`` has no compiler.
+    Without ``platforms``, these are all platforms with a compiler. Raises `ToolchainError` if a compilation fails, or
+    if a named platform has no compiler.
     """
     available = compilers()
     unavailable = sorted(set(platforms) - set(available))
@@ -72,7 +74,7 @@ def binaries(unit: MockupUnit, platforms: Collection[str] = ()) -> dict[str, byt
 
 
 def archive(unit: MockupUnit, version: int, libraries: Mapping[str, bytes]) -> bytes:
-    """Return the bytes of the FMU for FMI 2 or 3."""
+    """Return the FMU for version 2 or 3 of FMI as bytes of a zip file."""
     contents: dict[str, bytes] = {"modelDescription.xml": unit.descriptions[version].encode()}
     for platform, library in libraries.items():
         platform_record = PLATFORMS[platform]
@@ -86,7 +88,7 @@ def archive(unit: MockupUnit, version: int, libraries: Mapping[str, bytes]) -> b
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as file:
         for path, data in contents.items():
             entry = zipfile.ZipInfo(path, _DATE)
-            entry.create_system = 3  # fixed, so that file permissions do not depend on the machine
+            entry.create_system = 3  # Unix, so that file permissions do not depend on this machine
             entry.external_attr = _PROGRAM if path.startswith("binaries/") else _FILE
             entry.compress_type = zipfile.ZIP_DEFLATED
             file.writestr(entry, data)

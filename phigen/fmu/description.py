@@ -17,11 +17,11 @@ from phigen.fmu.variables import Variable, first_run
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
 
-#: Vendor name of the annotations of phigen.
+#: Name of the vendor in annotations.
 VENDOR = "phigen"
 
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
-#: Capabilities of the solver that are stated as true, as attributes of each version of FMI.
+#: Capabilities that the solver has, as names of attributes in each version of FMI.
 _ABILITIES = {
     2: ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate"),
     3: (
@@ -38,7 +38,7 @@ _ABILITIES = {
 def model_description(
     compilation: Compilation, variables: Sequence[Variable], token: str, version: int, sources: Sequence[str]
 ) -> str:
-    """Return the text of ``modelDescription.xml`` for FMI 2 or 3; ``sources`` are the files to compile."""
+    """Return the text of ``modelDescription.xml`` for version 2 or 3 of FMI; ``sources`` are the files to compile."""
     spec = compilation.spec
     variables = [
         replace(v, unit=_without_control_characters(v.unit), description=_without_control_characters(v.description))
@@ -75,7 +75,7 @@ def model_description(
 
 
 def build_description(name: str, sources: Sequence[str]) -> str:
-    """Return the text of ``sources/buildDescription.xml``, of FMI 3."""
+    """Return the text of ``sources/buildDescription.xml`` for FMI 3.0."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=name)
     files = ET.SubElement(configuration, "SourceFileSet", language="C99")
@@ -88,9 +88,7 @@ def _co_simulation(root: ET.Element, compilation: Compilation, version: int, sou
     of_steps = ET.SubElement(root, "CoSimulation", modelIdentifier=compilation.spec.name)
     for ability in _ABILITIES[version]:
         of_steps.set(ability, "true")
-    if (
-        compilation.program.noise
-    ):  # a step with noise cannot be divided, as its parts would draw different random numbers
+    if compilation.program.noise:  # A step with noise cannot be divided: its parts would draw other random numbers.
         of_steps.set("canHandleVariableCommunicationStepSize", "false")
     if version == 2:
         of_steps.set("canNotUseMemoryManagementFunctions", "true")
@@ -100,9 +98,9 @@ def _co_simulation(root: ET.Element, compilation: Compilation, version: int, sou
 
 
 def _experiment(root: ET.Element, compilation: Compilation) -> None:
-    """Add the default experiment, which is that of `first_run`.
+    """Add the default experiment: start, end and step of `first_run`.
 
-    Steps of monitored systems are uniform in τ. The physical end time is then unknown, and only the start is stated.
+    With a monitor, steps are equal in τ, the end in physical time is unknown, and only the start is added.
     """
     run = first_run(compilation.spec)
     experiment = ET.SubElement(root, "DefaultExperiment", startTime=repr(float(run.start)))
@@ -112,7 +110,7 @@ def _experiment(root: ET.Element, compilation: Compilation) -> None:
 
 
 def _annotations(root: ET.Element, compilation: Compilation, version: int) -> None:
-    """Add annotations that identify the solver: its method, and the checksum of its spec."""
+    """Add annotations with the method of the solver and the checksum of its spec."""
     spec, facts = compilation.spec, ET.Element("method")
     facts.set("order", str(compilation.order.order))
     facts.set("scheme", str(compilation.described["scheme"]))
@@ -167,7 +165,7 @@ def _structure(root: ET.Element, variables: Sequence[Variable], version: int) ->
 
 
 def _without_control_characters(text: str) -> str:
-    """Return the text with spaces in place of line breaks and of characters that XML forbids."""
+    """Return the text with spaces in place of line breaks and of control characters, which XML forbids."""
     return " ".join(
         "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Cn", "Zl", "Zp") else c for c in text).split()
     )

@@ -13,7 +13,8 @@ from phigen.runtime.toolchain import Compiler
 
 @dataclass(frozen=True)
 class Platform:
-    """A platform: its folder in FMI 3.0 and in 2.0 ("" if 2.0 defines none), its target for zig, its file suffix."""
+    """Platform: its folder in FMUs of FMI 3.0 and 2.0 ("" if 2.0 defines none), its target for zig, and the suffix of
+    libraries."""
 
     folder: str
     folder_2: str
@@ -21,7 +22,7 @@ class Platform:
     suffix: str
 
 
-#: Platforms that zig compiles for without further packages. The version of glibc is old, so that the binaries also load
+#: Platforms for which zig compiles without further packages. The version of glibc is an old one, so that binaries load
 #: on older machines.
 PLATFORMS = {
     p.folder: p
@@ -35,11 +36,11 @@ PLATFORMS = {
     )
 }
 
-#: Without fused multiply-add, results differ between platforms only by their libm. Only the functions of FMI are
-#: exported, and debugging symbols are stripped.
+#: Flags of compilations. Without fused multiply-add, results on different platforms differ only by their libm. Only the
+#: functions of FMI are exported, and debugging symbols are removed.
 FLAGS = ("-ffp-contract=off", "-fvisibility=hidden", "-s")
 
-#: Limit of a compilation in seconds. The first one for a platform also builds zig's runtime libraries for it.
+#: Limit of a compilation in seconds, which includes the time in which zig first builds its libraries for a platform.
 TIMEOUT = 1200.0
 
 _PACKAGE = "ziglang"
@@ -53,9 +54,9 @@ def host() -> Platform | None:
 
 
 def compilers() -> dict[str, Compiler]:
-    """Return the compilers by platform: zig for all platforms if it is installed, else the C compiler of this machine.
+    """Return the compilers by platform: zig for all platforms if it is installed, else the C compiler for this machine.
 
-    Raises `ToolchainError` if CC names a compiler that does not work.
+    Raises `ToolchainError` if the compiler named in CC does not work.
     """
     if find_spec(_PACKAGE):
         zig = (sys.executable, "-m", _PACKAGE, "cc")

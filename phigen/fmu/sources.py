@@ -1,6 +1,6 @@
-"""C of an FMU: the solver as ``phigen build`` writes it, and the functions of FMI 2.0 and 3.0 that call it.
+"""C sources of an FMU: the solver as ``phigen build`` writes it, and the functions of FMI 2.0 and 3.0 that call it.
 
-The functions of FMI are in ``templates/c/runtime/fmu*.c``. This module prints the constants of a system for them.
+The functions of FMI are in ``templates/c/runtime/fmu*.c``; this module adds the constants of a system.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -> str:
-    """Return the text of ``NAME_fmi.c``, which includes ``NAME.h``."""
+    """Return the text of ``NAME_fmi.c``, the functions of FMI for the solver in ``NAME.h``."""
     program = compilation.program
     switches = runtime_of(program)[0].switches
     amalgam = Amalgam(program.name, switches, {"solver.h": "", "fmu_model.h": _model(compilation, variables, token)})
@@ -37,7 +37,8 @@ def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -
 
 
 def token_of(compilation: Compilation, files: dict[str, str]) -> str:
-    """Return the token that must agree between ``modelDescription.xml`` and a binary: a hash of the solver's source."""
+    """Return a token by which FMI checks that ``modelDescription.xml`` and a binary belong together: a hash of the
+    solver."""
     identity = "".join(files[name] for name in sorted(files)) + repr(first_run(compilation.spec))
     digest = hashlib.sha256(identity.encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

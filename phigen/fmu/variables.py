@@ -1,4 +1,4 @@
-"""Variables of an FMU, which the importing simulator reads and sets by number."""
+"""Variables of an FMU, which the simulator reads and sets by their numbers."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ POSITION = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of ``modelDescription.xml``.
+    """Variable in ``modelDescription.xml``.
 
-    ``number`` is its value reference, the same in FMI 2.0 and 3.0. ``start`` is its initial value, None if the solver
-    computes it. ``whole`` is true for an integer, ``positive`` for a lower bound of 0.
+    ``number`` is its value reference, the same in FMI 2.0 and 3.0. ``start`` is its initial value, or None if the
+    solver computes it. ``whole`` marks integers, and ``positive`` variables with lower bound 0.
     """
 
     name: str
-    causality: str  # independent, input, output, parameter
-    variability: str  # continuous, tunable, fixed
+    causality: str  # independent, input, output or parameter
+    variability: str  # continuous, tunable or fixed
     start: float | None = None
     description: str = ""
     unit: str = ""
@@ -38,21 +38,22 @@ class Variable:
 
     @property
     def initial(self) -> str:
-        """Return the attribute ``initial``, exact or calculated; empty for causalities that may not have it."""
+        """Return the value of the attribute ``initial``: exact or calculated, "" for causalities without this
+        attribute."""
         if self.causality in ("independent", "input"):
             return ""
         return "calculated" if self.start is None else "exact"
 
 
 def first_run(spec: Spec) -> Run:
-    """Return the run with the initial state, parameters and step of an FMU: the first one with a positive step.
+    """Return the first run with a positive step, which gives initial state, parameters and step of an FMU.
 
     Raises `SpecError` for lattices, and for a spec without such a run.
     """
     if spec.lattice:
         hint = "phigen show --expand SIZES prints a small lattice as an ordinary spec, of which there can be an FMU"
         raise SpecError(
-            [spec.diagnostic(("lattice",), f"an FMU of {spec.name}: not for lattices in this version", hint)]
+            [spec.diagnostic(("lattice",), f"{spec.name} is a lattice, for which there are no FMUs yet", hint)]
         )
     if not spec.runs:
         message = f"an FMU of {spec.name} needs initial values and a step, and the spec has no runs"
@@ -67,13 +68,14 @@ def first_run(spec: Spec) -> Run:
 
 
 def variables_of(compilation: Compilation) -> tuple[Variable, ...]:
-    """Return all variables by value reference (0, 1, …), grouped by kind as `first_numbers` counts them."""
+    """Return all variables in the order of their numbers 0, 1, …, grouped by kind as in `first_numbers`."""
     all_variables = chain.from_iterable(_kinds(compilation).values())
     return tuple(replace(variable, number=k) for k, variable in enumerate(all_variables))
 
 
 def first_numbers(compilation: Compilation) -> dict[str, int]:
-    """Return the number of the first variable of each kind. An absent kind has the number of the next kind."""
+    """Return the number of the first variable of each kind; for a kind without variables, the number of the next
+    kind."""
     numbers, number = {}, 0
     for kind, variables_of_kind in _kinds(compilation).items():
         numbers[kind] = number
@@ -132,7 +134,7 @@ def _seed(program: Program, run: Run) -> Iterator[Variable]:
 
 
 def _attitude(program: Program) -> Iterator[Variable]:
-    """Yield the entries of the attitude, which starts as the identity."""
+    """Yield the entries of the attitude, which is the identity at the start."""
     if not program.attitude:
         return
     rows = program.attitude.group.rows
@@ -144,7 +146,7 @@ def _attitude(program: Program) -> Iterator[Variable]:
 
 
 def _position(program: Program) -> Iterator[Variable]:
-    """Yield the position of a body that also moves, which starts at 0."""
+    """Yield the position of a body with an attitude and a position; it is 0 at the start."""
     if program.attitude and program.attitude.group.translation:
         for name in POSITION:
             yield Variable(f"position.{name}", "output", "continuous", 0.0, "position of the body in space")

@@ -1,1 +1,1 @@
-"""Gauss collocation: its coefficients, and the algebras through which it becomes an exact Poisson map."""
+"""Gauss collocation: its coefficients, and the algebras by which its step becomes an exact Poisson map."""

@@ -1,13 +1,15 @@
 """Star algebras of simple Lie algebras without known matrices, as quotients of their universal enveloping algebras.
 
-For sl(n), so(n), sp(2n) and their real forms A = K ⊕ g ⊕ S ⊕ Z: K is spanned by 1, S is a module of symmetric elements
-that the anticommutators ab + ba span with 1, and Z is spanned by a central skew element, for sl(n) and su(n) only. S is
-an eigenspace of the Casimir operator on Sym² g. Products by elements of g are, for a, b in g and f in S,
+For sl(n), so(n), sp(2n) and their real forms, A = K ⊕ g ⊕ S ⊕ Z. Here K is spanned by 1. S is a module of symmetric
+elements such that all anticommutators ab + ba are in K ⊕ S. Z is spanned by a central skew element z, and is only
+needed for sl(n) and su(n). S is an eigenspace of the Casimir operator on Sym² g. The products of elements of g with a,
+b in g and f in S are
 
     ab = ½[a, b] + c κ(a, b) + σ(a, b),    af = ½ a▷f + μ τ(a, f) + ν ⟨a, f⟩ z,    az = ι(a),
 
-with the Killing form κ, the projection σ on S, its transpose τ, and an isomorphism ι of g and S. That these represent g
-gives linear equations for c, μ and ν. All products follow from those by g. gl(n) and u(n) are sl(n) and su(n) with z.
+where κ is the Killing form, σ the projection on S, τ its transpose, and ι an isomorphism of g and S. The condition that
+these products represent g gives linear equations for c, μ and ν. All other products follow from them. gl(n) and u(n)
+are sl(n) and su(n) with z.
 """
 
 from __future__ import annotations
@@ -25,16 +27,20 @@ from phigen.gauss.star_algebra import StarAlgebra, Vector
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.symbolic.tower import rational
 
-#: Largest dimension of the Lie algebra, that of sp(6): larger ones have an A above the limit.
+#: Largest dimension of the Lie algebra, that of sp(6); for larger ones, A has more than MOST_UNKNOWNS dimensions.
 MOST_SIMPLE = 21
 
 #: Largest number of terms in the table of products. The bases of `named` algebras, permuted and scaled, have up to
-#: 1,700; the 4,000 of so(5) in a dense basis make 120,000 operations of a tangent of a stage, which programs refuse.
+#: 1,700. so(5) in a dense basis has 4,000, which make 120,000 operations in the tangent map of a stage, more than
+#: programs may have.
 MOST_TERMS = 2000
 
 
 def enveloping(lie: LieAlgebra) -> StarAlgebra | None:
-    """Return the algebra A of a simple Lie algebra, or of the sum of one and a one-dimensional centre, or None."""
+    """Return the algebra A of a simple Lie algebra, or of the sum of a simple and a one-dimensional algebra.
+
+    Returns None if there is none, or if it exceeds the limits.
+    """
     field, m = lie.field, lie.dimension
     if not field.is_rational or m > MOST_SIMPLE:
         return None
@@ -85,7 +91,10 @@ def _kernel(a: fmpq_mat) -> list[list[fmpq]]:
 
 
 def _derived_and_centre(ad: Sequence[fmpq_mat], m: int) -> tuple[fmpq_mat, fmpq_mat, int] | None:
-    """Return a basis of [g, g] and of the centre as rows, its inverse, and dim [g, g]; None if these do not span g."""
+    """Return a basis of [g, g] and the centre as rows, its inverse, and dim [g, g].
+
+    Returns None if [g, g] and the centre do not span g, or if the centre has more than one dimension.
+    """
     brackets = fmpq_mat(m * m, m, [ad[i][k, j] for i in range(m) for j in range(m) for k in range(m)])
     reduced, rank = brackets.rref()
     centre = _kernel(fmpq_mat(m * m, m, [ad[i][k, j] for k in range(m) for j in range(m) for i in range(m)]))
@@ -104,7 +113,7 @@ def _unit_rows(m: int) -> list[list[fmpq]]:
 
 
 def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: int, simple: int) -> fmpq_mat:
-    """Return the adjoint matrix of a basis element of [g, g] in the basis of [g, g]."""
+    """Return ad of basis element ``k`` of [g, g], as a matrix in the basis of [g, g]."""
     m = len(ad)
     total = _matrix(m, m)
     for i in range(m):
@@ -114,7 +123,7 @@ def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: i
 
 
 def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
-    """Yield the modules S that the algebra may have by its dimension, those of the smallest A first."""
+    """Yield the modules S that are possible for the dimension of g, in the order of the size of A."""
     m = len(ad)
     form = fmpq_mat(m, m, [_trace(a * b) for a in ad for b in ad])
     if m < 8 or form.det() == 0:
@@ -125,10 +134,11 @@ def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
         eigenvalues.append((m, Fraction(1), True))  # sl(n): symmetric products without trace
     n = (1 + isqrt(1 + 8 * m)) // 2
     if n * (n - 1) == 2 * m and not centre:
-        eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices
+        eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices without trace
     n = (isqrt(1 + 8 * m) - 1) // 4
     if n * (2 * n + 1) == m and not centre:
-        eigenvalues.append((n * (2 * n - 1) - 1, Fraction(n, n + 1), False))  # sp(2n)
+        # sp(2n): the analogue of symmetric matrices
+        eigenvalues.append((n * (2 * n - 1) - 1, Fraction(n, n + 1), False))
     for size, eigenvalue, central in sorted(eigenvalues):
         if 1 + m + size + central > MOST_UNKNOWNS:
             continue
@@ -142,10 +152,14 @@ def _trace(a: fmpq_mat) -> fmpq:
 
 
 def _eigenspace(ad: Sequence[fmpq_mat], form: fmpq_mat, eigenvalue: Fraction) -> list[fmpq_mat]:
-    """Return a basis of the symmetric tensors with this eigenvalue of the Casimir operator, 1 on g."""
+    """Return a basis of the symmetric tensors that belong to an eigenvalue of the Casimir operator.
+
+    The operator is normalised so that its eigenvalue on g is 1.
+    """
     m = len(ad)
     flat = fmpq_mat(m * m, m, [ad[a][i, p] for i in range(m) for p in range(m) for a in range(m)])
-    crossed = flat * form.inv() * flat.transpose()  # Σ κ^ab ad_a ⊗ ad_b, at (i, p), (j, q)
+    # the matrix of Σ κ^ab ad_a ⊗ ad_b, with pairs (i, p) as rows and (j, q) as columns
+    crossed = flat * form.inv() * flat.transpose()
     pairs = [(i, j) for i in range(m) for j in range(i + 1)]
     half = _number((eigenvalue - 2) / 2)
     matrix = _matrix(len(pairs), len(pairs))
@@ -166,7 +180,10 @@ def _eigenspace(ad: Sequence[fmpq_mat], form: fmpq_mat, eigenvalue: Fraction) ->
 
 @dataclass(frozen=True)
 class _Module:
-    """The module S of a simple Lie algebra: symmetric tensors; with ``central`` A has the element z."""
+    """The module S of a simple Lie algebra, as symmetric ``tensors``; ``central`` says that A has the element z.
+
+    ``ad`` are the adjoint matrices of g, and ``form`` is the Killing form.
+    """
 
     ad: Sequence[fmpq_mat]
     form: fmpq_mat
@@ -175,11 +192,14 @@ class _Module:
 
     @property
     def size(self) -> int:
-        """The dimension of A."""
+        """The dimension of A = K ⊕ g ⊕ S ⊕ Z."""
         return 1 + len(self.ad) + len(self.tensors) + self.central
 
     def products(self) -> list[fmpq_mat] | None:
-        """Return the matrices of left multiplication by the basis of A = K ⊕ g ⊕ S ⊕ Z, or None."""
+        """Return the matrices of left multiplication by the basis elements of A = K ⊕ g ⊕ S ⊕ Z.
+
+        Returns None if c, μ, ν or ι do not exist.
+        """
         m, d = len(self.ad), len(self.tensors)
         lowered = [self.form * s * self.form for s in self.tensors]
         flat = fmpq_mat(d, m * m, [q[i, j] for q in lowered for i in range(m) for j in range(m)])
@@ -188,7 +208,8 @@ class _Module:
         action = [self._action(a, lowered, extract) for a in self.ad]
         metric = fmpq_mat(d, d, [_trace(q * s) for q in lowered for s in self.tensors]).inv()
         raised = [s * self.form for s in self.tensors]
-        right_factors = [_combination(raised, [metric[k, k2] for k in range(d)]) for k2 in range(d)]  # τ(·, f_l)
+        # the matrices of τ(·, f_l) for the basis f_l of S
+        right_factors = [_combination(raised, [metric[k, k2] for k in range(d)]) for k2 in range(d)]
         iota = _isomorphism(self.ad, action) if self.central else None
         if self.central and iota is None:
             return None
@@ -199,7 +220,7 @@ class _Module:
         return self._completed(left, lowered, factors, iota)
 
     def _action(self, a: fmpq_mat, lowered: Sequence[fmpq_mat], extract: fmpq_mat) -> fmpq_mat:
-        """Return the matrix of a basis element of g on S."""
+        """Return the matrix by which a basis element of g acts on S."""
         m, d = a.nrows(), len(lowered)
         images = [a.transpose() * q + q * a for q in lowered]
         return fmpq_mat(d, m * m, [e[i, j] for e in images for i in range(m) for j in range(m)]) * extract
@@ -211,9 +232,12 @@ class _Module:
         right_factors: Sequence[fmpq_mat],
         iota: fmpq_mat | None,
     ) -> tuple[fmpq, fmpq, fmpq] | None:
-        """Return c, μ, ν, from the equations on a few elements: the axioms of A are decided afterwards."""
+        """Return c, μ, ν from the equations for a few elements of g; None if these have no solution.
+
+        The axioms of A are decided later.
+        """
         m, d, rows = len(self.ad), len(self.tensors), list[list[fmpq]]()
-        pairing = None if iota is None else self.form * iota.inv()  # ⟨a, f⟩ with ⟨a, ι(b)⟩ = κ(a, b)
+        pairing = None if iota is None else self.form * iota.inv()  # the pairing with ⟨a, ι(b)⟩ = κ(a, b)
         for a, b in ((0, 1), (1, 2), (0, m - 1)):
             bracket = [self.ad[a][k, b] for k in range(m)]
             twice = _combination(self.ad, bracket)
@@ -249,7 +273,7 @@ class _Module:
         right_factors: Sequence[fmpq_mat],
         iota: fmpq_mat | None,
     ) -> fmpq_mat:
-        """Return the matrix of left multiplication by an element of g."""
+        """Return the matrix of left multiplication by basis element ``a`` of g."""
         m, d, (c, mu, nu) = len(self.ad), len(self.tensors), factors
         left = _matrix(self.size, self.size)
         left[1 + a, 0] = fmpq(1)
@@ -279,7 +303,10 @@ class _Module:
         factors: tuple[fmpq, fmpq, fmpq],
         iota: fmpq_mat | None,
     ) -> list[fmpq_mat] | None:
-        """Return the left multiplications by all of A: those by S and z are combinations of products of g."""
+        """Return the matrices of left multiplication by all basis elements of A, given those of g.
+
+        Elements of S and z are combinations of products of elements of g. Returns None if these products do not span S.
+        """
         m, d, size = len(self.ad), len(self.tensors), self.size
         identity = fmpq_mat(size, size, [fmpq(int(i == j)) for i in range(size) for j in range(size)])
         pairs = [(a, b) for a in range(m) for b in range(a + 1)]
@@ -289,7 +316,7 @@ class _Module:
             return None
         square = fmpq_mat(d, d, [values[k, c] for k in range(d) for c in pivot_rows])
         symmetric = []
-        for c in pivot_rows:  # σ(a, b) = ½(ab + ba) − c κ(a, b)
+        for c in pivot_rows:  # σ(a, b) = ½(ab + ba) − c κ(a, b), as a matrix of left multiplication
             a, b = pairs[c]
             product = left[a] * left[b] + left[b] * left[a]
             symmetric.append(product * fmpq(1, 2) - identity * (factors[0] * self.form[a, b]))
@@ -303,7 +330,10 @@ class _Module:
     def _centre(
         self, left: Sequence[fmpq_mat], by_module: Sequence[fmpq_mat], factors: tuple[fmpq, fmpq, fmpq], iota: fmpq_mat
     ) -> fmpq_mat:
-        """Return the left multiplication by z, from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z) for some a and f."""
+        """Return the matrix of left multiplication by z.
+
+        It follows from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z) for any a and f with ⟨a, f⟩ ≠ 0.
+        """
         m, d, pairing = len(self.ad), len(self.tensors), self.form * iota.inv()
         a, f = next((a, f) for a in range(m) for f in range(d) if pairing[a, f] != 0)
         anticommutator = (left[a] * by_module[f] + by_module[f] * left[a]) * fmpq(1, 2)
@@ -312,7 +342,7 @@ class _Module:
 
 
 def sum_of(matrices: Sequence[fmpq_mat], factors: Sequence[fmpq], column: int, rows: int) -> list[fmpq]:
-    """Return a column of Σ_k factors[k]·matrices[k]."""
+    """Return column ``column`` of Σ_k factors[k]·matrices[k], whose matrices have ``rows`` rows."""
     nonzero_terms = [(m, f) for m, f in zip(matrices, factors, strict=True) if f != 0]
     return [sum((m[i, column] * f for m, f in nonzero_terms), fmpq(0)) for i in range(rows)]
 
@@ -326,7 +356,7 @@ def _combination(matrices: Sequence[fmpq_mat], factors: Sequence[fmpq]) -> fmpq_
 
 
 def _pivots(a: fmpq_mat) -> list[int]:
-    """Return columns that span the column space."""
+    """Return the indices of columns that form a basis of the column space."""
     reduced, rank = a.rref()
     pivots: list[int] = []
     for j in range(a.ncols()):
@@ -336,7 +366,8 @@ def _pivots(a: fmpq_mat) -> list[int]:
 
 
 def _isomorphism(ad: Sequence[fmpq_mat], action: Sequence[fmpq_mat]) -> fmpq_mat | None:
-    """Return an invertible matrix ι with D_x ι = ι ad_x for all x, or None."""
+    """Return an invertible matrix ι with D_x ι = ι ad_x for all x, where D_x is the action of x on S; None if there is
+    none."""
     m, d = len(ad), action[0].nrows()
     rows: list[fmpq] = []
     for weights in ([fmpq(1 + k % 3) for k in range(m)], [fmpq(1 - 2 * (k % 2) + k) for k in range(m)]):
@@ -359,7 +390,10 @@ def _isomorphism(ad: Sequence[fmpq_mat], action: Sequence[fmpq_mat]) -> fmpq_mat
 def _assembled(
     lie: LieAlgebra, module: _Module, left: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat
 ) -> StarAlgebra:
-    """Return the star algebra; rows of ``basis`` are elements of [g, g], then that of the centre, if there is one."""
+    """Return the star algebra in the basis K, g, S, Z.
+
+    The rows of ``basis`` are elements of [g, g], followed by that of the centre if there is one.
+    """
     field, size, simple, m = lie.field, module.size, len(module.ad), lie.dimension
 
     def vector(entries: Sequence[fmpq]) -> Vector:
@@ -368,7 +402,8 @@ def _assembled(
     table = {(i, j): vector([left[i][k, j] for k in range(size)]) for i in range(size) for j in range(size)}
     skew = {*range(1, 1 + simple), *([size - 1] if module.central else [])}
     star = [{k: -field.one if k in skew else field.one} for k in range(size)]
-    row_numbers = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]  # of the rows of the basis
+    # positions in A of the rows of ``basis``
+    row_numbers = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]
     elements = [{row_numbers[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
     functional: list[Vector] = [{} for _ in range(size)]
     for r, row_number in enumerate(row_numbers):

@@ -1,8 +1,10 @@
-"""Brackets that are constant in the logarithms of some coordinates: log-canonical ones, those of Toda chains.
+"""Brackets that are constant in the logarithms of some coordinates, such as those of Lotka–Volterra systems and Toda
+chains.
 
-If {x_i, x_j} = c_ij x_i^e_i x_j^e_j with constant c_ij and e_i = 0 or 1, the brackets of the log |x_i| with e_i = 1,
-and of the other x_i, are constant. A Gauss method with these as its unknowns is a Poisson map. A step multiplies x_i by
-the exponential of an increment: signs stay, and 0 stays 0.
+Suppose {x_i, x_j} = c_ij x_i^e_i x_j^e_j with constant c_ij and e_i = 0 or 1. Then the brackets of the log |x_i| with
+e_i = 1 and of the other x_i are constant. A Gauss method whose unknowns are these logarithms and coordinates is a
+Poisson map. A step multiplies each x_i with e_i = 1 by the exponential of an increment, so signs do not change, and 0
+stays 0.
 """
 
 from __future__ import annotations
@@ -12,12 +14,13 @@ from collections.abc import Sequence
 from phigen.geometry.shapes import Matrix, coordinate_terms
 from phigen.symbolic.expression import Expression, symbol
 
-#: Brackets divided by coordinates: {x_i, x_j}/x_i by the pair (i, j).
+#: {x_i, x_j}/x_i by the pair (i, j).
 Rates = dict[tuple[int, int], Expression]
 
 
 def logarithmic(coordinates: Sequence[str], poisson: Matrix) -> Rates | None:
-    """Return {log x_i, x_j} by (i, j), for all x_i whose logarithms make brackets constant; None if none do so."""
+    """Return the brackets {log x_i, x_j} = {x_i, x_j}/x_i by (i, j), for all i with e_i = 1; None if no choice of e_i
+    exists."""
     pairs = [(i, j) for i, row in enumerate(poisson) for j in range(i) if not row[j].is_zero]
     terms = coordinate_terms(coordinates, [poisson[i][j] for i, j in pairs])
     if terms is None:

@@ -1,8 +1,9 @@
-"""Star algebras of matrices, for matrix Lie algebras that preserve a bilinear form, and for others at twice the size.
+"""Star algebras of matrix Lie algebras.
 
-If the matrices ρ(e) are skew for an invertible form B, ρᵀB + Bρ = 0, the associative algebra that they generate with
-1 has the involution a ↦ B⁻¹aᵀB. If there is no such form, ρ ⊕ −ρᵀ has the form that pairs the two halves. So so(n),
-so(p, q) and sp(2n) need n² or 4n² unknowns, su(n), sl(n) and gl(n) 2n².
+Let ρ(e) be the matrices of a Lie algebra. If they are skew for an invertible form B, ρᵀB + Bρ = 0, the associative
+algebra that they generate together with 1 has the involution a ↦ B⁻¹aᵀB. If there is no such form, ρ ⊕ −ρᵀ has one,
+which pairs the two halves. So the number of unknowns is at most n² or 4n² for so(n), so(p, q) and sp(2n), and 2n² for
+su(n), sl(n) and gl(n).
 """
 
 from __future__ import annotations
@@ -16,12 +17,13 @@ from phigen.geometry.linear import Span, add_multiple, kernel
 from phigen.geometry.matrix_algebras import product
 from phigen.geometry.representations import known_representation
 
-#: Largest dimension of an algebra: operations of a sweep at a stage grow as the third power of its square root.
+#: Largest dimension of a star algebra. The operations of a sweep at a stage grow as the third power of the square root
+#: of the dimension.
 MOST_UNKNOWNS = 36
 
 
 def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
-    """Return the algebra of a Lie algebra that is known by matrices with rational entries, or None."""
+    """Return the star algebra of a Lie algebra with known matrices of rational entries; None for other Lie algebras."""
     representation, field = known_representation(lie), lie.field
     if not field.is_rational:
         return None
@@ -31,7 +33,7 @@ def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
             if representation
             else _affine(lie)
         )
-    except KeyError:  # entries with parameters
+    except KeyError:  # entries contain parameters
         return None
     if not matrices:
         return None
@@ -46,10 +48,11 @@ def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
 
 
 def _affine(lie: LieAlgebra) -> list[SparseMatrix]:
-    """Return affine maps of an abelian ideal, the radical of the Killing form; none if there is no such ideal.
+    """Return matrices of affine maps that represent the Lie algebra on an abelian ideal; [] if there is none.
 
-    With a complement, which the linear map π onto the ideal has as its kernel, X becomes the matrix of ad X on the
-    ideal with the column π(X).
+    The ideal is the radical of the Killing form. Let π be a linear map of g onto the ideal, the identity on the ideal,
+    whose kernel is a complement. Then X is represented by the matrix of ad X on the ideal with the additional column
+    π(X).
     """
     m, field = lie.dimension, lie.field
     ad = [{(k, j): field.convert(c) for j in range(m) for k, c in lie.bracket(i, j).items()} for i in range(m)]
@@ -74,7 +77,10 @@ def _affine(lie: LieAlgebra) -> list[SparseMatrix]:
 
 
 def _projection(lie: LieAlgebra, ideal: Sequence[Vector], action: Sequence[SparseMatrix]) -> Vector | None:
-    """Return π, at k·m + i, with π = 1 on the ideal and π([X, Y]) = X π(Y) − Y π(X); None if there is none."""
+    """Return π as a vector with entry k·m + i in row k and column i; None if there is none.
+
+    π is the identity on the ideal, and π([X, Y]) = X π(Y) − Y π(X).
+    """
     m, size, field = lie.dimension, len(ideal), lie.field
     last = size * m
     rows: list[Vector] = []
@@ -113,14 +119,14 @@ def _transposed(a: SparseMatrix) -> SparseMatrix:
 
 
 def _doubled(a: SparseMatrix, n: int, field: Field) -> SparseMatrix:
-    """Return a ⊕ −aᵀ."""
+    """Return a ⊕ −aᵀ for a matrix a with n rows."""
     return {**a, **{(n + j, n + i): -v for (i, j), v in a.items()}}
 
 
 def _form(matrices: Sequence[SparseMatrix], n: int, field: Field) -> SparseMatrix | None:
-    """Return an invertible form B, symmetric or skew, with mᵀB + Bm = 0 for all matrices.
+    """Return an invertible form B, symmetric or skew, with mᵀB + Bm = 0 for all matrices m.
 
-    None if the basis of all such forms contains none.
+    Returns None if no element of a basis of these forms has an invertible symmetric or skew part.
     """
     rows: list[dict[int, Scalar]] = []
     for m in matrices:
@@ -153,7 +159,10 @@ def _inverse(a: SparseMatrix, n: int, field: Field) -> SparseMatrix | None:
 
 
 def _hull(generators: Sequence[SparseMatrix], n: int, field: Field) -> list[SparseMatrix]:
-    """Return a sparse basis of the associative algebra that matrices generate; empty if that is too large."""
+    """Return a sparse basis of the associative algebra that the generators span with their products.
+
+    Returns [] if its dimension exceeds MOST_UNKNOWNS.
+    """
     basis: list[SparseMatrix] = []
     pending = list(generators)
     while pending:
@@ -197,9 +206,10 @@ def _functional(
     basis: Sequence[Vector],
     field: Field,
 ) -> list[Vector] | None:
-    """Return x̃ at the basis.
+    """Return the functional x̃ at each basis element of the hull, as a linear form in x; None if there is none.
 
-    x̃ vanishes on symmetric elements, and on skew elements orthogonal to g by the trace of products, if there are any.
+    x̃ vanishes on symmetric elements, and on the skew elements that are orthogonal to g with respect to the trace of
+    products.
     """
     half = field.one / field.number(2)
     skew: list[Vector] = []
@@ -213,10 +223,10 @@ def _functional(
         part = {i: half}
         add_multiple(part, star[i], half)
         symmetric.append(part)
-    # the traces and the projection on symmetric elements vanish on skew elements orthogonal to g
+    # linear equations for elements that are skew and orthogonal to g
     rows = [{i: v[k] for i, v in enumerate(symmetric) if k in v} for k in range(len(hull))]
     solutions = kernel(field, [*traces, *(r for r in rows if r)], len(hull))
-    if Span(field, skew).dimension == len(basis):  # g is all of them, as that of se(n)
+    if Span(field, skew).dimension == len(basis):  # all skew elements are in g, as for se(n)
         solutions = []
     span = Span(field, [*basis, *solutions])
     if span.dimension < len(basis) + len(solutions):

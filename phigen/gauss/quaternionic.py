@@ -1,9 +1,11 @@
-"""The associative algebra A of a Lie algebra g: quaternions over a commutative algebra, with g as skew elements.
+"""Star algebras of quaternionic type: quaternions over a commutative algebra K, with the Lie algebra g as skew
+elements.
 
-A = K ⊕ g with ab = β(a, b) + ½[a, b] on g, where K commutes with all elements. A exists if [[a, b], c] = 4(β(b, c)a −
-β(a, c)b) for a symmetric β whose values are maps that commute with the bracket; K is spanned by the identity and
-these maps. For so(3) these are the quaternions, for sl(2) the 2×2 matrices, for so(3,1) and se(3) quaternions with
-complex and dual coefficients; Heisenberg algebras have β = 0, and so(4) is two copies of so(3).
+A = K ⊕ g with ab = β(a, b) + ½[a, b] for a, b in g, where K commutes with all elements. A exists if there is a
+symmetric β, whose values are linear maps of g that commute with the bracket, with [[a, b], c] = 4(β(b, c)a − β(a, c)b).
+K is spanned by the identity and these maps. For so(3), A are the quaternions; for sl(2), the 2×2 matrices; for so(3,1)
+and se(3), quaternions with complex and dual coefficients. Heisenberg algebras have β = 0, and so(4) gives two copies of
+so(3).
 """
 
 from __future__ import annotations
@@ -19,15 +21,15 @@ from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.linear import Span, add_multiple, kernel
 from phigen.symbolic.tower import rational
 
-#: A linear map of g, as entries (row, column).
+#: Linear map of g: its entries by (row, column).
 Map = dict[tuple[int, int], Scalar]
 
-#: Largest dimension of a Lie algebra; the unknowns of the linear equations for β grow as its third power.
+#: Largest dimension of a Lie algebra. The number of unknowns in the linear equations for β grows as its third power.
 MOST_QUATERNIONIC = 12
 
 
 def quaternionic(algebra: LieAlgebra) -> StarAlgebra | None:
-    """Return the algebra A of a Lie algebra, or None."""
+    """Return the algebra A of a Lie algebra; None if there is none, or if the Lie algebra is too large."""
     m, field = algebra.dimension, algebra.field
     if m > MOST_QUATERNIONIC:
         return None
@@ -42,7 +44,7 @@ def quaternionic(algebra: LieAlgebra) -> StarAlgebra | None:
 
 
 def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
-    """Return a basis of the linear maps φ with φ[a, b] = [φa, b], as entries (row, column), the identity first."""
+    """Return a basis of the linear maps φ of g with φ[a, b] = [φa, b]; the identity is the first."""
     m = len(ad)
     rows: list[dict[int, Scalar]] = []
     for i in range(m):
@@ -62,13 +64,16 @@ def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
 
 
 def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> dict[tuple[int, int], Map] | None:
-    """Return β(e_i, e_j) for all i, j, as maps, or None."""
+    """Return β(e_i, e_j) by (i, j), as linear maps of g; None if β does not exist."""
     m, count = len(ad), len(maps)
     pair_numbers = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(m) for j in range(i + 1))}
     four, last = field.number(4), len(pair_numbers) * count
 
     def unknowns(i: int, j: int, component: int, sign: Scalar) -> Iterator[tuple[int, dict[int, Scalar]]]:
-        """Yield the components of sign·4·β(e_i, e_j)(e_of) in the unknown coefficients of the maps."""
+        """Yield the coefficients of the unknowns in each component of sign·4·β(e_i, e_j)e_c, where c is ``component``.
+
+        The unknowns are the coefficients of β(e_i, e_j) in the basis ``maps``.
+        """
         pair_number = pair_numbers[max(i, j), min(i, j)]
         for number, phi in enumerate(maps):
             for (row, column), v in phi.items():
@@ -100,7 +105,7 @@ def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> 
 
 
 def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> list[Map]:
-    """Return a basis of the algebra of maps that the identity and the values of β generate, the identity first."""
+    """Return a basis of the algebra that the values of β generate; the identity is the first."""
     basis: list[Map] = [{(i, i): field.one for i in range(m)}]
     pending = [value for value in form.values() if value]
     while pending:
@@ -113,7 +118,7 @@ def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> lis
 
 
 def _normalised(a: Map) -> Map:
-    """Return a multiple whose first entry is 1: products with it take fewer multiplications."""
+    """Return a multiple of the map whose first entry is 1, so that products with it need fewer multiplications."""
     first = a[min(a)]
     return {position: v / first for position, v in a.items()}
 
@@ -128,9 +133,9 @@ def _composed(a: Mapping[tuple[int, int], Scalar], b: Mapping[tuple[int, int], S
 def _assembled(
     ad: Sequence[Sequence[Vector]], form: Mapping[tuple[int, int], Map], scalars: Sequence[Map], field: Field
 ) -> StarAlgebra:
-    """Return the algebra K ⊕ g.
+    """Return the algebra K ⊕ g; the caller checks its axioms.
 
-    Its basis contains 2e for the basis elements e of g, with 2a·2b = 4β + 2[a, b]. The axioms are not checked here.
+    Its basis has the elements of K, then 2e for the basis elements e of g, with 2a·2b = 4β(a, b) + 2[a, b].
     """
     m, count, unit = len(ad), len(scalars), field.one
     span, twice_unit, one_half = Span(field, scalars), field.number(2), unit / field.number(2)
@@ -155,7 +160,10 @@ def _assembled(
 
 
 def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
-    """Return the algebra as a sum of two, where K is two-dimensional and has an idempotent with rational entries."""
+    """Return the algebra as the direct sum of two algebras, if K has two dimensions and a rational idempotent.
+
+    Other algebras are returned unchanged.
+    """
     field, unit = algebra.field, algebra.field.one
     idempotent = _idempotent(algebra) if count == 2 else None
     if idempotent is None:
@@ -172,7 +180,10 @@ def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
 
 
 def _idempotent(algebra: StarAlgebra) -> Vector | None:
-    """Return (1 + (k − q/2)/r)/2 for the second basis element k of K, where k² = p + qk and r² = p + q²/4."""
+    """Return an idempotent of K = span(1, k) other than 0 and 1; None if no rational one exists.
+
+    If k² = p + qk and r² = p + q²/4, it is (1 + (k − q/2)/r)/2.
+    """
     field = algebra.field
     if not field.is_rational:
         return None

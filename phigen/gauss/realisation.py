@@ -1,11 +1,11 @@
-"""Treatment of the coordinates of a system by a Gauss method, so that its step is a Poisson map.
+"""Realisations of systems for Gauss methods: choices of unknowns with which a step is a Poisson map.
 
 Coordinates with constant brackets are unknowns themselves, since Gauss methods are symplectic. Coordinates with the
-brackets of a Lie algebra are x̃(G ξ G*), where G is a group element, 1 at the start of each step, and the method is
-applied to G (`phigen.gauss.star_algebra`). Coordinates whose logarithms have constant brackets are exponentials of
-unknowns (`phigen.gauss.logarithms`). Gauss methods preserve quadratic first integrals and constant two-forms, and
-commute with linear maps. So the step of G is presymplectic, and the step of x is a Poisson map, exactly, with all
-Casimirs.
+brackets of a Lie algebra are written as x̃(G ξ G*), where the group element G is 1 at the start of each step, and the
+method is applied to G (`phigen.gauss.star_algebra`). Coordinates whose logarithms have constant brackets are written as
+exponentials of unknowns (`phigen.gauss.logarithms`). Gauss methods preserve quadratic first integrals and constant
+two-forms, and commute with linear maps. So the step of G is presymplectic. Therefore the step of x is exactly a Poisson
+map, with all its Casimirs.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from phigen.symbolic.expression import ONE, ZERO, Expression
 
 @dataclass(frozen=True)
 class Plain:
-    """Coordinates (indices) that are unknowns themselves.
+    """Part of a system: coordinates, given by their indices, that are unknowns themselves.
 
-    Their brackets are constant; otherwise the step is Poisson up to truncation only.
+    If their brackets are not constant, a step is a Poisson map only up to its order.
     """
 
     indices: tuple[int, ...]
@@ -40,9 +40,10 @@ class Plain:
 
 @dataclass(frozen=True)
 class LogarithmicBlock:
-    """Coordinates (indices) whose logarithms are unknowns; brackets of these and of plain coordinates are constant.
+    """Part of a system: coordinates, given by their indices, whose logarithms are unknowns.
 
-    ``rates`` are the brackets of log x_i and x_j, by (i, j).
+    Brackets of the logarithms with each other and with plain coordinates are constant. ``rates`` has the brackets {log
+    x_i, x_j} by (i, j).
     """
 
     indices: tuple[int, ...]
@@ -51,10 +52,11 @@ class LogarithmicBlock:
 
 @dataclass(frozen=True)
 class AlgebraBlock:
-    """Coordinates (indices) with the brackets of a Lie algebra: x_i + ``shift`` is a momentum map of a star algebra.
+    """Part of a system: coordinates, given by their indices, with the brackets of a Lie algebra ``lie``.
 
-    If ``central``, the last basis element of the Lie algebra has no coordinate: its value is 1. ``ideal`` are the basis
-    elements of a square-zero ideal, if functionals take the place of its part of G (`phigen.gauss.square_zero`).
+    x_i + ``shift``_i is a momentum map of the star algebra ``algebra``. If ``central`` is set, the last basis element
+    of the Lie algebra has no coordinate, and the constant value 1. ``ideal`` are the basis elements of a square-zero
+    ideal whose components of G are replaced by functionals (`phigen.gauss.square_zero`); () if there is none.
     """
 
     indices: tuple[int, ...]
@@ -66,12 +68,12 @@ class AlgebraBlock:
 
     @property
     def subalgebra(self) -> tuple[int, ...]:
-        """The basis elements outside the ideal: G has unknowns along these."""
+        """The basis elements of the star algebra outside the ideal, along which G has unknowns."""
         return tuple(i for i in range(self.algebra.dimension) if i not in self.ideal)
 
     @property
     def unknowns(self) -> int:
-        """Number of unknowns of a stage."""
+        """The number of unknowns at a stage."""
         return 2 * len(self.subalgebra) if self.ideal else self.algebra.dimension
 
 
@@ -80,14 +82,14 @@ Part = Plain | LogarithmicBlock | AlgebraBlock
 
 @dataclass(frozen=True)
 class Realisation:
-    """The parts of a system; the step is a Poisson map if ``exact``, else its structure is one to truncation."""
+    """The parts of a system; ``exact`` says whether the step is a Poisson map, not only up to its order."""
 
     parts: tuple[Part, ...]
     exact: bool
 
     @property
     def groups(self) -> tuple[AlgebraBlock, ...]:
-        """The parts with the brackets of a Lie algebra."""
+        """The parts whose unknowns are group elements."""
         return tuple(part for part in self.parts if isinstance(part, AlgebraBlock))
 
     @property
@@ -97,13 +99,14 @@ class Realisation:
 
     @property
     def with_elements(self) -> Realisation:
-        """The same with all components of group elements as unknowns, from which translations follow."""
+        """The realisation in which all components of group elements are unknowns, so that translations follow from
+        these."""
         parts = (replace(part, ideal=()) if isinstance(part, AlgebraBlock) else part for part in self.parts)
         return Realisation(tuple(parts), self.exact)
 
     @property
     def label(self) -> str:
-        """The kind of the method, for users."""
+        """The kind of the method as text for users."""
         if not self.exact:
             return "Gauss collocation, structure to truncation"
         kinds = ["collective"] * bool(self.groups) + ["in logarithms"] * bool(self.logarithms)
@@ -111,19 +114,22 @@ class Realisation:
 
 
 def direct(system: System) -> Realisation:
-    """Return Gauss on ẋ = π∇H itself: a Poisson map where π is constant, else to truncation."""
+    """Return the realisation whose unknowns are all coordinates; it is exact if π is constant."""
     constant = isinstance(system.shape, Constant | Canonical)
     return Realisation((Plain(tuple(range(system.dimension))),), constant)
 
 
 def collective(system: System) -> Realisation | None:
-    """Return a realisation with which the step is a Poisson map, or None if none is known."""
+    """Return an exact realisation, whose step is a Poisson map; None if phigen knows none."""
     parts = _parts(system.coordinates, system.poisson, system.shape)
     return None if parts is None else Realisation(tuple(_merged_parts(parts)), True)
 
 
 def _parts(coordinates: Sequence[str], poisson: Matrix, shape: Shape) -> list[Part] | None:
-    """Return parts that make the step a Poisson map, or None; a π of no known shape is treated block by block."""
+    """Return parts that make a step a Poisson map; None if phigen knows none.
+
+    If the shape of π is unknown, the blocks of π are treated separately.
+    """
     everything = tuple(range(len(coordinates)))
     if isinstance(shape, Constant | Canonical):
         return [Plain(everything)]
@@ -142,7 +148,7 @@ def _parts(coordinates: Sequence[str], poisson: Matrix, shape: Shape) -> list[Pa
 
 
 def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] | None:
-    """Return the parts of all blocks of π; None if there is one block, or one of them has no parts."""
+    """Return the parts of all blocks of π; None if π is one block, or if a block has no known parts."""
     blocks_of_poisson = blocks(coordinates, poisson)
     if len(blocks_of_poisson) < 2:
         return None
@@ -158,7 +164,7 @@ def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] 
 
 
 def _with_global_indices(part: Part, block: Sequence[int]) -> Part:
-    """Return a part of a block with the indices of its coordinates among all."""
+    """Return a part of a block with indices into all coordinates; ``block`` has the indices of the block."""
     indices = tuple(block[i] for i in part.indices)
     if isinstance(part, LogarithmicBlock):
         return LogarithmicBlock(indices, {(block[i], block[j]): rate for (i, j), rate in part.rates.items()})
@@ -166,7 +172,10 @@ def _with_global_indices(part: Part, block: Sequence[int]) -> Part:
 
 
 def _merged_parts(parts: Sequence[Part]) -> Iterator[Part]:
-    """Yield the parts: one plain part first, then one of logarithms."""
+    """Yield the parts with all plain parts merged into one, and all logarithmic parts merged into one.
+
+    The order is plain, logarithmic, Lie algebras.
+    """
     plain_indices = [i for part in parts if isinstance(part, Plain) for i in part.indices]
     if plain_indices:
         yield Plain(tuple(sorted(plain_indices)))
@@ -180,9 +189,9 @@ def _merged_parts(parts: Sequence[Part]) -> Iterator[Part]:
 
 
 def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
-    """Yield indecomposable parts of a linear or affine structure.
+    """Yield the indecomposable parts of a linear or affine structure: indices, Lie algebra, flag.
 
-    The third entry says whether the last basis element is the constant 1.
+    The flag says whether the last basis element of the Lie algebra is the constant 1.
     """
     if isinstance(shape, LiePoisson):
         for indices in indecomposable_parts(shape.algebra):
@@ -191,7 +200,8 @@ def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
         extension = shape.extension
         unit_index = extension.dimension - 1
         linear = {ij: {k: c for k, c in row.items() if k != unit_index} for ij, row in extension.constants.items()}
-        # A constant bracket couples its coordinates too; here it is replaced by a multiple of one of them.
+        # A constant bracket couples its two coordinates as well. It is replaced by a multiple of one of them to make
+        # this visible.
         completed = {ij: row or {ij[0]: ONE} for ij, row in linear.items()}
         for indices in indecomposable_parts(LieAlgebra("", unit_index, completed)):
             pairs = [ij for ij in extension.constants if set(ij) <= set(indices)]
@@ -202,8 +212,9 @@ def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
 
 
 def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | None:
+    """Return the part for some coordinates with the brackets of a Lie algebra; None if no star algebra is known."""
     last = len(indices)
-    if all(set(row) <= {last} for row in lie.constants.values()):  # all brackets are constant, or zero
+    if all(set(row) <= {last} for row in lie.constants.values()):  # all brackets are constant
         return Plain(tuple(indices))
     shift = _shift(lie, last) if central else [ZERO] * last
     if shift is not None:
@@ -216,7 +227,7 @@ def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | N
 
 
 def star_algebra(lie: LieAlgebra) -> StarAlgebra | None:
-    """Return a star algebra whose skew elements contain the Lie algebra, or None if none is known."""
+    """Return a star algebra whose skew elements contain the Lie algebra; None if phigen knows none."""
     return quaternionic(lie) or of_matrices(lie) or enveloping(lie)
 
 
@@ -226,7 +237,10 @@ def _without_constants(lie: LieAlgebra, last: int) -> LieAlgebra:
 
 
 def _shift(lie: LieAlgebra, last: int) -> list[Expression] | None:
-    """Return s with {x_i, x_j} = Σ_k c_ij^k (x_k + s_k), which absorbs the constants of the brackets, or None."""
+    """Return the shift s with {x_i, x_j} = Σ_k c_ij^k (x_k + s_k), where c_ij^k are the linear terms of the brackets.
+
+    Returns None if there is no shift that replaces the constant terms.
+    """
     field = lie.field
     rows: list[Vector] = []
     for row in lie.constants.values():

@@ -1,7 +1,8 @@
-"""Group elements of a Gauss step as rotations: a homomorphism from a star algebra to dual quaternions.
+"""Attitudes for Gauss steps: the group element of a step as a rotation, by a homomorphism to dual quaternions.
 
-A dual quaternion q + εr, ε² = 0, is the rotation q and the translation 2r q̄. Elements E_a of the rotations become ∓½i,
-½j, ½k, as the sign of the bracket is, those of translations ε times these, all others 0.
+A dual quaternion q + εr with ε² = 0 stands for the rotation q and the translation 2r q̄. The homomorphism maps the
+elements E_a that rotate to ½i, ½j, ½k or to −½i, −½j, −½k, by the sign of the bracket, those that translate to ε times
+these, and all others to 0.
 """
 
 from __future__ import annotations
@@ -18,14 +19,15 @@ from phigen.geometry.field import Scalar
 from phigen.geometry.linear import Span
 from phigen.symbolic.expression import ONE, Expression, number, total
 
-#: Components of a dual quaternion: those of q, then those of r.
+#: The eight components of a dual quaternion q + εr: those of q, then those of r.
 Dual = list[Scalar]
 
 
 def group_element(points: StageMap, attitude: Group) -> list[Expression] | None:
-    """Return the element of a step less 1, with a translation if the group has one, in terms of the unknowns; or None.
+    """Return the group element of a step minus 1, with its translation if the group has one, as a function of the
+    unknowns.
 
-    None if the coordinates of the rotation belong to no star algebra, or to one without the homomorphism.
+    Returns None if the coordinates that rotate belong to no star algebra, or if there is no homomorphism.
     """
     for group, places in zip(points.realisation.groups, points.places, strict=True):
         if set(attitude.rotation) <= set(group.indices):
@@ -43,7 +45,7 @@ def _element(
         total(algebra.field.expression(image[k]) * z for image, z in zip(images, offsets, strict=True) if image[k])
         for k in range(8)
     ]
-    if attitude.spatial:  # the element moves from the left, so it is the inverse
+    if attitude.spatial:  # elements act from the left on the attitude, which needs the inverse
         w = [w[0], *(-v for v in w[1:4]), w[4], *(-v for v in w[5:])]
     inverse = [ONE + w[0], *(-v for v in w[1:4])]
     translation = quaternion_product(w[4:], inverse)[1:]
@@ -51,7 +53,7 @@ def _element(
 
 
 def _images(group: AlgebraBlock, attitude: Group) -> list[Dual] | None:
-    """Return the dual quaternions of the basis of the star algebra, or None if there is no homomorphism."""
+    """Return the dual quaternions of the basis elements of the star algebra; None if there is no homomorphism."""
     algebra, field = group.algebra, group.algebra.field
     half = field.one / field.number(2)
     scale = half if attitude.spatial else -half
@@ -82,7 +84,7 @@ def _combination(algebra: StarAlgebra, factors: Vector, images: Sequence[Dual]) 
 
 
 def _generate(algebra: StarAlgebra, elements: list[Vector], images: list[Dual]) -> None:
-    """Append products of the elements, with their images, until they span the algebra or nothing is new."""
+    """Append products of elements, and of their images, until the elements span the algebra or no product is new."""
     generators = len(elements)
     for k in count():
         if k == len(elements) or Span(algebra.field, elements).dimension == algebra.dimension:
@@ -110,7 +112,7 @@ def _times(a: Sequence[Scalar], b: Sequence[Scalar]) -> Dual:
 
 
 def _is_homomorphism(algebra: StarAlgebra, images: Sequence[Dual]) -> bool:
-    """Whether products of basis elements have the products of their images."""
+    """Whether the image of each product of two basis elements is the product of their images."""
     n = range(algebra.dimension)
     return all(
         _multiplied(images[i], images[j]) == _combination(algebra, algebra.table.get((i, j), {}), images)

@@ -1,10 +1,11 @@
-"""Square-zero ideals of star algebras: their part of a group element acts on momenta through a functional only.
+"""Square-zero ideals of star algebras, whose components of a group element act on momenta only through a functional.
 
-Let A = B ⊕ N with N² = 0, N an ideal, B a subalgebra, and N* = N, B* = B. For G = g + n the momenta of a = b + c are
-x̃(GaG*) = λ(bg*) + κ(cg*), with the functionals λ(b) = x̃(gb) + 2x̃(nb) of B and κ(c) = x̃(gc) of N, since x̃(gbn*) =
-x̃(nbg*). If Ġ = G(e + v), then ġ = ge and λ̇(b) = λ(eb) + 2κ(vb). So g and λ are a closed set of unknowns, linear in G,
-and Gauss methods, which commute with linear maps, make the same step with them. There are 2 dim B of them; for motions
-of a body N are translations, or the directions of several fields, and g, λ are those of T*B.
+Let A = B ⊕ N with a subalgebra B, an ideal N, N² = 0, B* = B and N* = N. For G = g + n, the momenta of a = b + c are
+x̃(GaG*) = λ(bg*) + κ(cg*), since x̃(gbn*) = x̃(nbg*). Here λ(b) = x̃(gb) + 2x̃(nb) is a functional on B, and κ(c) =
+x̃(gc) a functional on N. If Ġ = G(e + v) with e in B and v in N, then ġ = ge and λ̇(b) = λ(eb) + 2κ(vb). So the
+derivatives of g and λ depend on g and λ alone, and λ is a linear function of G. Gauss methods commute with linear maps,
+so they make the same step with the unknowns g and λ. The number of these unknowns is 2 dim B. For motions of a body, N
+are translations, or the directions of several fields, and (g, λ) is a point of T*B.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from phigen.gauss.star_algebra import StarAlgebra
 
 
 def square_zero_ideal(algebra: StarAlgebra) -> tuple[int, ...]:
-    """Return the basis elements of an ideal N as above, where 2 dim B does not exceed the dimension of A; else none.
+    """Return the basis elements of such an ideal N if 2 dim B does not exceed the dimension of A; else ().
 
-    N is the radical of the form tr ab; basis elements must span N and B, and elements of the frame lie in N or in B.
+    N is the radical of the form tr ab. Basis elements must span N and B, and each element of the frame must lie in N or
+    in B.
     """
     n, zero = range(algebra.dimension), algebra.field.zero
     products = {at: row for at, row in algebra.table.items() if row}

@@ -1,7 +1,8 @@
-"""Stages of a Gauss step: points and their vector field in terms of the unknowns, and the change of frame.
+"""Stages of a Gauss step: coordinates and derivatives as functions of the unknowns, and the change of frame.
 
-The unknowns are offsets, 0 at the start of the step: x − x_start of a plain coordinate, t − t_start of the time,
-log x − log x_start of a coordinate with a logarithm, G − 1 of a group element. So small steps lose no digits.
+The unknowns are offsets, which are 0 at the start of a step, so that small steps lose no digits. They are x − x_start
+for a plain coordinate, t − t_start for the time, log x − log x_start for a coordinate with a logarithm, and G − 1 for a
+group element.
 """
 
 from __future__ import annotations
@@ -28,18 +29,19 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.symbols import Symbol
 
-#: The kind of symbols of unknowns.
+#: The kind of the symbols that stand for unknowns.
 OFFSET = "z"
 
 
 @dataclass(frozen=True)
 class StageMap:
-    """Points as expressions in the start of the step and the unknowns.
+    """The state at a stage as a function of the start of the step and of the unknowns.
 
-    ``unknowns`` are symbols, and ``change`` is x − x_start by coordinates. The first unknowns are offsets of the
-    coordinates with the indices ``moved``. Then come the offset of the time, if H depends on it, those of functionals
-    of algebras with ideals, those of the logarithms of the coordinates ``scaled``, and those of group elements.
-    ``places`` are the indices of the unknowns of each group: those of G, then those of functionals.
+    ``unknowns`` are names of symbols. The first unknowns are offsets of the coordinates with the indices ``moved``.
+    Then come the offset of the time if H depends on it, the offsets of functionals of star algebras with ideals, the
+    offsets of the logarithms of the coordinates with the indices ``scaled``, and the entries of group elements minus 1.
+    ``places`` has the indices of the unknowns of each group: those of the group element, then those of its functional.
+    ``change`` is x − x_start for each coordinate.
     """
 
     system: System
@@ -49,34 +51,35 @@ class StageMap:
     scaled: tuple[int, ...]
     places: tuple[tuple[int, ...], ...]
     change: tuple[Expression, ...] = field(default=())
-    pace: Expression = ONE  # the factor of ∇H + ζ: g with a monitor and forces
+    pace: Expression = ONE  # the factor of ∇H and covector forces: the rate g of a monitor with forces
 
     @property
     def logarithms(self) -> dict[int, Expression]:
-        """The unknowns that are offsets of logarithms, by their coordinates."""
+        """The unknowns that are offsets of logarithms, by the indices of their coordinates."""
         first = self.plain
         return {i: symbol(self.unknowns[first + k]) for k, i in enumerate(self.scaled)}
 
     @property
     def plain(self) -> int:
-        """Number of the first unknowns, those that have the scale of the state."""
+        """The number of the unknowns that have the scale of the state; these are the first ones."""
         groups = self.realisation.groups
         return len(self.moved) + len(self.system.times) + sum(len(g.subalgebra) for g in groups if g.ideal)
 
     @property
     def start(self) -> tuple[str, ...]:
-        """The symbols of the start of a step: coordinates, then the time."""
+        """The names of the symbols at the start of a step: coordinates, then the time."""
         return (*self.system.coordinates, *self.system.times)
 
 
 def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) -> StageMap:
-    """Return the points of a system in terms of the unknowns of a step; ``pace`` multiplies ∇H and covector forces."""
+    """Return the state of a system at a stage; ``pace`` multiplies ∇H and covector forces."""
     plain_indices = tuple(i for part in realisation.parts if isinstance(part, Plain) for i in part.indices)
     scaled = tuple(i for part in realisation.logarithms for i in part.indices)
     if realisation.exact:
         plain_indices = tuple(i for i in plain_indices if any(not e.is_zero for e in system.poisson[i]))
     if not (plain_indices or scaled or realisation.groups or system.times):
-        plain_indices = (0,)  # all brackets are zero; arrays in C have at least one entry
+        # If all brackets are zero, one coordinate is an unknown, since arrays in C have at least one entry.
+        plain_indices = (0,)
     places, count = _places(realisation, len(plain_indices) + len(system.times), len(scaled))
     unknowns = tuple(Symbol(OFFSET, k) for k in range(count))
     change = [ZERO] * system.dimension
@@ -93,7 +96,10 @@ def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) 
 
 
 def _places(realisation: Realisation, plain: int, scaled: int) -> tuple[tuple[tuple[int, ...], ...], int]:
-    """Return the indices of the unknowns of each group, after these numbers of others, and the number of unknowns."""
+    """Return the indices of the unknowns of each group, and the number of all unknowns.
+
+    ``plain`` and ``scaled`` are the numbers of unknowns of coordinates and time, and of logarithms.
+    """
     functional = plain
     element = plain + scaled + sum(len(g.subalgebra) for g in realisation.groups if g.ideal)
     places = []
@@ -106,7 +112,8 @@ def _places(realisation: Realisation, plain: int, scaled: int) -> tuple[tuple[tu
 
 
 def group_values(system: System, group: AlgebraBlock) -> list[Expression]:
-    """Return the values of the elements E_a of a Lie algebra at the start of a step."""
+    """Return the coordinates of a Lie algebra part at the start of a step, plus their shifts; 1 for a central
+    element."""
     coordinates = [symbol(system.coordinates[i]) + s for i, s in zip(group.indices, group.shift, strict=True)]
     return [*coordinates, *([ONE] if group.central else [])]
 
@@ -122,10 +129,10 @@ def _combined(algebra: StarAlgebra, factors: Mapping[int, object], values: Seque
 
 @dataclass(frozen=True)
 class _Scaled:
-    """The functional x̃ divided by q, and frame elements f divided by numbers c.
+    """The functional x̃ divided by q at the basis elements, and the frame elements f divided by numbers c.
 
-    With suitable q and c the products need few multiplications by numbers. ``combination`` gives the E_a from the
-    values of x̃/q at the f/c.
+    q and c are chosen such that products need few multiplications by numbers. ``combination`` gives x̃ at the E_a as
+    combinations of x̃/q at the f/c.
     """
 
     at_basis: list[Expression]
@@ -151,13 +158,13 @@ def _scaled(group: AlgebraBlock, x: Sequence[Expression]) -> _Scaled:
 
 
 def offset_element(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[Expression]:
-    """Return the components of w = G − 1 by the unknowns of a group; those in its ideal are not known, and are 0."""
+    """Return the components of w = G − 1 from the unknowns of a group; components in its ideal are 0."""
     components = dict(zip(group.subalgebra, offsets, strict=False))
     return [components.get(k, ZERO) for k in range(group.algebra.dimension)]
 
 
 def _element_at(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[Expression]:
-    """Return the components of G = 1 + w, those in the ideal as 0."""
+    """Return the components of G = 1 + w from the unknowns of a group; components of w in its ideal count as 0."""
     unit = group.algebra.unit
     return [
         w + (_scalar(group.algebra, unit[k]) if k in unit else ZERO)
@@ -166,9 +173,10 @@ def _element_at(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[Expr
 
 
 def _momentum_change(group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Expression]) -> list[Expression]:
-    """Return x̃(G E_a G*) − x_a for G = 1 + w: 2x̃(wE_a) + x̃(wE_a w*), as E_a is skew.
+    """Return x̃(G E_a G*) − x_a for G = 1 + w and all a.
 
-    With functionals λ = x̃ + u of a subalgebra it is u(E_a) + λ(E_a w*) there.
+    This is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. For E_a in a subalgebra with a functional λ = x̃ + u, it is
+    u(E_a) + λ(E_a w*).
     """
     algebra, scaled, w = group.algebra, _scaled(group, x), offset_element(group, offsets)
     left = _functional_times(algebra, scaled, w)
@@ -181,7 +189,7 @@ def _momentum_change(group: AlgebraBlock, x: Sequence[Expression], offsets: Sequ
 
 
 def _momentum(group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Expression]) -> list[Expression]:
-    """Return x̃(G E_a G*) for a group element G."""
+    """Return x̃(G E_a G*) for a group element G and all a; ``offsets`` are the unknowns of the group."""
     at_frame, combination = _at_frame(group, x, offsets)
     return [_combined(group.algebra, parts, at_frame) for parts in combination]
 
@@ -189,14 +197,16 @@ def _momentum(group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Ex
 def _at_frame(
     group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Expression]
 ) -> tuple[list[Expression], list[Vector]]:
-    """Return multiples of x̃(G f G*) for the frame elements f, and the combinations of these that are x̃(G E_a G*)."""
+    """Return multiples of x̃(G f G*) for the frame elements f, and the coefficients that combine them to x̃(G E_a
+    G*)."""
     algebra, scaled = group.algebra, _scaled(group, x)
     left, g = _left(group, scaled, offsets), _element_at(group, offsets)
     return [_with_star(algebra, f, left, g) for f in scaled.frame], scaled.combination
 
 
 def _left(group: AlgebraBlock, scaled: _Scaled, offsets: Sequence[Expression]) -> list[Expression]:
-    """Return x̃(Gb)/q for the elements b of the basis; λ(b)/q in the subalgebra, where there is an ideal."""
+    """Return x̃(Gb)/q for the basis elements b of the algebra; if there is an ideal, λ(b)/q for those in the
+    subalgebra."""
     left = _functional_times(group.algebra, scaled, _element_at(group, offsets))
     if group.ideal:
         for k, u in zip(group.subalgebra, offsets[len(group.subalgebra) :], strict=True):
@@ -205,7 +215,7 @@ def _left(group: AlgebraBlock, scaled: _Scaled, offsets: Sequence[Expression]) -
 
 
 def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Expression]) -> list[Expression]:
-    """Return x̃(wb)/q for the elements b of the basis."""
+    """Return x̃(wb)/q for the basis elements b of the algebra."""
     left = []
     for k in range(algebra.dimension):
         values = [_combined(algebra, algebra.table.get((i, k), {}), scaled.at_basis) for i in range(algebra.dimension)]
@@ -216,7 +226,7 @@ def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Express
 def _with_star(
     algebra: StarAlgebra, f: Mapping[int, Scalar], left: Sequence[Expression], w: Sequence[Expression]
 ) -> Expression:
-    """Return x̃(wfw*)/q, where ``left`` are the values x̃(wb)/q."""
+    """Return x̃(wfw*)/q for a frame element f; ``left`` has the values x̃(wb)/q of `_functional_times`."""
     unit = algebra.field.one
     terms = []
     for j in range(algebra.dimension):
@@ -227,7 +237,7 @@ def _with_star(
 
 
 def at_unknowns(points: StageMap) -> dict[str, Expression]:
-    """Return the coordinates and the time at a stage, in terms of the unknowns."""
+    """Return the coordinates and the time at a stage by name, as functions of the unknowns."""
     system = points.system
     stage_values = {c: symbol(c) + d for c, d in zip(system.coordinates, points.change, strict=True)}
     stage_values |= {
@@ -243,7 +253,7 @@ def at_unknowns(points: StageMap) -> dict[str, Expression]:
 def _element(
     algebra: StarAlgebra, elements: Sequence[Mapping[int, object]], factors: Sequence[Expression]
 ) -> list[Expression]:
-    """Return the components of Σ_a factors[a]·elements[a]."""
+    """Return the components of Σ_a factors[a]·elements[a] in the basis of the algebra."""
     return [
         total(_scalar(algebra, e[k]) * r for e, r in zip(elements, factors, strict=False) if k in e)
         for k in range(algebra.dimension)
@@ -251,7 +261,7 @@ def _element(
 
 
 def offsets_of(points: StageMap, places: Sequence[int]) -> list[Expression]:
-    """Return the unknowns at these places."""
+    """Return the symbols of the unknowns with the indices ``places``."""
     return [symbol(points.unknowns[k]) for k in places]
 
 
@@ -264,11 +274,11 @@ def vector_field(
     *,
     collected: bool = False,
 ) -> list[Expression]:
-    """Return the derivatives of the unknowns at a stage, with these values of the coordinates, times a weight.
+    """Return the derivatives of the unknowns at a stage, times ``weight``.
 
-    ``hold`` receives each component of the velocities in Lie algebras, and returns its replacement. ``slopes`` stand
-    for ∇H, where H is not that of the system. With ``collected``, velocities that are affine in the momenta are sums
-    over x̃(G f G*) for the elements f of the frame.
+    ``stage_values`` has the coordinates and the time at the stage by name. ``slopes`` replaces ∇H if it is not None.
+    ``hold`` maps each component of a velocity in a Lie algebra to its replacement. With ``collected``, velocities that
+    are affine in the momenta are written as sums over x̃(G f G*) for the frame elements f.
     """
     system, realisation = points.system, points.realisation
     slopes = gradient(system.hamiltonian, system.coordinates) if slopes is None else slopes
@@ -286,7 +296,7 @@ def vector_field(
     derivatives += [ZERO] * (len(points.unknowns) - len(derivatives))
     rates = [-weight * value for value in substitute(slopes, stage_values)]
     for group, at in zip(realisation.groups, points.places, strict=True):
-        # A constant among the basis elements, if there is one, acts as 0: it is central.
+        # A constant among the basis elements is central, so that it does not act.
         velocity = _element(group.algebra, group.algebra.basis, [rates[i] for i in group.indices])
         if collected:
             sums = _collected(points, group, at, slopes, weight)
@@ -302,7 +312,7 @@ def vector_field(
 def _derivatives(
     points: StageMap, group: AlgebraBlock, places: Sequence[int], velocity: Sequence[Expression]
 ) -> list[Expression]:
-    """Return the derivatives of the unknowns of a group; the part of the velocity in the ideal counts twice."""
+    """Return the derivatives of the unknowns of a group, from its ``velocity``, a component for each basis element."""
     offsets = offsets_of(points, places)
     of_element = _multiplied(group.algebra, _element_at(group, offsets), velocity)
     if not group.ideal:
@@ -312,14 +322,15 @@ def _derivatives(
 
 
 def functional_offsets(group: AlgebraBlock, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
-    """Return the offsets of the functional λ of the subalgebra at G = 1 + w, where all components of w are known."""
+    """Return the offsets of the functional λ of the subalgebra at G = 1 + w, from all components of w."""
     doubled = [number(2) * v if k in group.ideal else v for k, v in enumerate(w)]
     left = _functional_times(group.algebra, _scaled(group, x), doubled)
     return [left[k] for k in group.subalgebra]
 
 
 def _pulled_back(group: AlgebraBlock, a: Sequence[Expression], left: Sequence[Expression]) -> list[Expression]:
-    """Return f(ab) for the elements b of the subalgebra, by the values ``left`` of a functional f at the basis."""
+    """Return f(ab) for the basis elements b of the subalgebra; ``left`` has the values of the functional f at all basis
+    elements."""
     n = range(group.algebra.dimension)
     rows = [[_combined(group.algebra, group.algebra.table.get((i, k), {}), left) for i in n] for k in group.subalgebra]
     return [total(a[i] * value for i, value in enumerate(row) if not (a[i].is_zero or value.is_zero)) for row in rows]
@@ -328,7 +339,10 @@ def _pulled_back(group: AlgebraBlock, a: Sequence[Expression], left: Sequence[Ex
 def _collected(
     points: StageMap, group: AlgebraBlock, places: Sequence[int], slopes: Sequence[Expression], weight: Expression
 ) -> list[Expression | None]:
-    """Return −w Σ_a E_a ∂H/∂x_a as sums over x̃(G f G*); None for components that are not affine in the momenta."""
+    """Return the components of −w Σ_a E_a ∂H/∂x_a for w = ``weight``, as sums over x̃(G f G*) for the frame elements f.
+
+    Components that are not affine in the momenta are None.
+    """
     system, algebra = points.system, group.algebra
     names = [system.coordinates[i] for i in group.indices]
     state = {*system.coordinates, *system.times}
@@ -352,13 +366,13 @@ def _collected(
 
 
 def _logarithmic_rate(points: StageMap, i: int, slopes: Sequence[Expression]) -> Expression:
-    """Return the derivative of log x_i."""
+    """Return the derivative of log x_i, from {log x_i, x_j} and ∇H."""
     rates = [(j, rate) for part in points.realisation.logarithms for (k, j), rate in part.rates.items() if k == i]
     return total(rate * slopes[j] for j, rate in rates if not slopes[j].is_zero)
 
 
 def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
-    """Return the product of two elements."""
+    """Return the components of the product of two elements."""
     terms: list[list[Expression]] = [[] for _ in range(algebra.dimension)]
     for (i, j), row in sorted(algebra.table.items()):
         if a[i].is_zero or b[j].is_zero:
@@ -369,7 +383,11 @@ def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expre
 
 
 def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) -> list[Expression]:
-    """Return derivatives of the unknowns in the frame of the end of a step: G* = G⁻¹ times those of group elements."""
+    """Return ``slopes``, derivatives of the unknowns, in the frame of the end of the step.
+
+    Derivatives of group elements are multiplied by G* = G⁻¹ from the left, those of functionals are transformed, and
+    the other ones do not change.
+    """
     values = list(slopes)
     for group, places in zip(points.realisation.groups, points.places, strict=True):
         algebra, offsets, k = group.algebra, offsets_of(points, places), [slopes[i] for i in places]
@@ -391,9 +409,10 @@ def _functional_in_next_frame(
     k: Sequence[Expression],
     turned: Sequence[Expression],
 ) -> list[Expression]:
-    """Return derivatives k of the functional λ in the next frame: k(bg*) − λ(sg*), with s the symmetric part of ġb.
+    """Return derivatives ``k`` of the functional λ in the frame of the end of a step: k(bg*) − λ(sg*).
 
-    Here ġ, ``turned``, are derivatives in that frame. The second term is due to nb + gn* = 0 at the end of a step.
+    Here s is the symmetric part of ġb, and ġ, ``turned``, is the derivative of g in that frame. The second term follows
+    from nb + gn* = 0 at the end of a step.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
     left = _left(group, _scaled(group, group_values(points.system, group)), offsets)

@@ -1,8 +1,9 @@
-"""Associative algebras with an involution, whose skew elements contain a Lie algebra.
+"""Star algebras: associative algebras with an involution, whose skew elements contain a Lie algebra.
 
 Let A be such an algebra, g a Lie subalgebra of its skew elements (a* = −a), and x̃ a functional on A that vanishes on
-symmetric elements. On A, as a vector space with the constant two-form ω(u, v) = x̃(u v*), right multiplication by
-exp(ξ), ξ ∈ g, is linear and symplectic, and its momentum map is quadratic: J_ξ(G) = x̃(G ξ G*). At G = 1 it is x̃ itself.
+symmetric elements. A is a vector space with the constant two-form ω(u, v) = x̃(u v*). On A, right multiplication by
+exp(ξ) with ξ ∈ g is linear and symplectic, and its momentum map is quadratic: J_ξ(G) = x̃(G ξ G*). At G = 1, this is
+x̃(ξ).
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ Vector = dict[int, Scalar]
 
 @dataclass(frozen=True)
 class StarAlgebra:
-    """An algebra in a basis, with an involution.
+    """Star algebra in a basis.
 
-    ``table[i, j]`` is the product of two basis elements, ``star[i]`` the image of one under the involution, ``unit``
-    the unit. ``basis`` are the elements E_a of g. ``frame`` are skew elements for the computation of momenta, with
-    E_a = Σ_k frame_k·``combination[a][k]``. The functional x̃ of a point x has the value Σ_a x_a·``functional[i][a]``
-    at the basis element i.
+    ``table[i, j]`` is the product of two basis elements, without entries for products 0. ``star[i]`` is the image of a
+    basis element under the involution, and ``unit`` is the unit element. ``basis`` has the elements E_a of g. ``frame``
+    has skew elements by which momenta are computed: E_a = Σ_k combination[a][k]·frame[k]. The functional x̃ of a point
+    x has the value Σ_a functional[i][a]·x_a at basis element i.
     """
 
     field: Field
@@ -53,11 +54,11 @@ class StarAlgebra:
         return combined(self.star, a)
 
     def commutator(self, a: Mapping[int, Scalar], b: Mapping[int, Scalar]) -> Vector:
-        """Return ab − ba."""
+        """Return the commutator ab − ba."""
         return difference(self.product(a, b), self.product(b, a), self.field.one)
 
     def value(self, a: Mapping[int, Scalar]) -> Vector:
-        """Return x̃(a) as a linear form in x."""
+        """Return x̃(a) as a linear form in x: its coefficients by index."""
         return combined(self.functional, a)
 
     @cached_property
@@ -77,7 +78,7 @@ class StarAlgebra:
         return not any(any(residuals) for _, residuals in self.axioms())
 
     def axioms(self) -> Iterator[tuple[str, Iterator[Vector]]]:
-        """Yield the axioms of the momentum map, each with residuals that are empty where it holds."""
+        """Yield the axioms of the momentum map: a name, and residuals that are all empty if the axiom holds."""
         n, unit = range(self.dimension), self.field.one
         units = [{i: unit} for i in n]
         yield "A is associative", self._associators()
@@ -90,10 +91,13 @@ class StarAlgebra:
         yield "E_a is a combination of the frame", self._framed()
         yield "x̃(E_a) = x_a", (difference(self.value(e), {a: unit}, unit) for a, e in enumerate(self.basis))
         yield "x̃(a*) = −x̃(a)", (difference(self.value(self.starred(u)), self.value(u), -unit) for u in units)
-        yield "functionals x̃ stay such under the skew elements", self._commutators_of_skew()
+        yield "skew elements on which all functionals x̃ vanish form an ideal", self._commutators_of_skew()
 
     def _associators(self) -> Iterator[Vector]:
-        """Yield the (ab)c − a(bc) of basis elements; over the rationals those of all b and c together, by a."""
+        """Yield (ab)c − a(bc) for basis elements a, b, c.
+
+        For rational coefficients, the residuals of all b and c are yielded together, one vector for each a.
+        """
         n = range(self.dimension)
         if not self.field.is_rational:
             yield from (self._associator(i, j, k) for i in n for j in n for k in n)
@@ -102,7 +106,7 @@ class StarAlgebra:
         entries = {(i, k, j): v for (i, j), row in self.table.items() for k, v in row.items()}
         left = [fmpq_mat(size, size, [entries.get((i, k, j), zero) for k in n for j in n]) for i in n]
         flat = fmpq_mat(size, size * size, [v for m in left for v in m.entries()])
-        for i in n:  # the matrix of (ij) is Σ_k (ij)_k times that of k
+        for i in n:  # left multiplication by e_i e_j is Σ_k (e_i e_j)_k times left multiplication by e_k
             of_products = left[i].transpose() * flat
             apart = [left[i] * m for m in left]
             together = [v for m in apart for v in m.entries()]
@@ -130,7 +134,10 @@ class StarAlgebra:
             yield difference(self.starred(f), f, -self.field.one)
 
     def _commutators_of_skew(self) -> Iterator[Vector]:
-        """Yield x̃([u, n]) for all skew u, and the skew n on which all x̃ vanish: the n must form an ideal."""
+        """Yield x̃([u, n]) for all skew u and all skew n on which every x̃ vanishes.
+
+        These residuals are 0 if the n form an ideal of the skew elements.
+        """
         rows: list[Vector] = [{} for _ in self.basis]
         for i, u in enumerate(self.skew):
             for a, v in self.value(u).items():
@@ -157,7 +164,7 @@ def difference(a: Mapping[int, Scalar], b: Mapping[int, Scalar], factor: Scalar)
 
 
 def in_basis(algebra: StarAlgebra, vectors: Sequence[Vector]) -> StarAlgebra:
-    """Return the algebra in another basis."""
+    """Return the algebra in another basis, whose elements are ``vectors``."""
     span = Span(algebra.field, vectors)
 
     def converted(a: Mapping[int, Scalar]) -> Vector:

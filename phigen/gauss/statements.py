@@ -1,8 +1,9 @@
-"""Statements about a Gauss step, proved for each build: symplecticity, order, momentum map.
+"""Statements about a Gauss step, decided for each system: symplecticity, order, brackets, momentum map.
 
-A Gauss method is symplectic and preserves quadratic first integrals if μ_ij + μ_ji = 1 for its coefficients as used.
-By the axioms of `phigen.gauss.star_algebra` the components of J are quadratic, and J is a Poisson map from the
-presymplectic space of group elements; the unit is a section of it. Hence the step in x is a Poisson map.
+A Gauss method is symplectic and preserves quadratic first integrals if its coefficients, as the solver uses them,
+satisfy μ_ij + μ_ji = 1. By the axioms of `phigen.gauss.star_algebra`, the components of the momentum map J are
+quadratic, and J is a Poisson map from the presymplectic space of group elements. J is x at the unit element. Hence the
+step in x is a Poisson map.
 """
 
 from __future__ import annotations
@@ -38,16 +39,16 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, Statement, decide_zero
 
-#: Largest residual of the order conditions that rounding of the coefficients explains.
+#: Largest residual of the order conditions that the rounding of coefficients to double precision explains.
 ROUNDED = Fraction(1, 10**15)
 
 
 def check(
     system: System, discretised: System, realisation: Realisation, tableau: Tableau, pace: Expression = ONE
 ) -> Iterator[Statement]:
-    """Yield the statements about coefficients, then those about the realisation.
+    """Yield the statements about the coefficients, then those about the realisation.
 
-    ``pace`` multiplies ∇H and covector forces, where a monitor and forces act.
+    ``pace`` is the factor of ∇H and covector forces, g for a monitor with forces.
     """
     yield _symplectic(tableau)
     yield _order(tableau)
@@ -63,13 +64,13 @@ def check(
 
 
 def _symplectic(tableau: Tableau) -> Statement:
-    name = "μ_ij + μ_ji = 1 for the numbers as used: symplectic, quadratic first integrals are kept"
+    name = "μ_ij + μ_ji = 1 after rounding: the method is symplectic and preserves quadratic first integrals"
     defect = max(map(abs, tableau.defects))
     return Statement(name, REFUTED, residual=str(float(defect))) if defect else Statement(name, PROVED)
 
 
 def _order(tableau: Tableau) -> Statement:
-    """Decide the conditions B(2s) and C(s), which give the order 2s."""
+    """Decide the order conditions B(2s) and C(s), from which the order 2s follows."""
     s = tableau.stages
     c, b = (list(map(Fraction, values)) for values in (tableau.nodes, tableau.weights))
     residuals = [abs(sum(w * x**k for w, x in zip(b, c, strict=True)) - Fraction(1, k + 1)) for k in range(2 * s)]
@@ -86,7 +87,7 @@ def _order(tableau: Tableau) -> Statement:
 
 
 def _brackets(system: System, realisation: Realisation) -> Statement:
-    """Decide that π has the brackets that the parts assume: of the Lie algebras, else constant."""
+    """Decide whether π has the brackets that the parts assume: those of Lie algebras, and constant ones."""
     n = system.dimension
     expected: dict[tuple[int, int], Expression] = {}
     group_of = {i: group for group in realisation.groups for i in group.indices}
@@ -121,7 +122,7 @@ def _lie_poisson(system: System, group: AlgebraBlock) -> dict[tuple[int, int], E
 
 
 def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
-    """Decide that J is a quadratic momentum map on a star algebra."""
+    """Decide whether the coordinates of a Lie algebra part are a quadratic momentum map on its star algebra."""
     coordinate_names = ", ".join(system.coordinates[i] for i in group.indices)
     algebra = group.algebra
     name = (
@@ -143,9 +144,9 @@ def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
 
 
 def _functionals(system: System, points: StageMap) -> Statement:
-    """Decide that functionals of subalgebras make the same step as group elements: the same momenta and velocities.
+    """Decide whether steps with functionals of subalgebras are those of group elements: equal momenta and velocities.
 
-    The velocities are those of any H, by symbols in place of ∇H.
+    Symbols stand for ∇H, so that the statement holds for any H.
     """
     complete = stage_map(points.system, points.realisation.with_elements, points.pace)
     values = _unknowns_by_elements(points, complete)
@@ -162,7 +163,7 @@ def _functionals(system: System, points: StageMap) -> Statement:
 
 
 def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Expression]:
-    """Return the unknowns of ``points`` in terms of those of ``complete``, which has no functionals."""
+    """Return the unknowns of ``points`` by name, as functions of those of ``complete``, which has no functionals."""
     first, size = len(points.moved) + len(points.system.times), len(points.scaled)
     common = [*range(first), *range(points.plain, points.plain + size)]
     values = {points.unknowns[k]: symbol(complete.unknowns[i]) for i, k in enumerate(common)}
@@ -177,7 +178,8 @@ def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Exp
 
 
 def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> Iterator[Statement]:
-    """Yield that the unknowns are 0 at the start of a step, and that the method follows ẋ = π∇H there."""
+    """Yield statements about the start of a step: the unknowns 0 stand for the start, and there the method follows ẋ =
+    π∇H."""
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]
     yield decide_zero("the unknowns 0 belong to the state at the start of a step", start, system.positive)

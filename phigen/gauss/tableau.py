@@ -1,9 +1,9 @@
-"""Coefficients of Gauss collocation, in a form that is exactly symplectic after rounding.
+"""Coefficients of Gauss collocation, in a form that remains exactly symplectic after rounding.
 
-A step from z solves Z_i = z + Σ_j μ_ij L_j with L_j = h b_j f(Z_j), and ends at z + Σ_j L_j; μ_ij = a_ij/b_j. If μ_ij
-+ μ_ji = 1, the step is symplectic and preserves the quadratic first integrals of f, for any b_j. The exact μ_ij
-satisfy this (b_i a_ij + b_j a_ji = b_i b_j). Here the μ_ij below the diagonal are rounded to multiples of 2⁻⁵²; then
-1 − μ_ij is a floating-point number too, and the identity holds without error.
+A step from z solves Z_i = z + Σ_j μ_ij L_j, where L_j = h b_j f(Z_j) and μ_ij = a_ij/b_j, and ends at z + Σ_j L_j. If
+μ_ij + μ_ji = 1, the step is symplectic and preserves the quadratic first integrals of f, for any b_j. The exact μ_ij
+satisfy this condition, since b_i a_ij + b_j a_ji = b_i b_j. Here the μ_ij below the diagonal are rounded to multiples
+of 2⁻⁵². Then 1 − μ_ij is a floating-point number too, and the condition holds without error.
 """
 
 from __future__ import annotations
@@ -14,37 +14,38 @@ from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import cache
 
-#: Decimal digits of the nodes; all coefficients follow from them in exact arithmetic.
+#: Decimal digits of the nodes. All other coefficients are computed from the nodes in exact arithmetic.
 DIGITS = 60
 
-#: Largest number of stages, for the orders 2 to 16.
+#: Largest number of stages; a method of s stages has order 2s.
 MOST_STAGES = 8
 
-#: The predictor of the stages of the next step is optimal for motions whose frequencies, times h, do not exceed BAND
-#: times the number of stages. More stages are used with longer steps.
+#: Band of the predictor, for each stage of the method, in units of 1/h. The predictor of the next step is optimal for
+#: motions with frequencies up to the band; methods with more stages are used with longer steps.
 BAND = Fraction(1, 4)
 
 
-#: Number of steps that predictors read.
+#: Largest number of previous steps that predictors read.
 EARLIER = 2
 
-#: Bands of predictors, as `BAND`, and the steps that each reads; vectorised C uses the one that was best recently.
-#: Errors of predicted slopes on the Kowalevski top, at steps of 0.1, 0.25, 0.5, 1: 3e-10, 4e-8, 8e-5, 0.1; by `BAND`
-#: alone 3e-5, 6e-5, 3e-4, 0.2.
+#: Bands of several predictors, as `BAND`, with the number of previous steps that each reads. Vectorised C uses the
+#: predictor that was best in recent steps. Errors of predicted slopes of the Kowalevski top with steps of 0.1, 0.25,
+#: 0.5 and 1 are 3e-10, 4e-8, 8e-5 and 0.1; with `BAND` alone they are 3e-5, 6e-5, 3e-4 and 0.2.
 BANDS = ((Fraction(3, 32), EARLIER), (Fraction(3, 16), EARLIER), (Fraction(3, 8), 1))
 
 
-#: The one of `BANDS` that other solvers use for all steps. At eight stages its errors are 1e-8 for frequencies up to
-#: 1.2 divided by h, and 5e-4 at 2/h. Those of `BAND` with one step are 1e-4 and 8e-4.
+#: Index in `BANDS` of the predictor that other solvers use for all steps. With eight stages, its errors are 1e-8 for
+#: frequencies up to 1.2/h, and 5e-4 at 2/h. With `BAND` and one previous step they are 1e-4 and 8e-4.
 SOLE_BAND = 1
 
 
 @dataclass(frozen=True)
 class Precision:
-    """Floating-point numbers: the ``spacing`` from 1 to 2, whose multiples below 2, and 1 minus them, are exact.
+    """Floating-point format for which coefficients are rounded.
 
-    Predictors assume relative errors ``noise`` of the values, or ``fine_noise`` for errors independent of the step
-    size.
+    ``spacing`` is the distance of its numbers between 1 and 2. Multiples of ``spacing`` below 2, and 1 minus them, are
+    exact. Predictors assume relative errors ``noise`` in the values that they read; those of `predictors` assume
+    ``fine_noise``.
     """
 
     spacing: Fraction
@@ -58,12 +59,12 @@ SINGLE = Precision(Fraction(1, 2**23), Fraction(1, 10**5), Fraction(1, 10**5))
 
 @dataclass(frozen=True)
 class Tableau:
-    """Coefficients of a method: ``nodes`` c_i, ``weights`` b_i, and the matrix ``mixing`` μ.
+    """Coefficients of a Gauss method: ``nodes`` c_i, ``weights`` b_i, and the matrix ``mixing`` μ, rounded.
 
-    μ_ij + μ_ji = 1 holds exactly. Nodes and weights are rounded to floating-point numbers. ``prediction`` gives the
-    offsets Z_i − z of the next step as Σ_j prediction[i][j]·L_j of the last one alone. ``doubled`` is
-    ν = μ diag(b) μ, which gives their integrals up to the stages by the L_j of the same step, and ``times`` are nodes τ
-    with ν_ij − ν_ji = τ_i − τ_j, exactly.
+    μ_ij + μ_ji = 1 holds exactly. ``prediction`` extrapolates one step: the offsets Z_i − z of the next step are about
+    Σ_j prediction[i][j]·L_j with L_j of the last step. ``doubled`` is ν = μ diag(b) μ, which gives the integrals of the
+    Z_i − z from the start of a step to each stage, by the L_j of this step. ``times`` are nodes τ such that ν_ij − ν_ji
+    = τ_i − τ_j holds exactly.
     """
 
     nodes: tuple[float, ...]
@@ -75,19 +76,19 @@ class Tableau:
 
     @property
     def stages(self) -> int:
-        """The number of stages; the order is twice this."""
+        """The number of stages, half the order."""
         return len(self.nodes)
 
     @property
     def defects(self) -> list[Fraction]:
-        """The values μ_ij + μ_ji − 1 for i ≤ j, in exact arithmetic: all are zero."""
+        """The values μ_ij + μ_ji − 1 for j ≤ i in exact arithmetic, which are all 0."""
         mu = [[Fraction(v) for v in row] for row in self.mixing]
         return [mu[i][j] + mu[j][i] - 1 for i in range(self.stages) for j in range(i + 1)]
 
 
 @cache
 def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
-    """Return the coefficients of the method with this number of stages."""
+    """Return the coefficients of the method with some number of stages, rounded for a floating-point format."""
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
     times = [_nearest(c, precision.spacing / 2) for c in nodes]
@@ -104,9 +105,10 @@ def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
 
 @cache
 def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool = False) -> list[list[list[float]]]:
-    """Return matrices like ``prediction`` of `Tableau`, one for each of `BANDS`; ``integrated``, of integrals.
+    """Return the matrix of each predictor in `BANDS`, in the form of ``prediction`` of `Tableau`.
 
-    Columns belong to the stages of the last step, then to those of the step before.
+    Columns belong to the L_j of the last step, then to those of the step before. With ``integrated``, the matrices
+    predict integrals of offsets, as ``doubled`` gives them.
     """
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
@@ -117,7 +119,11 @@ def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool =
 def _integrated(
     weights: Sequence[Fraction], mixing: Sequence[Sequence[Fraction]], values: Sequence[Sequence[Fraction]]
 ) -> list[list[Fraction]]:
-    """Return μ diag(b) V: integrals up to each stage, in units of the step, of functions with stage values V."""
+    """Return μ diag(b) V, the integrals from the start of the step to each stage of functions with the values V at
+    stages.
+
+    The integrals are in units of the step.
+    """
     columns = list(zip(*values, strict=True))
     return [[sum((m * w * v for m, w, v in zip(row, weights, column, strict=True)), Fraction(0)) for column in columns]
             for row in mixing]  # fmt: skip
@@ -129,7 +135,7 @@ def _floats(rows: Sequence[Sequence[Fraction]]) -> list[list[float]]:
 
 @cache
 def _exact(stages: int) -> tuple[list[Fraction], list[list[Fraction]]]:
-    """Return the weights b_j and the matrix μ before rounding."""
+    """Return the exact weights b_j and the exact matrix μ."""
     nodes = gauss_nodes(stages)
     basis = _lagrange(nodes)
     weights = [_integral(p, Fraction(1)) for p in basis]
@@ -138,14 +144,17 @@ def _exact(stages: int) -> tuple[list[Fraction], list[list[Fraction]]]:
 
 @cache
 def gauss_nodes(stages: int) -> tuple[Fraction, ...]:
-    """Return the zeros of the Legendre polynomial of this degree on [0, 1], ascending, to more than 50 digits."""
+    """Return the zeros of the Legendre polynomial of degree ``stages`` on [0, 1], ascending, to more than 50 digits."""
     with localcontext() as context:
         context.prec = DIGITS
         return tuple(sorted((1 - Fraction(_legendre_zero(stages, k))) / 2 for k in range(stages)))
 
 
 def _legendre_zero(n: int, k: int) -> Decimal:
-    """Return a zero on [−1, 1] by Newton's method; no deflation is needed, by the starting values of Tricomi."""
+    """Return zero number k of the Legendre polynomial of degree n on [−1, 1], by Newton's method.
+
+    Tricomi's starting values are so close to each zero that no deflation is needed.
+    """
     import math
 
     x = Decimal((1 - (n - 1) / (8 * n**3)) * math.cos(math.pi * (4 * k + 3) / (4 * n + 2)))
@@ -159,7 +168,8 @@ def _legendre_zero(n: int, k: int) -> Decimal:
 
 
 def _lagrange(nodes: Sequence[Fraction]) -> list[list[Fraction]]:
-    """Return the coefficients, from the lowest, of the polynomials that are 1 at one node and 0 at the others."""
+    """Return the Lagrange polynomials of the nodes, 1 at one node and 0 at the others, by coefficients from the lowest
+    on."""
     polynomials = []
     for i, c in enumerate(nodes):
         p = [Fraction(1)]
@@ -174,7 +184,7 @@ def _integral(p: Sequence[Fraction], end: Fraction) -> Fraction:
 
 
 def _rounded(exact: Sequence[Sequence[Fraction]], spacing: Fraction) -> list[list[float]]:
-    """Return the matrix μ as floating-point numbers with μ_ij + μ_ji = 1."""
+    """Return the matrix μ rounded to multiples of the spacing, with μ_ij + μ_ji = 1 exactly."""
     n = len(exact)
     mu = [[Fraction(1, 2)] * n for _ in range(n)]
     for i in range(n):
@@ -189,7 +199,7 @@ def _nearest(value: Fraction, spacing: Fraction) -> Fraction:
 
 
 def _skew_by(times: Sequence[Fraction], exact: Sequence[Sequence[Fraction]], spacing: Fraction) -> list[list[Fraction]]:
-    """Return ν as multiples of the spacing with ν_ij − ν_ji = τ_i − τ_j; all are floating-point numbers."""
+    """Return ν rounded to multiples of the spacing, with ν_ij − ν_ji = τ_i − τ_j exactly."""
     nu = [[_nearest(v, spacing) for v in row] for row in exact]
     for i in range(len(nu)):
         for j in range(i):
@@ -204,7 +214,10 @@ def _prediction(
     band: tuple[Fraction, int],
     noise: Fraction,
 ) -> list[list[Fraction]]:
-    """Return μ diag(b) W diag(1/b), where W extrapolates f from the stages of some last steps to those of the next."""
+    """Return μ diag(b) W diag(1/b), where W extrapolates f from the stages of previous steps to those of the next step.
+
+    ``band`` is an entry of `BANDS`, and ``noise`` the relative error of the values.
+    """
     n, (width, step_count) = len(nodes), band
     known_times = [c - steps_back for steps_back in range(1, step_count + 1) for c in nodes]
     extrapolation = _extrapolation(known_times, nodes, width * n, noise)
@@ -214,10 +227,10 @@ def _prediction(
 def _extrapolation(
     known_times: Sequence[Fraction], times: Sequence[Fraction], band: Fraction, noise: Fraction
 ) -> list[list[Fraction]]:
-    """Return for each time in ``times`` the weights of values at the times ``known_times``.
+    """Return weights W: Σ_j W[i][j]·f(known_times[j]) predicts f(times[i]).
 
-    They give the best linear prediction of a signal whose spectrum is flat up to a band limit, and zero beyond, from
-    values with errors of the size ``noise``.
+    They give the best linear prediction of a signal whose spectrum is flat up to the angular frequency ``band`` and 0
+    beyond, from values with errors of relative size ``noise``.
     """
     rows = [[_sinc(band * (a - b)) + (noise**2 if a == b else 0) for b in known_times] for a in known_times]
     sides = [[_sinc(band * (a - b)) for b in times] for a in known_times]
@@ -226,7 +239,7 @@ def _extrapolation(
 
 
 def _sinc(x: Fraction) -> Fraction:
-    """Return sin(x)/x to more digits than are needed."""
+    """Return sin(x)/x to about `DIGITS` digits."""
     term = value = Fraction(1)
     square = Fraction(round(x * x * 10**DIGITS), 10**DIGITS)
     for k in range(1, 40):
@@ -236,7 +249,7 @@ def _sinc(x: Fraction) -> Fraction:
 
 
 def _linear_solutions(rows: Sequence[Sequence[Fraction]], sides: Sequence[Sequence[Fraction]]) -> list[list[Fraction]]:
-    """Return the solutions of linear equations for several right-hand sides, by elimination."""
+    """Return the solutions of linear equations for several right-hand sides ``sides``, by Gaussian elimination."""
     n = len(rows)
     table = [[*row, *side] for row, side in zip(rows, sides, strict=True)]
     for k in range(n):

@@ -1,1 +1,1 @@
-"""Poisson tensors, brackets, Casimirs and Lie algebras."""
+"""Geometry of systems: Poisson tensors, brackets, Casimirs and Lie algebras."""

@@ -1,4 +1,5 @@
-"""Block-diagonal π: groups of coordinates without brackets between them (several bodies, spin and particle)."""
+"""Blocks of π: groups of coordinates without brackets between them, such as several bodies, or a spin and a
+particle."""
 
 from __future__ import annotations
 
@@ -9,9 +10,10 @@ from phigen.symbolic.expression import symbols_of
 
 
 def blocks(coordinates: Sequence[str], poisson: Matrix) -> list[list[int]]:
-    """The finest partition into groups with {x_i, x_j} = 0 between them and brackets of their own coordinates only.
+    """Return the finest partition of the coordinates into blocks, as sorted lists of indices from 0.
 
-    Indices from 0, sorted; a coordinate that commutes with all others and occurs in no bracket is a group by itself.
+    Coordinates of different blocks commute, and brackets in a block only depend on coordinates of this block. A
+    coordinate that commutes with all others and occurs in no bracket is a block of its own.
     """
     index = {c: i for i, c in enumerate(coordinates)}
     part = list(range(len(coordinates)))

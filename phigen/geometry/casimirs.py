@@ -1,9 +1,15 @@
-"""Casimir functions found from the form of a Poisson tensor.
+"""Search for Casimirs by the form of a Poisson tensor.
 
-Sources, in this order: the Casimirs of a Nambu bracket; the kernel of a constant π (linear functions); the
-kernel of A for a log-canonical π (monomials x^u); polynomials of growing degree, by linear algebra; traces of
-powers tr X^m on the dual of a matrix algebra with a non-degenerate trace form. Functions that depend on
-declared or earlier ones are dropped. `phigen.geometry.checks` proves each of them.
+Candidates come from these sources, in this order:
+
+- the Casimirs that define a Nambu bracket
+- linear functions, from the kernel of a constant π
+- monomials x^u, from the kernel of the matrix A of a log-canonical π
+- polynomials of increasing degree, by linear algebra
+- traces tr X^m, on the dual of a matrix algebra with a non-degenerate trace form
+
+Candidates that depend on declared or earlier Casimirs are dropped. `phigen.geometry.checks` proves that each one is a
+Casimir.
 """
 
 from __future__ import annotations
@@ -23,7 +29,7 @@ from phigen.geometry.trace_casimirs import trace_casimirs
 from phigen.spec.model import NambuForm, PoissonForm, ProductForm, PullbackForm
 from phigen.symbolic.expression import Expression, call, gradient, number, power, product, substitute, symbol, total
 
-#: Largest degree of the polynomials that are searched for.
+#: Largest degree of polynomials in the search.
 DEGREE = 4
 
 
@@ -35,9 +41,9 @@ def found_casimirs(
     declared: Mapping[str, Expression],
     used_names: Collection[str],
 ) -> tuple[dict[str, Expression], tuple[str, ...]]:
-    """Casimirs independent of the declared ones, under free names C1, C2, …; and notes.
+    """Return Casimirs that are independent of the declared ones, by free names C1, C2, …, and notes.
 
-    The search ends when their number is the corank of π. Notes say what was left out.
+    The search ends when the number of Casimirs is the corank of π. Notes say which parts of the search were omitted.
     """
     slopes = [gradient(c, coordinates) for c in declared.values()]
     ranks = generic_ranks([poisson, slopes])
@@ -67,6 +73,7 @@ def found_casimirs(
 def _candidates(
     coordinates: Sequence[str], poisson: Matrix, shape: Shape, form: PoissonForm, notes: list[str]
 ) -> Iterator[Expression]:
+    """Yield candidates for Casimirs; append to ``notes`` which parts of the search were omitted."""
     if isinstance(form, NambuForm):
         yield from form.casimirs
         return
@@ -85,7 +92,8 @@ def _candidates(
             yield from _monomial(coordinates, a)
             return
         case LiePoisson(algebra):
-            # Degree 3 finds the sparse ones of low degree; the traces are dense but reach every degree.
+            # Polynomials of degree up to 3 first, as they are sparse. Traces have many terms, but are not limited in
+            # degree.
             yield from polynomial_casimirs(coordinates, poisson, shape, 3, [])
             representation = known_representation(algebra)
             if representation is not None:
@@ -104,7 +112,7 @@ def _linear(coordinates: Sequence[str], matrix: Matrix) -> Iterator[Expression]:
 
 
 def _monomial(coordinates: Sequence[str], a: Matrix) -> Iterator[Expression]:
-    """x^u for the kernel vectors u of A; ½ Σ u_i log x_i² where the exponents contain parameters."""
+    """Yield x^u for vectors u in the kernel of A; with parameters in u, ½ Σ u_i log x_i² instead."""
     field, vectors = _kernel(a)
     for vector in vectors:
         if field.is_rational:

@@ -1,4 +1,4 @@
-"""The mathematics of a system as statements: skew symmetry, Jacobi identity, Casimirs, invariants, rank."""
+"""Statements about the mathematics of a system: skew symmetry, Jacobi identity, Casimirs, invariants, rank."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: The name of the statement that implies the higher strong order.
+#: Name of the statement from which the higher strong order follows.
 COMMUTING = "the sources of noise commute, hence strong order 1"
 
 
 def check(system: System) -> list[Statement]:
-    """All statements on a system; Casimirs and invariants in the order of the spec, found Casimirs after."""
+    """Return all statements about a system: Casimirs and invariants in the order of the spec, then the Casimirs that
+    were found."""
     return [
         skew_symmetry(system),
         jacobi_identity(system),
@@ -28,7 +29,7 @@ def check(system: System) -> list[Statement]:
 
 
 def skew_symmetry(system: System) -> Statement:
-    """Decide whether π_ij = −π_ji."""
+    """Decide whether π_ij = −π_ji for all i, j."""
     pi, names = system.poisson, system.coordinates
     n = len(names)
     residuals = [(f"({names[i]}, {names[j]})", pi[i][j] + pi[j][i]) for i in range(n) for j in range(i, n)]
@@ -36,7 +37,7 @@ def skew_symmetry(system: System) -> Statement:
 
 
 def casimir_statements(system: System) -> Iterator[Statement]:
-    """π∇C = 0 for each Casimir, declared or found."""
+    """Decide π∇C = 0 for each Casimir C, declared or found."""
     for name, casimir in system.casimirs.items():
         flow = hamiltonian_vector_field(system.poisson, gradient(casimir, system.coordinates))
         residuals = [(f"{{{c}, {name}}}", f) for c, f in zip(system.coordinates, flow, strict=True)]
@@ -45,7 +46,7 @@ def casimir_statements(system: System) -> Iterator[Statement]:
 
 
 def invariant_statements(system: System) -> Iterator[Statement]:
-    """{F, H} + ∂_t F = 0 for each further first integral F."""
+    """Decide {F, H} + ∂_t F = 0 for each declared invariant F."""
     flow = system.vector_field()
     for name, invariant in system.invariants.items():
         slopes = gradient(invariant, system.coordinates)
@@ -57,7 +58,7 @@ def invariant_statements(system: System) -> Iterator[Statement]:
 
 
 def force_statements(system: System) -> Iterator[Statement]:
-    """Statements on forces: the rates of change of Casimirs, and the sign of the damping."""
+    """Yield statements about forces: the rates of change of Casimirs, and that the damping reduces the energy."""
     if system.forces is None:
         return
     for name, casimir in system.casimirs.items():
@@ -76,7 +77,8 @@ def force_statements(system: System) -> Iterator[Statement]:
 
 
 def noise_statements(system: System) -> Iterator[Statement]:
-    """Statements on noise: whether its sources commute, which decides the strong order, and a stationary density."""
+    """Yield statements about noise: whether its sources commute, which gives the strong order, and a stationary
+    density."""
     if not system.noise:
         return
     commute = _commutation(system)
@@ -103,7 +105,7 @@ def noise_statements(system: System) -> Iterator[Statement]:
 
 
 def commuting(system: System) -> bool:
-    """Whether the flows of all sources of noise commute, as far as phigen can tell."""
+    """Whether the flows of all sources of noise commute, as far as phigen can decide it."""
     return _commutation(system).holds
 
 
@@ -114,7 +116,10 @@ def _commutation(system: System) -> Statement:
 
 
 def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
-    """Obstruction to commuting flows of two sources: π∇{g_i, g_j}, as the sum of the squares of its components."""
+    """Return a label, and an expression that is 0 if the flows of noise sources i and j commute.
+
+    The expression is the sum of the squares of the components of π∇{σ_i g_i, σ_j g_j}.
+    """
     first, second = system.noise[i], system.noise[j]
     field = hamiltonian_vector_field(system.poisson, second.impulse(system.coordinates))
     bracket = total(a * b for a, b in zip(first.impulse(system.coordinates), field, strict=True))
@@ -125,7 +130,10 @@ def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
 def _temperature(
     system: System, slope: Sequence[Expression], diffusive_rate: Sequence[Expression], spread: Sequence[Expression]
 ) -> Expression | None:
-    """The T for which 2T (πζ + f) + Σ σ² (XH) X has no component along ∇H at some point; None if there is none."""
+    """Return a temperature T for which 2T(πζ + f) + Σ σ²(XH)X has no component along ∇H, at one point.
+
+    ``slope`` is ∇H, ``diffusive_rate`` is πζ + f, and ``spread`` is Σ σ²(XH)X. Returns None if no such T was found.
+    """
     loss = total(a * b for a, b in zip(slope, diffusive_rate, strict=True))
     gained = total(a * b for a, b in zip(slope, spread, strict=True))
     for k in range(ATTEMPTS):
@@ -137,8 +145,8 @@ def _temperature(
 
 
 def _ratio(numerator: Expression, denominator: Expression) -> Expression:
-    """A quotient with common factors cancelled."""
-    for _ in range(2):  # squares of roots are recognised in the second ring only
+    """Return the quotient of two expressions, with common factors cancelled."""
+    for _ in range(2):  # The first round rewrites squares of roots, which only the ring of the second round recognises.
         tower = Tower(symbols_of(numerator, denominator), [numerator, denominator])
         a, b = (tower.simplified(e) for e in tower.convert_all([numerator, denominator]))
         common = a.gcd(b)
@@ -147,7 +155,7 @@ def _ratio(numerator: Expression, denominator: Expression) -> Expression:
 
 
 def rank_statement(system: System) -> Statement:
-    """The rank of π at generic points against the number of independent Casimirs known."""
+    """State the rank of π at generic points, and the number of independent Casimirs."""
     slopes = [gradient(c, system.coordinates) for c in system.casimirs.values()]
     ranks = generic_ranks([system.poisson, slopes], system.positive)
     if ranks is None:

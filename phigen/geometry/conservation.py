@@ -1,9 +1,9 @@
-"""Units of errors of energy, Casimirs and invariants: the same wherever errors are measured, printed or drawn.
+"""Units of the errors of energy, Casimirs and invariants, which are the same for measurements, tables and figures.
 
-Errors are relative to the value at the start. If that value is much smaller than its terms, it depends on the choice
-of the zero of energy; then errors are relative to the terms. For a system the terms are Σ |x_i ∂_i H| at the start:
-the change of H by a relative change of the coordinates, independent of added constants. For a lattice they are the
-magnitudes of the energies of the sites. If they are 0 too, errors are absolute.
+An error is relative to the value at the start. If this value is much smaller than its terms, it depends on the choice
+of the zero of energy, so the error is relative to the terms. For a system, the terms are Σ |x_i ∂_i H| at the start:
+the change of H by a relative change of all coordinates, independent of constants in H. For a lattice, they are the sum
+of the absolute energies of the sites. If the terms are 0 too, the error is absolute.
 """
 
 from __future__ import annotations
@@ -19,29 +19,32 @@ from phigen.geometry.system import System
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient
 
-#: A value below this fraction of its terms counts as zero.
+#: Ratio of a value to its terms below which the value counts as 0.
 SMALL = 1e-3
 
-#: Energy error, in its unit, above which users are warned: a tenth of the energy is not a small perturbation.
+#: Energy error, in its unit, above which users are warned: an error of a tenth of the energy is not a small
+#: perturbation.
 LARGE_ENERGY_ERROR = 0.1
 
 RELATIVE, TERMS, SITES, ABSOLUTE = "relative", "of its terms", "of its sites", "absolute"
 
-#: The quantity that every system has.
+#: Name of the quantity that every system has.
 ENERGY = "energy"
 
 
 def rounding(steps: int) -> float:
-    """Bound of the round-off error of a quantity after ``steps`` steps, relative to its terms: a random walk."""
+    """Return a bound for the round-off error of a quantity after ``steps`` steps, relative to its terms; it grows as
+    √steps."""
     return 1e-15 * (20 + math.sqrt(steps))
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of the errors of a quantity: its ``size``, and the ``kind`` `RELATIVE`, `TERMS`, `SITES` or `ABSOLUTE`.
+    """Unit of the errors of a quantity: its ``size``, and its ``kind``, one of `RELATIVE`, `TERMS`, `SITES`,
+    `ABSOLUTE`.
 
-    ``terms`` are those of the quantity at the start, in this unit; rounding errors are proportional to them.
-    ``moves`` says that time, forces or noise change the quantity, so that its changes are not errors.
+    ``terms`` is the sum of terms at the start in this unit, to which rounding errors are proportional. ``moves`` says
+    that time, forces or noise change the quantity, so that its changes are not errors.
     """
 
     size: float = 1.0
@@ -51,12 +54,12 @@ class Unit:
 
     @property
     def adjective(self) -> str:
-        """The kind of errors in this unit: ``relative`` or ``absolute``."""
+        """The kind of errors in this unit as an adjective: ``relative`` or ``absolute``."""
         return ABSOLUTE if self.kind == ABSOLUTE else RELATIVE
 
     def errors(self, values: Floats, start: float) -> Floats:
-        """The errors (rows,) of values (rows,)."""
-        with np.errstate(invalid="ignore"):  # of energies that are not finite
+        """Return the errors (rows,) of values (rows,) of the quantity in this unit; ``start`` is its exact value."""
+        with np.errstate(invalid="ignore"):  # values may be infinite or NaN
             errors: Floats = np.abs(values - start) / self.size
         return errors
 
@@ -64,25 +67,26 @@ class Unit:
 def units(
     quantities: Iterable[Expression], coordinates: Sequence[str], parameters: Mapping[str, float], start: Floats
 ) -> list[Unit]:
-    """The unit of each quantity on a trajectory from the state ``start`` (DIM,)."""
+    """Return the unit of each quantity, on a trajectory from the state ``start`` (DIM,)."""
     point_values = {**parameters, **dict(zip(coordinates, np.asarray(start).tolist(), strict=True))}
     values = (value_and_terms(q, coordinates, point_values) for q in quantities)
     return [unit_of(float(value), float(terms)) for value, terms in values]
 
 
 def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> dict[str, Unit]:
-    """The units of the energy and the Casimirs of a system, by their names."""
+    """Return the units of energy and Casimirs of a system by name, on a trajectory from the state ``start`` (DIM,)."""
     quantities = {ENERGY: system.hamiltonian, **system.casimirs}
     return dict(zip(quantities, units(quantities.values(), system.coordinates, parameters, start), strict=True))
 
 
 def moving(system: System) -> list[str]:
-    """The names of energy and Casimirs that time, forces or noise change."""
+    """Return the names of those of energy and Casimirs that time, forces or noise change."""
     return [ENERGY, *system.pushed] if system.driven else []
 
 
 def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
-    """The unit of a quantity with the given value and sum of terms at the start, where terms are of the ``kind``."""
+    """Return the unit of a quantity by its value and its sum of terms at the start; ``kind`` is the kind of the
+    terms."""
     if abs(value) > SMALL * terms and math.isfinite(value):
         return Unit(abs(value), RELATIVE, max(1.0, terms / abs(value)))
     return Unit(terms, kind) if 0 < terms < math.inf else Unit()
@@ -91,20 +95,21 @@ def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
 def value_and_terms(
     quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]
 ) -> tuple[Floats, Floats]:
-    """Q and Σ |x_i ∂_i Q|, at one state or at each of a trajectory."""
+    """Return a quantity Q and Σ |x_i ∂_i Q|, at one state or at each state of a trajectory."""
     value, *slopes = evaluate([quantity, *gradient(quantity, coordinates)], values)
     with np.errstate(all="ignore"):
         return value, np.asarray(sum(np.abs(values[c] * slope) for c, slope in zip(coordinates, slopes, strict=True)))
 
 
 def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]) -> float:
-    """The largest value or sum of terms along a trajectory, to which rounding errors are proportional."""
+    """Return the largest of |Q| and Σ |x_i ∂_i Q| along a trajectory, to which rounding errors are proportional."""
     value, terms = value_and_terms(quantity, coordinates, values)
     return float(np.max(np.maximum(np.abs(value), terms))) or 1.0
 
 
 def stated(units_by_name: Mapping[str, Unit]) -> str:
-    """The sentence that names the units of errors; ``units_by_name`` are units by the names of quantities."""
+    """Return the sentence on a figure or table that says which units its errors have, from units by name of the
+    quantity."""
     errors = "Errors and changes" if any(unit.moves for unit in units_by_name.values()) else "Errors"
     relative = any(unit.kind == RELATIVE for unit in units_by_name.values())
     clauses = [f"{errors} are relative to the value at the start"] if relative else []

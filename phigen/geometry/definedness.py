@@ -1,4 +1,4 @@
-"""Tests that the formulas of a system are defined: no division by zero, and some point in their domain."""
+"""Tests whether the formulas of a system are defined: they do not divide by 0, and have values at some points."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: Points that are tried, and the factors by which they are tried: near 0, around 1 and far away.
+#: Number of sample points, and factors by which their coordinates are multiplied: points of size 1, near 0, and far
+#: away.
 POINTS = 64
 SCALES = (Fraction(1), Fraction(1, 32), Fraction(30))
-#: A value above this magnitude is not 0: the rounding of an expression that vanishes stays far below.
-_CLEARLY = 1e-6
+#: Absolute value above which an expression is not 0; the rounding errors of an expression that is 0 are much smaller.
+_NONZERO = 1e-6
 
 Point = Mapping[str, float]
 
 
 def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Statement]:
-    """A statement for each of H, π, the Casimirs and the invariants that seems to be undefined everywhere.
+    """Yield a statement for each part of a system that seems to be undefined everywhere: H, π, each Casimir and
+    invariant.
 
-    ``starts`` are the coordinates and parameters at the starts of runs. An expression is refuted if it divides by
-    zero (by exact proof if possible), or if it has no value at the sampled points and at the starts; without starts,
-    the latter is undecided.
+    ``starts`` has the coordinates and parameters at the starts of runs. A part is refuted if it divides by 0, or if it
+    has no value at the sample points and at the starts. Without starts, missing values leave it undecided.
     """
     for name, roots in _parts(system).items():
         divisor = _divided_by_zero(roots, system.positive)
@@ -38,7 +39,7 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
 
 
 def undefined_starts(system: System, starts: Mapping[str, Point]) -> Iterator[Statement]:
-    """A statement for each run, by its name, at whose start some part of the system has no value."""
+    """Yield a statement for each run, by name, at whose start some part of the system has no value."""
     parts = _parts(system)
     for run, point in starts.items():
         undefined = [name for name, roots in parts.items() if not _is_defined(roots, point)]
@@ -47,12 +48,12 @@ def undefined_starts(system: System, starts: Mapping[str, Point]) -> Iterator[St
 
 
 def start_is_defined(run: str) -> str:
-    """The name of the statement about the start of a run."""
+    """Return the name of the statement about the start of a run."""
     return f"everything is defined where {run} starts"
 
 
 def _parts(system: System) -> dict[str, Sequence[Expression]]:
-    """The expressions of a system, each with its description."""
+    """Return the expressions of each part of a system, by a description of the part."""
     parts: dict[str, Sequence[Expression]] = {"H": [system.hamiltonian]}
     if system.forces:
         parts["the force"] = [*system.forces.covector, *system.forces.vector]
@@ -62,7 +63,8 @@ def _parts(system: System) -> dict[str, Sequence[Expression]]:
 
 
 def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> str:
-    """Description of a divisor, or of the argument of a logarithm, that is zero; empty if there is none."""
+    """Return a description of a divisor, or of an argument of a logarithm, that is 0 everywhere; "" if there is
+    none."""
     for e in topological(list(roots)):
         if e.op == "log" or (e.op == "pow" and e.value < 0):
             (argument,) = e.args
@@ -75,14 +77,14 @@ def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> 
 
 
 def _may_be_zero(e: Expression, positive: Collection[str]) -> bool:
-    """Whether the values at some points are compatible with 0."""
+    """Whether the value at the first sample point in the domain is compatible with 0."""
     names = symbols_of(e)
     for k in range(POINTS):
         try:
             (value,) = evaluate([e], {n: float(v) for n, v in sample_point(names, positive, k).items()})
         except DomainError:
             continue
-        return abs(value) < _CLEARLY
+        return abs(value) < _NONZERO
     return False
 
 

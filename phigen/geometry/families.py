@@ -1,7 +1,7 @@
-"""The named Lie algebras of a spec, for every size: bases, their order, and faithful real representations.
+"""The named Lie algebras of specs, for every size: basis, order of the basis, and faithful real matrices.
 
-E_ij is the matrix with a single 1 in row i, column j. With ``sign: plus``, {x_i, x_j} = Σ c_ij^k x_k for the
-constants [E_i, E_j] = Σ c_ij^k E_k below; ``sign: minus`` negates all brackets.
+E_ij is the matrix with a single 1 in row i, column j. With ``sign: plus``, {x_i, x_j} = Σ c_ij^k x_k for the constants
+[E_i, E_j] = Σ c_ij^k E_k below; ``sign: minus`` negates all brackets.
 
 ================ ============================================================================================
 so(3)            L_1, L_2, L_3 with [L_1, L_2] = L_3 and cyclic (L_k v = e_k × v). The free rigid body in the
@@ -33,7 +33,7 @@ from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.matrix_algebras import algebra_of_sparse_matrices
 from phigen.symbolic.expression import number
 
-#: (row, column) → entry, counted from 0.
+#: Sparse matrix: (row, column), counted from 0 → entry.
 Entries = dict[tuple[int, int], Fraction]
 
 
@@ -86,7 +86,7 @@ def _su(n: int) -> tuple[int, list[Entries]]:
 
 
 def _complexified(real: Entries, imaginary: Entries) -> Entries:
-    """The real matrix (a −b; b a) of a + ib, rows and columns interleaved as re, im, re, im, …"""
+    """Return the real matrix (a −b; b a) of a + ib; rows and columns are in the order re, im, re, im, …"""
     real_entries = {}
     for (i, j), v in real.items():
         real_entries[2 * i, 2 * j] = real_entries[2 * i + 1, 2 * j + 1] = v
@@ -113,7 +113,7 @@ def _aff(n: int) -> tuple[int, list[Entries]]:
     return n + 1, [_unit(i, j) for i, j in _all(n)] + [_unit(i, n) for i in range(n)]
 
 
-#: name → (smallest size, dimension for a size, size and entries of the matrices)
+#: name → (smallest size, function for the dimension of a size, function for size and entries of the matrices)
 FAMILIES: dict[str, tuple[int, Callable[[int], int], Callable[[int], tuple[int, list[Entries]]]]] = {
     "so": (2, lambda n: n * (n - 1) // 2, _so),
     "se": (2, lambda n: n * (n + 1) // 2, _se),
@@ -127,7 +127,8 @@ FAMILIES: dict[str, tuple[int, Callable[[int], int], Callable[[int], tuple[int, 
 
 
 def dimension(family: str, size: int) -> int:
-    """Dimension of a named algebra; raises `SpecError` for an unknown family or a size it does not have."""
+    """Return the dimension of a named algebra. Raises `SpecError` for an unknown family, or a size that the family
+    lacks."""
     if family not in FAMILIES:
         families = ", ".join(f"{name}(n)" for name in FAMILIES)
         raise SpecError([Diagnostic(f"unknown Lie algebra {family}({size})", hint=f"known families: {families}")])
@@ -140,7 +141,7 @@ def dimension(family: str, size: int) -> int:
 
 
 def named(family: str, size: int) -> LieAlgebra:
-    """A named algebra with its defining representation; raises as `dimension`."""
+    """Return a named algebra with its defining representation. Raises the errors of `dimension`."""
     dimension(family, size)
     matrix_size, basis = FAMILIES[family][2](size)
     matrices = [{position: number(v) for position, v in sorted(m.items())} for m in basis]
@@ -148,7 +149,7 @@ def named(family: str, size: int) -> LieAlgebra:
 
 
 def families_of_dimension(dimension: int) -> list[tuple[str, int]]:
-    """All (family, size) of that dimension; in each family the dimension increases with the size."""
+    """Return the (family, size) of all named algebras with this dimension."""
     families = []
     for name, (smallest, dimension_of, _) in FAMILIES.items():
         step = 2 if name == "sp" else 1

@@ -1,4 +1,4 @@
-"""Arithmetic of structure constants: the field Q, or Q(parameters) when parameters occur in them."""
+"""Arithmetic of structure constants: the field Q, or Q(parameters) if the constants contain parameters."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from phigen.symbolic.expression import Expression, number, topological
 from phigen.symbolic.horner import horner
 from phigen.symbolic.tower import rational
 
-#: An element of a `Field`: ``flint.fmpq`` or `Ratio`; both know + - * / and comparison with 0.
+#: Element of a `Field`: ``flint.fmpq`` or `Ratio`. Both have + − * / and comparison with 0.
 Scalar = Any
 
 _ARITHMETIC = frozenset({"number", "symbol", "add", "sub", "neg", "mul"})
 
 
 class Ratio:
-    """A quotient of polynomials over Q in lowest terms, the denominator with leading coefficient 1."""
+    """Quotient of polynomials over Q in lowest terms; the leading coefficient of the denominator is 1."""
 
     __slots__ = ("denominator", "numerator")
 
@@ -66,11 +66,11 @@ class Ratio:
 
 
 class Field(Arithmetic[Scalar]):
-    """The smallest field Q(symbols) that holds the given expressions.
+    """The smallest field Q(symbols) that contains some expressions.
 
-    A function of parameters (``sqrt(l)``, ``pi``) is one more independent symbol. Relations between such functions
-    are not used, so an element that vanishes only by one of them counts as non-zero. This affects the recognition of
-    algebraic structures only; everything built from them is proved in a `Tower`.
+    Functions of parameters (``sqrt(l)``) and constants such as ``pi`` are further independent symbols. Relations
+    between them are not used, so an element that is 0 only by such a relation counts as non-zero. This only affects the
+    recognition of algebraic structures; statements about them are proved in a `Tower`.
     """
 
     def __init__(self, expressions: Iterable[Expression] = ()) -> None:
@@ -87,33 +87,33 @@ class Field(Arithmetic[Scalar]):
         self.one = self.number(1)
 
     def number(self, value: int | Fraction) -> Scalar:
-        """The rational number as an element."""
+        """Return a rational number as an element of the field."""
         value = Fraction(value)
         rational = fmpq(value.numerator, value.denominator)
         return rational if self.is_rational else Ratio(self._context.constant(rational), self._context.constant(1))
 
     def convert(self, e: Expression) -> Scalar:
-        """The expression as an element; KeyError if it needs a symbol that the field does not have."""
+        """Return an expression as an element of the field. Raises `KeyError` if it contains other symbols."""
         if e.is_number:
             return self.number(e.value)
         return self.values([e])[0]
 
     def visit(self, node: Expression, args: list[Scalar]) -> Scalar:
-        """The element of a node."""
+        """Return the element of a node of the expression, from the elements of its arguments."""
         if id(node) in self._index:
             return Ratio(self._context.gens()[self._index[id(node)]], self._context.constant(1))
         return super().visit(node, args)
 
     def constant(self, value: Fraction) -> Scalar:
-        """The rational number as an element."""
+        """Return a rational number as an element of the field."""
         return self.number(value)
 
     def variable(self, name: str) -> Scalar:
-        """KeyError: symbols of the field are not decomposed."""
+        """Raise `KeyError`, since `visit` has converted all symbols that the field contains."""
         raise KeyError(name)
 
     def power(self, base: Scalar, exponent: Fraction) -> Scalar:
-        """Return an integer power of an element."""
+        """Return an integer power of an element. Raises `KeyError` for other powers."""
         if exponent.denominator != 1:
             raise KeyError(str(exponent))
         return base ** int(exponent)
@@ -123,7 +123,7 @@ class Field(Arithmetic[Scalar]):
         raise KeyError(name)
 
     def expression(self, element: Scalar) -> Expression:
-        """The element as an expression."""
+        """Return an element of the field as an expression."""
         if self.is_rational:
             return number(rational(element))
         top, bottom = (self._polynomial(p) for p in (element.numerator, element.denominator))

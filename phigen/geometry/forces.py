@@ -1,7 +1,8 @@
-"""Forces beside the Hamiltonian: ẋ = π(∇H + ζ) + f, with a covector field ζ and a vector field f.
+"""Forces in addition to the Hamiltonian: ẋ = π(∇H + ζ) + f, with a covector field ζ and a vector field f.
 
-πζ is tangent to the leaves, so ζ keeps all Casimirs; every field tangent to the leaves is of this form. Damping by
-the double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². f may be any field, and usually changes Casimirs.
+πζ is tangent to the symplectic leaves, so ζ conserves all Casimirs; every field tangent to the leaves has this form.
+Damping by the double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². f may be any field, and usually changes
+Casimirs.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from phigen.symbolic.expression import ZERO, Expression
 
 @dataclass(frozen=True)
 class Forces:
-    """``covector`` is ζ including the damping, ``vector`` is f, by coordinates.
+    """Forces of a system: ``covector`` is ζ, including the damping, and ``vector`` is f, both by coordinate.
 
-    ``damping`` is λ, 0 if there is none, and ``undamped`` is ζ without it.
+    ``damping`` is λ, or 0 without damping. ``undamped`` is ζ without the damping.
     """
 
     covector: tuple[Expression, ...]
@@ -27,7 +28,7 @@ class Forces:
 
 
 def forces_of(spec_forces: SpecForces, coordinates: Sequence[str], field: Sequence[Expression]) -> Forces | None:
-    """The forces of a spec, None without forces; ``field`` is π∇H."""
+    """Return the forces of a spec, None without forces; ``field`` is π∇H."""
     if not spec_forces:
         return None
     damping = spec_forces.damping or ZERO

@@ -1,4 +1,4 @@
-"""The Poisson tensor π_ij = {x_i, x_j} of a form in a spec."""
+"""The Poisson tensor π_ij = {x_i, x_j} for each form of π in specs."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, symbol, 
 
 
 def structure(form: PoissonForm, coordinates: Sequence[str]) -> tuple[Matrix, Shape]:
-    """π of a form, and its shape; raises `SpecError` as `algebra_of_form` and `poisson_matrix`."""
+    """Return π of a form, and its shape. Raises the errors of `algebra_of_form` and `poisson_matrix`."""
     algebra = algebra_of_form(form, coordinates)
     matrix = poisson_matrix(form, coordinates, algebra)
     return matrix, LiePoisson(algebra) if algebra and algebra.constants else recognise(coordinates, matrix)
 
 
 def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAlgebra | None = None) -> Matrix:
-    """The n×n matrix of the form; ``algebra`` is that of `algebra_of_form`.
+    """Return the n×n matrix π of a form; ``algebra`` is the result of `algebra_of_form`.
 
-    Raises `SpecError` where a size does not match the number of coordinates.
+    Raises `SpecError` if a size does not match the number of coordinates.
     """
     n = len(coordinates)
     match form:
@@ -58,15 +58,15 @@ def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAl
 
 
 def algebra_of_form(form: PoissonForm, coordinates: Sequence[str]) -> LieAlgebra | None:
-    """The Lie algebra of a ``lie_algebra`` form, multiplied by its sign; None for the other forms.
+    """Return the Lie algebra of a ``lie_algebra`` form, multiplied by its sign; None for other forms.
 
-    Raises `SpecError` for an unknown family, a dimension other than the number of coordinates, and what
-    `phigen.geometry.matrix_algebras` refuses.
+    Raises `SpecError` for an unknown family, for a dimension other than the number of coordinates, and for matrices or
+    constants that `phigen.geometry.matrix_algebras` refuses.
     """
     if not isinstance(form, LieAlgebraForm):
         return None
     if form.family:
-        # Checked before the matrices are built: so(1000), a typing error, would take minutes.
+        # The dimension is checked before the matrices are built, which would take minutes for so(1000), a typing error.
         _expect_dimension(f"{form.family}({form.size})", families.dimension(form.family, form.size), len(coordinates))
         algebra = families.named(form.family, form.size)
     elif form.matrices:
@@ -89,7 +89,7 @@ def _canonical(coordinates: Sequence[str], q: Sequence[str], p: Sequence[str]) -
 
 
 def _product(coordinates: Sequence[str], blocks: Sequence[tuple[tuple[str, ...], PoissonForm]]) -> Matrix:
-    """Block-diagonal π; raises `SpecError` for a block that depends on coordinates of another."""
+    """Return the block-diagonal π of several forms. Raises `SpecError` if a block depends on coordinates of another."""
     index = {c: i for i, c in enumerate(coordinates)}
     n = range(len(coordinates))
     entries = [[ZERO for _ in n] for _ in n]
@@ -106,10 +106,10 @@ def _product(coordinates: Sequence[str], blocks: Sequence[tuple[tuple[str, ...],
 
 
 def _nambu(coordinates: Sequence[str], casimirs: Sequence[Expression]) -> Matrix:
-    """π_ij = det ∂(x_i, x_j, C_1, …, C_{n−2})/∂(x_1, …, x_n).
+    """Return π_ij = det ∂(x_i, x_j, C_1, …, C_{n−2})/∂(x_1, …, x_n), the matrix of a Nambu bracket.
 
-    That is {f, g} = det ∂(f, g, C_1, …, C_{n−2})/∂(x_1, …, x_n). For n = 3: {x_1, x_2} = ∂C/∂x_3 and cyclic,
-    so that ẋ = ∇H × ∇C. Raises `SpecError` unless there are n − 2 Casimirs.
+    The bracket is {f, g} = det ∂(f, g, C_1, …, C_{n−2})/∂(x_1, …, x_n). For n = 3, {x_1, x_2} = ∂C/∂x_3 and cyclic, so
+    that ẋ = ∇H × ∇C. Raises `SpecError` unless there are n − 2 Casimirs.
     """
     n = len(coordinates)
     if len(casimirs) != n - 2:
@@ -128,9 +128,10 @@ def _nambu(coordinates: Sequence[str], casimirs: Sequence[Expression]) -> Matrix
 def _minor(
     rows: Sequence[Sequence[Expression]], columns: Sequence[int], minors: dict[tuple[int, ...], Expression]
 ) -> Expression:
-    """The determinant of as many of the last rows as there are columns, by Laplace expansion along the first of them.
+    """Return the determinant of the last k rows in k columns, where k is the number of ``columns``.
 
-    ``minors`` caches the minors: there are 2ⁿ of them, whereas the expansion has n! terms.
+    It is expanded along the first of these rows. ``minors`` caches minors by their columns: there are 2ⁿ minors, while
+    the expansion without a cache has n! terms.
     """
     if not columns:
         return ONE

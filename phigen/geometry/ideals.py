@@ -1,7 +1,7 @@
 """Direct sums of Lie algebras in a basis that mixes the summands, such as so(4) = so(3) ⊕ so(3).
 
-The projections onto the summands commute with every ad_X, so they lie in the centroid, the linear maps T with
-T[X, Y] = [TX, Y]. A primary decomposition of the centroid's elements over Q finds them.
+The projections onto the summands commute with every ad_X. So they lie in the centroid, the space of linear maps T with
+T[X, Y] = [TX, Y]. They follow from primary decompositions of elements of the centroid over Q.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.linear import kernel
 from phigen.symbolic.tower import rational
 
-#: Above this dimension the centroid, n² unknowns, is not computed.
+#: Largest dimension n of an algebra for which the centroid is computed, since it has n² unknowns.
 LARGEST = 12
 
 Rows = tuple[tuple[Fraction, ...], ...]
 
 
 def ideal_projections(algebra: LieAlgebra) -> list[Rows]:
-    """Projections e_1, …, e_r with Σ e_a = 1, e_a e_b = 0 onto ideals of which the algebra is the direct sum.
+    """Return projections e_1, …, e_r onto ideals of which the algebra is the direct sum: Σ e_a = 1, e_a e_b = 0.
 
-    Row-major matrices in the basis E_i (column j is the image of E_j). One, the identity, if nothing finer was
-    found: structure constants with parameters, a large or an indecomposable algebra.
+    Each is a matrix by rows in the basis E_i, whose column j is the image of E_j. The only projection is the identity
+    for indecomposable and for large algebras, and if structure constants contain parameters.
     """
     n = algebra.dimension
     parts = [_identity(n)]
@@ -47,17 +47,17 @@ def _refined(part: Any, idempotent: Any) -> list[Any]:
 
 
 def _centroid(algebra: LieAlgebra) -> list[Any]:
-    """A basis of the maps T with T[E_i, E_j] = [TE_i, E_j] for all i, j."""
+    """Return a basis of the linear maps T with T[E_i, E_j] = [TE_i, E_j] for all i, j."""
     n, field = algebra.dimension, algebra.field
     constants = [[{k: field.convert(c) for k, c in algebra.bracket(i, j).items()} for j in range(n)] for i in range(n)]
     equations = []
     for i in range(n):
         for j in range(n):
             rows: list[dict[int, Scalar]] = [{} for _ in range(n)]
-            for k, c in constants[i][j].items():  # T[E_i, E_j]: T_mk is unknown m·n + k
+            for k, c in constants[i][j].items():  # Add T[E_i, E_j]; the unknown m·n + k is T_mk.
                 for m in range(n):
                     rows[m][m * n + k] = rows[m].get(m * n + k, field.zero) + c
-            for a in range(n):  # [TE_i, E_j] = Σ_a T_ai [E_a, E_j]
+            for a in range(n):  # Subtract [TE_i, E_j] = Σ_a T_ai [E_a, E_j].
                 for m, c in constants[a][j].items():
                     rows[m][a * n + i] = rows[m].get(a * n + i, field.zero) - c
             equations += [row for row in rows if row]
@@ -65,7 +65,7 @@ def _centroid(algebra: LieAlgebra) -> list[Any]:
 
 
 def _idempotents(element: Any) -> list[Any]:
-    """The projections onto the primary components of a matrix over Q; none if there is only one."""
+    """Return the projections onto the primary components of a matrix over Q; [] if there is only one component."""
     minimal = element.minpoly()
     _, factors = minimal.factor()
     if len(factors) < 2:
@@ -96,5 +96,5 @@ def _rows(matrix: Any) -> Rows:
 
 
 def applied(rows: Sequence[Sequence[Fraction]], vector: Sequence[Any], zero: Any) -> list[Any]:
-    """The product of a matrix of rationals and a vector of expressions."""
+    """Return the product of a matrix of rational numbers and a vector of expressions."""
     return [sum((c * v for c, v in zip(row, vector, strict=True) if c), zero) for row in rows]

@@ -11,19 +11,20 @@ from phigen.symbolic.numeric import DomainError, evaluate_precisely, evaluate_wi
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 
-#: Degrees up to which polynomials are recognised: those of constant, linear and log-canonical tensors.
+#: Largest degree of polynomials that are recognised: those of constant, linear and log-canonical tensors have degree ≤
+#: 2.
 DEGREE = 2
-#: Points at which values are taken, in this order: (a, a + b, a + 2b, …); many functions are rational at the first two.
+#: Points of expansion (a, a + b, a + 2b, …) as pairs (a, b). Many functions have rational values at the first two.
 _BASES = ((0, 0), (1, 0), (2, 1))
-#: Number of lines that are tried until the function has values on one.
+#: Number of lines that are tried until the function has values on one of them.
 _LINES = 8
 
 
 def polynomial_by_identity(e: Expression, coordinates: Sequence[str]) -> Expression | None:
-    """The polynomial in the coordinates, of degree ≤ `DEGREE`, that equals the expression; None if there is none.
+    """Return the polynomial in the coordinates, of degree ≤ `DEGREE`, that equals the expression; else None.
 
-    The coefficients are Taylor coefficients at a point, and the equality is proved in the ring of the functions that
-    occur. None also if there is no proof.
+    The coefficients are Taylor coefficients at a point. The equality is proved in the ring of the functions that occur;
+    without a proof, the result is None.
     """
     moving = [c for c in symbols_of(e) if c in coordinates]
     if not _flat_on_a_line(e, moving):
@@ -39,7 +40,10 @@ def polynomial_by_identity(e: Expression, coordinates: Sequence[str]) -> Express
 
 
 def _flat_on_a_line(e: Expression, moving: Sequence[str]) -> bool:
-    """Whether the difference of order `DEGREE` + 1 vanishes on a line: cheap, and false for nearly all functions."""
+    """Whether the finite difference of order `DEGREE` + 1 vanishes on a line.
+
+    This test is cheap, and excludes nearly all functions that are no polynomials.
+    """
     names = symbols_of(e)
     for k in range(_LINES):
         start = sample_point(names, names, k)
@@ -57,7 +61,8 @@ def _flat_on_a_line(e: Expression, moving: Sequence[str]) -> bool:
 
 
 def _expansion(e: Expression, moving: Sequence[str]) -> Expression | None:
-    """The Taylor polynomial about the first point that has one; None if none has."""
+    """Return the Taylor polynomial of degree 2 about the first point of `_BASES` where it exists; None if there is
+    none."""
     slopes = gradient(e, moving)
     parts = [e, *slopes, *(c for slope in slopes for c in gradient(slope, moving))]
     parameters = [s for s in symbols_of(e) if s not in moving]
@@ -74,7 +79,7 @@ def _expansion(e: Expression, moving: Sequence[str]) -> Expression | None:
 def _values_at(
     parts: Sequence[Expression], base: Mapping[str, Fraction], parameters: Sequence[str]
 ) -> list[Expression]:
-    """The expressions at a point of the coordinates; none if they have no values there."""
+    """Return the expressions at a point of the coordinates; [] if one of them has no value there."""
     try:
         evaluate_precisely(parts, {**sample_point(parameters, parameters, 0), **base}, DIGITS)
     except DomainError:

@@ -1,4 +1,4 @@
-"""The Jacobi identity of a Poisson tensor, proved in the ring that holds its entries."""
+"""Decision of the Jacobi identity of a Poisson tensor, in the ring that contains its entries."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from phigen.symbolic.verdict import Statement, decide_elements
 
 
 def jacobi_identity(system: System) -> Statement:
-    """Prove or refute Σ_a (∂_a π_ij π_ak + ∂_a π_jk π_ai + ∂_a π_ki π_aj) = 0, i < j < k, with symbolic parameters.
+    """Decide Σ_a (∂_a π_ij π_ak + ∂_a π_jk π_ai + ∂_a π_ki π_aj) = 0 for all i < j < k, with symbolic parameters.
 
-    A refutation names the first failing triple that has a point where the sum is not zero.
+    A refutation names the first triple i, j, k with a point where the sum is not zero.
     """
     names = system.coordinates
     entries = [e for row in system.poisson for e in row]
@@ -27,7 +27,10 @@ def jacobi_identity(system: System) -> Statement:
 
 
 def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
-    """The cyclic sums that are not 0, computed from non-zero products: few in large structures."""
+    """Yield the names and values of the cyclic sums other than 0, as `Poly`.
+
+    They are computed from products of non-zero factors, of which large structures have few.
+    """
     names = system.coordinates
     n = range(len(names))
     images = iter(tower.convert_all([e for row in system.poisson for e in row]))
@@ -41,7 +44,8 @@ def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
                 for a in sorted(index[s] for s in tower.names_in(entry) if s in index):
                     slope = tower.derivative(entry, names[a])
                     for k, second_factor in rows[a].items() if slope != 0 else ():
-                        if k not in (i, j) and (i < j < k or j < k < i or k < i < j):  # a cyclic permutation
+                        # each triple once, in one of its cyclic orders
+                        if k not in (i, j) and (i < j < k or j < k < i or k < i < j):
                             indices = (min(i, j, k), i + j + k - min(i, j, k) - max(i, j, k), max(i, j, k))
                             sums[indices] = sums.get(indices, tower.zero) + tower.product(slope, second_factor)
     for (i, j, k), residual in sorted(sums.items(), key=lambda item: item[0]):

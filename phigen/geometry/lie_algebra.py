@@ -1,7 +1,7 @@
-"""Lie algebras by structure constants, with faithful matrix representations where they are known.
+"""Lie algebras by structure constants, with faithful matrices if known.
 
-Convention: [E_i, E_j] = Σ_k c_ij^k E_k, and on the dual {x_i, x_j} = Σ_k c_ij^k x_k. A spec's ``sign: minus``
-negates all c_ij^k; −E_i then represents the negated algebra.
+The structure constants are defined by [E_i, E_j] = Σ_k c_ij^k E_k; on the dual, {x_i, x_j} = Σ_k c_ij^k x_k. ``sign:
+minus`` in a spec negates all c_ij^k; the matrices −ρ(E_i) then represent the negated algebra.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from functools import cached_property
 from phigen.geometry.field import Field, Scalar
 from phigen.symbolic.expression import Expression, symbol, total
 
-#: A sparse vector or matrix: index or (row, column) → non-zero scalar.
+#: Sparse vector, by index, and sparse matrix, by (row, column), of non-zero scalars.
 Vector = dict[int, Scalar]
 SparseMatrix = dict[tuple[int, int], Scalar]
 
 
 @dataclass(frozen=True)
 class Representation:
-    """Matrices ρ(E_i) with ρ([E_i, E_j]) = [ρ(E_i), ρ(E_j)], as sparse entries (row, column) → value."""
+    """Matrices ρ(E_i) with ρ([E_i, E_j]) = [ρ(E_i), ρ(E_j)], each by its non-zero entries: (row, column) → value."""
 
     name: str
     size: int
@@ -29,10 +29,10 @@ class Representation:
 
 @dataclass(frozen=True)
 class LieAlgebra:
-    """A Lie algebra over Q(parameters) with a basis E_1 … E_n.
+    """Lie algebra over Q(parameters) with a basis E_1 … E_n.
 
-    ``constants[(i, j)][k]`` is c_ij^k for i < j, only non-zero values; c_ji^k = −c_ij^k. ``representation`` is
-    a faithful one if the source of the algebra gives it.
+    ``constants[(i, j)][k]`` is c_ij^k for i < j, without values 0; c_ji^k = −c_ij^k. ``representation`` is a faithful
+    one if the source of the algebra, such as the spec, has one.
     """
 
     name: str
@@ -42,7 +42,7 @@ class LieAlgebra:
     labels: tuple[str, ...] = field(default=())
 
     def bracket(self, i: int, j: int) -> Mapping[int, Expression]:
-        """[E_i, E_j] as k → c_ij^k."""
+        """Return [E_i, E_j] as a map k → c_ij^k."""
         if i == j:
             return {}
         if i < j:
@@ -50,22 +50,22 @@ class LieAlgebra:
         return {k: -c for k, c in self.constants.get((j, i), {}).items()}
 
     def label(self, i: int) -> str:
-        """The name of E_i for messages."""
+        """Return the name of E_i for messages."""
         return self.labels[i] if self.labels else f"E{i + 1}"
 
     @cached_property
     def field(self) -> Field:
-        """The field of the structure constants."""
+        """The field that contains the structure constants."""
         return Field(c for row in self.constants.values() for c in row.values())
 
     def poisson(self, coordinates: Sequence[str]) -> tuple[tuple[Expression, ...], ...]:
-        """The Lie–Poisson tensor π_ij = Σ_k c_ij^k x_k, an n×n matrix."""
+        """Return the Lie–Poisson tensor π_ij = Σ_k c_ij^k x_k, an n×n matrix."""
         x = [symbol(c) for c in coordinates]
         n = range(self.dimension)
         return tuple(tuple(total(c * x[k] for k, c in sorted(self.bracket(i, j).items())) for j in n) for i in n)
 
     def opposite(self) -> LieAlgebra:
-        """The algebra with the negated bracket, represented by −ρ(E_i)."""
+        """Return the algebra with the negated bracket, represented by −ρ(E_i)."""
         rep = self.representation
         if rep is not None:
             negated = tuple({position: -v for position, v in m.items()} for m in rep.matrices)

@@ -1,4 +1,4 @@
-"""Exact linear algebra with sparse vectors over a `Field`."""
+"""Exact linear algebra for sparse vectors over a `Field`."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Key = TypeVar("Key", bound=Any)
 @dataclass
 class _Row(Generic[Key]):
     pivot: Key
-    entries: dict[Key, Scalar]  # 1 at the pivot
-    combination: dict[int, Scalar]  # of the given vectors
+    entries: dict[Key, Scalar]  # entries of the row, 1 at its pivot
+    combination: dict[int, Scalar]  # coefficients of the original vectors
 
 
 class Span(Generic[Key]):
-    """The span of sparse vectors (key → non-zero scalar), with coordinates in terms of them.
+    """Span of sparse vectors (key → non-zero scalar), with coordinates of its elements in terms of these vectors.
 
-    ``dependent`` lists the positions of vectors that are combinations of earlier ones.
+    ``dependent`` has the positions of vectors that are combinations of earlier ones.
     """
 
     def __init__(self, field: Field, vectors: Iterable[Mapping[Key, Scalar]]) -> None:
@@ -38,11 +38,11 @@ class Span(Generic[Key]):
 
     @property
     def dimension(self) -> int:
-        """Dimension of the span."""
+        """The dimension of the span."""
         return len(self._rows)
 
     def coordinates(self, vector: Mapping[Key, Scalar]) -> dict[int, Scalar] | None:
-        """c with vector = Σ c[i]·vectors[i], only non-zero c[i]; None if the vector is not in the span."""
+        """Return c with vector = Σ c[i]·vectors[i], without values 0; None if the vector is not in the span."""
         remainder, combination = self._reduce(vector)
         return None if remainder else {i: -c for i, c in sorted(combination.items())}
 
@@ -68,7 +68,7 @@ class Span(Generic[Key]):
     def _reduce(self, vector: Mapping[Key, Scalar]) -> tuple[dict[Key, Scalar], dict[int, Scalar]]:
         remainder = {k: v for k, v in vector.items() if v != 0}
         combination: dict[int, Scalar] = {}
-        # Reduced rows: no row contains the pivot of another, so only the pivots of the vector itself matter.
+        # No row contains the pivot of another row, so only the pivots that occur in the vector need to be eliminated.
         for row, factor in [(self._by_pivot[k], v) for k, v in remainder.items() if k in self._by_pivot]:
             add_multiple(remainder, row.entries, -factor)
             add_multiple(combination, row.combination, -factor)
@@ -76,7 +76,7 @@ class Span(Generic[Key]):
 
 
 def add_multiple(target: dict[Key, Scalar], source: Mapping[Key, Scalar], factor: Scalar) -> None:
-    """target += factor·source, in place; entries that become 0 disappear."""
+    """Add ``factor``·``source`` to ``target`` in place; entries that become 0 are removed."""
     for k, v in source.items():
         value = target[k] + factor * v if k in target else factor * v
         if value == 0:
@@ -86,9 +86,9 @@ def add_multiple(target: dict[Key, Scalar], source: Mapping[Key, Scalar], factor
 
 
 def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> list[dict[int, Scalar]]:
-    """A basis of the vectors v of length ``size`` with Σ_k row[k]·v[k] = 0 for all rows, in reduced form.
+    """Return a basis of the vectors v of length ``size`` with Σ_k row[k]·v[k] = 0 for all rows.
 
-    Each vector is 1 at its last non-zero position, where the others are 0.
+    Each basis vector is 1 at its last non-zero position, where the other basis vectors are 0.
     """
     echelon: dict[int, dict[int, Scalar]] = {}
     for row in sorted(rows, key=len):
@@ -116,7 +116,8 @@ def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> lis
 
 
 def coprime_integers(vector: Mapping[Any, Scalar]) -> dict[Any, int]:
-    """The multiple of a vector over Q that has coprime integers, the first of them (in order of keys) positive."""
+    """Return the multiple of a vector over Q with coprime integers as entries; the entry with the smallest key is
+    positive."""
     exact = {k: rational(v) for k, v in sorted(vector.items())}
     scale = lcm(*(v.denominator for v in exact.values()))
     integers = {k: int(v * scale) for k, v in exact.items()}
@@ -126,7 +127,8 @@ def coprime_integers(vector: Mapping[Any, Scalar]) -> dict[Any, int]:
 
 
 def inverse_matrix(rows: Sequence[Sequence[Expression]]) -> tuple[tuple[Expression, ...], ...]:
-    """The inverse of a square matrix of expressions, its entries in lowest terms; ZeroDivisionError if it is singular.
+    """Return the inverse of a square matrix of expressions, in lowest terms. Raises ZeroDivisionError if it is
+    singular.
 
     Functions of symbols count as independent symbols, as in `Field`.
     """

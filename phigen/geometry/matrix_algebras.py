@@ -1,4 +1,4 @@
-"""Lie algebras from matrices and from structure constants, with the checks that make them Lie algebras."""
+"""Lie algebras from matrices and from structure constants, after checks that these define a Lie algebra."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Matrix = tuple[tuple[Expression, ...], ...]
 
 
 def from_matrices(matrices: Sequence[Matrix]) -> LieAlgebra:
-    """The algebra spanned by square matrices, its basis; entries may contain parameters.
+    """Return the Lie algebra whose basis are these square matrices; entries may contain parameters.
 
-    Raises `SpecError` for sizes that differ, a linearly dependent matrix, and a commutator that leaves the
-    span (naming the pair).
+    Raises `SpecError` for matrices of different sizes, for a linearly dependent matrix, and for a commutator outside
+    the span, with the pair of matrices.
     """
     size = len(matrices[0])
     for i, m in enumerate(matrices):
@@ -35,7 +35,7 @@ def from_matrices(matrices: Sequence[Matrix]) -> LieAlgebra:
 def algebra_of_sparse_matrices(
     name: str, size: int, matrices: Sequence[Mapping[tuple[int, int], Expression]]
 ) -> LieAlgebra:
-    """`from_matrices` for matrices given by their non-zero entries (row, column) → value."""
+    """Return the Lie algebra of `from_matrices` for matrices given by their non-zero entries (row, column) → value."""
     field = Field(e for m in matrices for e in m.values())
     converted = [{position: field.convert(e) for position, e in m.items()} for m in matrices]
     span = Span(field, converted)
@@ -64,7 +64,7 @@ def algebra_of_sparse_matrices(
 
 
 def product(a: SparseMatrix, b: SparseMatrix) -> SparseMatrix:
-    """The product of sparse matrices."""
+    """Return the product of two sparse matrices."""
     rows: dict[int, list[tuple[int, object]]] = {}
     for (r, c), v in b.items():
         rows.setdefault(r, []).append((c, v))
@@ -77,10 +77,10 @@ def product(a: SparseMatrix, b: SparseMatrix) -> SparseMatrix:
 def from_structure_constants(
     dimension: int, structure: Mapping[int, Mapping[int, Mapping[int, Expression]]]
 ) -> LieAlgebra:
-    """The algebra with [E_i, E_j] = Σ_k structure[i][j][k] E_k (from 0); pairs may be given in one order or both.
+    """Return the algebra with [E_i, E_j] = Σ_k structure[i][j][k] E_k, with indices from 0.
 
-    Raises `SpecError` for indices out of range, pairs that contradict antisymmetry, and a failing Jacobi
-    identity (naming the triple).
+    A pair may be given in one order or in both. Raises `SpecError` for indices out of range, for pairs that contradict
+    antisymmetry, and if the Jacobi identity fails, with the triple.
     """
     indices = [i for i, row in structure.items() for j, ks in row.items() for i in (i, j, *ks)]
     if indices and max(indices) >= dimension:
@@ -127,7 +127,10 @@ def _expect_jacobi(algebra: LieAlgebra) -> None:
 
 
 def failing_jacobi(algebra: LieAlgebra) -> tuple[tuple[int, int, int], int, Expression] | None:
-    """The first triple whose cyclic double brackets do not add up to 0, a component and its value; None if all do."""
+    """Return the first triple for which the Jacobi identity fails, with a component of the sum and its value.
+
+    Returns None if the identity holds.
+    """
     for triple in combinations(range(algebra.dimension), 3):
         for component, residual in jacobi_residuals(algebra, *triple).items():
             if decide_zero("Jacobi", [("", residual)]).verdict == REFUTED:
@@ -136,7 +139,7 @@ def failing_jacobi(algebra: LieAlgebra) -> tuple[tuple[int, int, int], int, Expr
 
 
 def jacobi_residuals(algebra: LieAlgebra, i: int, j: int, k: int) -> dict[int, Expression]:
-    """[[E_i, E_j], E_k] + cyclic, the components that are not literally 0."""
+    """Return [[E_i, E_j], E_k] + cyclic by component, without components that are literally 0."""
     terms: dict[int, list[Expression]] = {}
     for a, b, c in ((i, j, k), (j, k, i), (k, i, j)):
         for m, v in algebra.bracket(a, b).items():

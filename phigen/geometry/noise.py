@@ -1,10 +1,11 @@
 """Noise through Hamiltonians: dx = … + Σ σ_k π∇g_k ∘ dW_k, in the sense of Stratonovich.
 
-Each source acts along a Hamiltonian vector field, so it conserves all Casimirs and the volume of the leaves. Without
-forces the flow of each path of the noise is a Poisson map. The amplitudes σ_k depend on parameters and the time only.
+Each source acts along a Hamiltonian vector field, so it conserves all Casimirs and the volume of the symplectic leaves.
+Without forces, the flow for each path of the noise is a Poisson map. The amplitudes σ_k depend on parameters and time
+only.
 
-With forces πζ, a density exp(−H/T) on every leaf is stationary where πζ = −(1/2T) Σ σ_k² (X_k H) X_k with X_k = π∇g_k:
-fluctuation and dissipation.
+With forces πζ, the density exp(−H/T) on every leaf is stationary if πζ = −(1/2T) Σ σ_k² (X_k H) X_k with X_k = π∇g_k,
+the relation of fluctuation and dissipation.
 """
 
 from __future__ import annotations
@@ -18,17 +19,17 @@ from phigen.symbolic.expression import Expression, gradient
 
 @dataclass(frozen=True)
 class Source:
-    """A source of noise: the Hamiltonian g and the amplitude σ of σ π∇g ∘ dW."""
+    """Source of noise σ π∇g ∘ dW, with the Hamiltonian g and the amplitude σ."""
 
     name: str
     hamiltonian: Expression
     amplitude: Expression
 
     def impulse(self, coordinates: Sequence[str]) -> tuple[Expression, ...]:
-        """σ∇g, the covector by which an increment of the noise acts."""
+        """Return the covector σ∇g, which multiplies an increment of W."""
         return tuple(self.amplitude * g for g in gradient(self.hamiltonian, coordinates))
 
 
 def sources_of(spec_sources: Mapping[str, SpecNoise]) -> tuple[Source, ...]:
-    """The sources of a spec, in its order."""
+    """Return the sources of noise of a spec, in its order."""
     return tuple(Source(name, s.hamiltonian, s.amplitude) for name, s in spec_sources.items())

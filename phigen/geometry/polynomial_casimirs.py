@@ -1,4 +1,4 @@
-"""Polynomial Casimirs of a polynomial π, by exact linear algebra on their coefficients."""
+"""Polynomial Casimirs of a polynomial π, by exact linear algebra for their coefficients."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from phigen.geometry.shapes import LiePoisson, Matrix, Shape, Terms, coordinate_
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.horner import horner
 
-#: Most unknown coefficients in one linear system, without and with parameters in π.
+#: Largest number of unknown coefficients in a linear system, without and with parameters in π.
 UNKNOWNS, UNKNOWNS_WITH_PARAMETERS = 800, 60
 
 Exponents = tuple[int, ...]
@@ -22,10 +22,10 @@ Exponents = tuple[int, ...]
 def polynomial_casimirs(
     coordinates: Sequence[str], poisson: Matrix, shape: Shape, degree: int, notes: list[str]
 ) -> Iterator[Expression]:
-    """A basis of the polynomial Casimirs of degree 1, then 2, … up to ``degree``, constants left out.
+    """Yield a basis of the polynomial Casimirs without constant terms, of degree 1, then 2, … up to ``degree``.
 
-    For a π whose terms have one common degree, those of degree d are homogeneous; otherwise they include the
-    ones of lower degree. Degrees whose linear system is too large are skipped, and ``notes`` says so.
+    If all terms of π have the same degree, the Casimirs are homogeneous; otherwise those of degree d may contain terms
+    of lower degree. Degrees whose linear system is too large are skipped, which is added to ``notes``.
     """
     n = len(coordinates)
     candidates = (
@@ -37,7 +37,7 @@ def polynomial_casimirs(
         notes.append("polynomial Casimirs were not searched for: π is not polynomial in the coordinates")
         return
     field = Field(c for terms in candidates for c in terms.values())
-    # Columns of π: the equations are Σ_j π_ij ∂_j C = 0, one for each row i.
+    # The equations are Σ_j π_ij ∂_j C = 0, one for each row i.
     entries = [[_converted(field, candidates[i * n + j]) for j in range(n)] for i in range(n)]
     homogeneous = len({sum(e) for terms in candidates for e in terms}) <= 1
     largest = UNKNOWNS if field.is_rational else UNKNOWNS_WITH_PARAMETERS
@@ -57,7 +57,7 @@ def polynomial_casimirs(
 
 
 def _linear_terms(algebra: LieAlgebra) -> list[Terms]:
-    """`coordinate_terms` of a Lie–Poisson tensor, as its structure constants say."""
+    """Return the result of `coordinate_terms` for the entries of a Lie–Poisson tensor, from its structure constants."""
     n = range(algebra.dimension)
     units = [tuple(int(k == m) for m in n) for k in n]
     return [{units[k]: c for k, c in sorted(algebra.bracket(i, j).items(), reverse=True)} for i in n for j in n]
@@ -78,7 +78,8 @@ def _monomials(n: int, degree: int) -> list[Exponents]:
 
 
 def _equations(entries: list[list[dict[Exponents, Scalar]]], monomials: list[Exponents]) -> list[dict[int, Scalar]]:
-    """One sparse row for each row of π and each monomial that occurs in it."""
+    """Return the linear equations for the coefficients as sparse rows, one for each row of π and each monomial in
+    it."""
     rows: dict[tuple[int, Exponents], dict[int, Scalar]] = {}
     for column, monomial in enumerate(monomials):
         for j, exponent in enumerate(monomial):

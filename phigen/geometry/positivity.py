@@ -1,4 +1,4 @@
-"""Whether an expression is positive, or not negative: by its form, or at the points where runs start."""
+"""Statements that an expression is positive, or not negative: by its form, or at the starts of runs."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement
 
-#: Signs of real values that follow from the form of an expression; None if none follows.
+#: Signs of real values that can follow from the form of an expression.
 POSITIVE, NOT_NEGATIVE = "positive", "not negative"
 _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIVE, "E": POSITIVE}
 
 
 def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequence[Mapping[str, float]]) -> Statement:
-    """Whether ``e`` is positive wherever it is defined and not 0; ``positive`` names symbols that are.
+    """Decide whether ``e`` is positive where it is defined, except for zeros; ``positive`` names positive symbols.
 
-    Proved by the form alone; refuted by a point of ``starts`` at which it is not positive; otherwise checked at the
-    starts.
+    The statement is refuted if ``e`` is not positive at one of ``starts``, proved if its form shows the sign, and else
+    checked at the starts.
     """
     for point in starts:
         try:
@@ -34,14 +34,14 @@ def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequ
     if sign == NOT_NEGATIVE:
         return Statement(name, PROVED, "by its form, except where it is 0")
     if starts:
-        return Statement(name, CHECKED, f"where runs start, {len(starts)}; a step on which it is not fails")
-    return Statement(name, UNDECIDED, "no run starts anywhere; a step on which it is not fails")
+        return Statement(name, CHECKED, f"where runs start, {len(starts)}; a step fails where it is not positive")
+    return Statement(name, UNDECIDED, "the spec has no runs; a step fails where it is not positive")
 
 
 def not_negative(
     name: str, e: Expression, positive: Collection[str], points: Sequence[Mapping[str, float]]
 ) -> Statement | None:
-    """Whether ``e`` is nowhere negative: by its form alone, else at ``points``; None if neither decides."""
+    """Decide whether ``e`` is nowhere negative: by its form, else at ``points``; None without points."""
     if _sign_of_negative(e, positive) == POSITIVE:
         return Statement(name, REFUTED, "negative by its form", shortened(e))
     if sign_of(e, positive):
@@ -68,12 +68,13 @@ def _sign_of_negative(e: Expression, positive: Collection[str]) -> str | None:
 
 
 def sign_of(e: Expression, positive: Collection[str]) -> str | None:
-    """The sign that the form shows."""
+    """Return the sign that follows from the form of an expression, for positive symbols ``positive``; None if none
+    follows."""
 
     def visit(e: Expression, args: list[str | None]) -> str | None:
         if e.op == "number":
             return POSITIVE if e.value > 0 else NOT_NEGATIVE if e.value == 0 else None
-        if e.op == "neg":  # of a negative number, or of a product with one
+        if e.op == "neg":  # the argument is a negative number, or a product with one
             return _sign_of_negative(e.args[0], positive)
         if e.op == "symbol":
             return POSITIVE if e.value in positive else None
@@ -84,11 +85,12 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
                 return args[0] or NOT_NEGATIVE
             return None if None in args else NOT_NEGATIVE if NOT_NEGATIVE in args else POSITIVE
         if e.op == "pow":
-            # A fractional power of a non-negative value, which is not negative.
+            # A fractional power has a value only for arguments ≥ 0, and that is not negative.
             exponent = Fraction(e.value)
             is_even = exponent.denominator % 2 == 0 or exponent.numerator % 2 == 0
             sign = args[0] or (NOT_NEGATIVE if is_even else None)
-            return POSITIVE if sign and exponent < 0 else sign  # 1/0 has no value
+            # 1/0 has no value, so the inverse of a non-negative value is positive
+            return POSITIVE if sign and exponent < 0 else sign
         return _ALWAYS.get(e.op)
 
     (result,) = fold([e], visit)

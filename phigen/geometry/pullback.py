@@ -1,4 +1,4 @@
-"""Structures in other coordinates y = ψ(x): the inverse of ψ, and π in the coordinates x."""
+"""Structures that are defined in other coordinates y = ψ(x): the inverse of ψ, and π in the coordinates x."""
 
 from __future__ import annotations
 
@@ -29,7 +29,11 @@ from phigen.symbolic.verdict import decide_zero
 
 @dataclass(frozen=True)
 class Coordinates:
-    """y = ψ(x) (``forward``, in x), x = ψ⁻¹(y) (``backward``, in y), and ∂x_i/∂y_a at y = ψ(x) (``jacobian[i][a]``)."""
+    """Change of coordinates y = ψ(x).
+
+    ``forward`` is ψ as expressions in x, ``backward`` is ψ⁻¹ as expressions in y, and ``jacobian[i][a]`` is ∂x_i/∂y_a
+    at y = ψ(x).
+    """
 
     forward: tuple[Expression, ...]
     backward: tuple[Expression, ...]
@@ -37,8 +41,10 @@ class Coordinates:
 
 
 def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coordinates:
-    """The map of a pull-back and its inverse; raises `SpecError` if none is given or found, or if a given one is
-    wrong."""
+    """Return the change of coordinates of a pull-back form, with the inverse of its map.
+
+    Raises `SpecError` if the spec has no inverse and phigen finds none, or if the inverse in the spec is wrong.
+    """
     _expect_size(form, coordinates)
     backward = form.inverse or _inverse(form, coordinates)
     forward = dict(zip(form.coordinates, form.map, strict=True))
@@ -52,7 +58,7 @@ def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coo
 
 
 def pulled_back(form: PullbackForm, inner: Matrix, coordinates: Sequence[str]) -> Matrix:
-    """π_ij = Σ ∂x_i/∂y_a {y_a, y_b} ∂x_j/∂y_b as a function of x; ``inner`` is the matrix {y_a, y_b} of ``form.of``."""
+    """Return π_ij = Σ ∂x_i/∂y_a {y_a, y_b} ∂x_j/∂y_b as a function of x; ``inner`` is the matrix {y_a, y_b}."""
     change = change_of_coordinates(form, coordinates)
     foreign = [s for s in symbols_of(*(e for row in inner for e in row)) if s in coordinates]
     if foreign:
@@ -77,7 +83,8 @@ def _expect_size(form: PullbackForm, coordinates: Sequence[str]) -> None:
 
 
 def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...]:
-    """x(y), one coordinate after the other from an equation in which it is the only unknown."""
+    """Return x as a function of y, solved one coordinate after another, each from an equation without other
+    unknowns."""
     of_affine = _of_affine_map(form, coordinates)
     if of_affine is not None:
         return of_affine
@@ -102,7 +109,7 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
 
 
 def _of_affine_map(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...] | None:
-    """x = J⁻¹(y − ψ(0)) if the Jacobian matrix J of ψ is constant; else None."""
+    """Return x = J⁻¹(y − ψ(0)) if the Jacobian matrix J of ψ is constant; else None."""
     columns = [[_simplified(e) for e in derivatives(form.map, c)] for c in coordinates]
     if any(s in coordinates for s in symbols_of(*(e for column in columns for e in column))):
         return None
@@ -129,7 +136,10 @@ def _next_solved(
 
 
 def _solved_for(e: Expression, value: Expression, x: str) -> Expression | None:
-    """x from e(x) = value: directly where e is linear in x, else one operation after the other."""
+    """Return x from e(x) = value: directly if e is linear in x, else by inverting one operation after another.
+
+    Returns None if an operation has no known inverse.
+    """
     slope = _simplified(derivatives([e], x)[0])
     if x not in symbols_of(slope):
         (constant,) = substitute([e], {x: ZERO})
@@ -157,6 +167,6 @@ def _solved_for(e: Expression, value: Expression, x: str) -> Expression | None:
 
 
 def _simplified(e: Expression) -> Expression:
-    """Rewritten in the ring if that takes fewer operations."""
+    """Return the expression in normal form, if this takes fewer operations; else unchanged."""
     tower = Tower(symbols_of(e), [e])
     return min(tower.expression(tower.convert(e)), e, key=lambda f: sum(1 for node in topological([f]) if node.args))

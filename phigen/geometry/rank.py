@@ -1,4 +1,4 @@
-"""Generic rank: the rank of a matrix of expressions at exact rational points, modulo primes."""
+"""Generic rank: the rank of a matrix of expressions, computed at exact rational points modulo primes."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.numeric import DomainError, evaluate_exactly, evaluate_with_scale, is_rational
 from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 
-#: Points at which a rank is computed; the largest found counts.
+#: Number of points at which a rank is computed; the largest rank counts.
 POINTS = 3
 ATTEMPTS = 64
-#: Ranks modulo a prime never exceed those over Q, and equal them except for unlucky primes: the larger of two counts.
+#: Primes modulo which ranks are computed. A rank modulo a prime never exceeds the rank over Q, and is smaller only for
+#: unlucky primes, so the larger of the ranks modulo two primes is taken.
 PRIMES = (2**61 - 1, 2**63 - 25)
 
 Rows = Sequence[Sequence[Expression]]
 
 
 def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> list[int] | None:
-    """The rank of each matrix at generic points; None if no point of the domain was found.
+    """Return the rank of each matrix at generic points; None if no point in the domain was found.
 
-    The rank at a point never exceeds the generic one and equals it except at unlucky points, hence the
-    largest of `POINTS` points is taken. Entries that are no rational functions are evaluated to `DIGITS` digits.
+    The rank at a point never exceeds the generic rank, and is smaller only at unlucky points. So the result is the
+    largest rank at `POINTS` points. Entries that are no rational functions are evaluated to `DIGITS` digits.
     """
     roots = [e for m in matrices for row in m for e in row]
     names, exact = symbols_of(*roots), is_rational(*roots)
@@ -41,7 +42,7 @@ def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> l
             ranks_at_points.append([rank([[next(in_turn) for _ in row] for row in m]) for m in matrices])
         except DomainError:
             continue
-        if len(ranks_at_points) == POINTS or not names:  # numbers are the same at all points
+        if len(ranks_at_points) == POINTS or not names:  # a matrix of numbers has the same rank at all points
             break
     return [max(ranks) for ranks in zip(*ranks_at_points, strict=True)] if ranks_at_points else None
 
@@ -51,7 +52,7 @@ def _exact_rank(rows: Sequence[Sequence[Fraction]]) -> int:
         return 0
     ranks = []
     for prime in PRIMES:
-        with suppress(ValueError):  # a denominator without inverse
+        with suppress(ValueError):  # raised if a denominator has no inverse modulo the prime
             ranks.append(int(nmod_mat(len(rows), len(rows[0]), _residues(rows, prime), prime).rank()))
     if not ranks:
         raise DomainError("denominators that the primes divide")
@@ -63,8 +64,10 @@ def _residues(rows: Sequence[Sequence[Fraction]], prime: int) -> list[int]:
 
 
 def _numerical_rank(rows: Sequence[Sequence[tuple[Any, Any]]]) -> int:
-    """Rank of a matrix of (value, scale), by elimination with full pivoting; values tiny relative to their scale are
-    0."""
+    """Return the rank of a matrix of pairs (value, scale), by elimination with full pivoting.
+
+    Values that are tiny relative to the largest scale count as 0.
+    """
     left = [[value for value, _ in row] for row in rows]
     threshold = max((scale for row in rows for _, scale in row), default=1) * 10**-ZERO_DIGITS
     rank = 0

@@ -1,9 +1,12 @@
-"""Faithful matrix representations of a Lie algebra, found from its structure constants.
+"""Faithful matrix representations of a Lie algebra, derived from its structure constants.
 
-Each indecomposable part is represented on its own, by the first of these that is faithful and that the
-caller accepts: the defining matrices of a named family with the same structure constants (or the negated
-ones); the adjoint (no centre); the adjoint and nilpotent characters (centre outside [g, g]); the affine
-representation of a two-step nilpotent algebra.
+Each indecomposable part has its own representation: the first in this list that is faithful and that the caller
+accepts.
+
+- the defining matrices of a named family with the same structure constants, or with the negated ones
+- the adjoint representation, if the centre is 0
+- the adjoint representation with nilpotent characters, if the centre is outside [g, g]
+- the affine representation of a two-step nilpotent algebra
 """
 
 from __future__ import annotations
@@ -18,17 +21,18 @@ from phigen.geometry.linear import Span, kernel
 from phigen.symbolic.expression import Expression
 
 Sparse = dict[tuple[int, int], Scalar]
-#: Above this dimension named families are not built for comparison.
+#: Largest dimension of an algebra that is compared with named families.
 _LARGEST_MATCHED = 45
 
 
 def known_representation(algebra: LieAlgebra) -> Representation | None:
-    """The representation that came with the algebra, or that of a named family with the same constants."""
+    """Return the representation in the source of the algebra, or that of a named family with the same constants; else
+    None."""
     return algebra.representation or next(_matching_families(algebra), None)
 
 
 def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
-    """Faithful representations, the preferred ones first, except the one that came with the algebra."""
+    """Yield faithful representations in order of preference, without the one in the source of the algebra."""
     yield from _matching_families(algebra)
     field = algebra.field
     adjoint = _adjoint(algebra, field)
@@ -41,7 +45,8 @@ def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
 
 
 def indecomposable_parts(algebra: LieAlgebra) -> list[list[int]]:
-    """The finest partition of the basis into ideals spanned by basis elements; indices from 0, sorted."""
+    """Return the finest partition of the basis such that each part spans an ideal, as sorted lists of indices from
+    0."""
     part = list(range(algebra.dimension))
     for (i, j), row in algebra.constants.items():
         merged = {part[m] for m in (i, j, *row)}
@@ -51,7 +56,7 @@ def indecomposable_parts(algebra: LieAlgebra) -> list[list[int]]:
 
 
 def restricted(algebra: LieAlgebra, part: Sequence[int]) -> LieAlgebra:
-    """The ideal spanned by some basis elements, with that basis."""
+    """Return the ideal that some basis elements span, with these elements as its basis."""
     position = {i: new_index for new_index, i in enumerate(part)}
     constants = {
         (position[i], position[j]): {position[k]: c for k, c in row.items()}
@@ -75,7 +80,7 @@ def _matching_families(algebra: LieAlgebra) -> Iterator[Representation]:
 
 
 def _plain(algebra: LieAlgebra) -> dict[tuple[int, int], dict[int, Expression]]:
-    # Numbers are interned, so that equal constants are the same object.
+    # Equal constants are one object each, so the maps of two algebras can be compared by ==.
     return {ij: dict(row) for ij, row in algebra.constants.items() if row}
 
 
@@ -85,7 +90,7 @@ def _adjoint(algebra: LieAlgebra, field: Field) -> list[Sparse]:
 
 
 def _rows_of(matrices: Sequence[Sparse], field: Field) -> list[dict[int, Scalar]]:
-    """Equations on v for Σ v_i·matrices[i] = 0."""
+    """Return the linear equations for v in Σ v_i·matrices[i] = 0."""
     rows: dict[tuple[int, int], dict[int, Scalar]] = {}
     for i, m in enumerate(matrices):
         for position, v in m.items():
@@ -96,13 +101,14 @@ def _rows_of(matrices: Sequence[Sparse], field: Field) -> list[dict[int, Scalar]
 def _with_characters(
     algebra: LieAlgebra, adjoint: list[Sparse], centre: list[dict[int, Scalar]], field: Field
 ) -> Iterator[Representation]:
-    """The adjoint, and for each central direction a 2×2 block (0 χ; 0 0) of a form χ that vanishes on [g, g].
+    """Yield the adjoint representation, extended by 2×2 blocks (0 χ; 0 0) that make it faithful on the centre.
 
-    A nilpotent block costs nothing in PE_iP, where a diagonal one would add a cubic term.
+    There is one block for each dimension of the centre; χ is a linear form that vanishes on [g, g]. A nilpotent block
+    adds nothing to PE_iP, while a diagonal block would add a cubic term.
     """
     derived = [{k: field.convert(c) for k, c in row.items()} for row in algebra.constants.values()]
     forms: list[dict[int, Scalar]] = []
-    central_values: list[dict[int, Scalar]] = []  # values of the chosen forms on the centre
+    central_values: list[dict[int, Scalar]] = []  # values on the centre of the forms chosen so far
     for form in kernel(field, derived, algebra.dimension):
         values = {m: v for m, z in enumerate(centre) if (v := _pairing(form, z, field)) != 0}
         if values and not Span(field, [*central_values, values]).dependent:
@@ -127,7 +133,7 @@ def _pairing(form: dict[int, Scalar], vector: dict[int, Scalar], field: Field) -
 
 
 def _two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> Iterator[Representation]:
-    """X ↦ (½ad_X X; 0 0) on g ⊕ R, which represents g when [[g, g], g] = 0."""
+    """Yield X ↦ (½ad_X X; 0 0) on g ⊕ R, which represents g if [[g, g], g] = 0."""
     derived = [set(row) for row in algebra.constants.values()]
     touched = sorted({k for row in derived for k in row})
     if any(adjoint[k] for k in touched) and not _is_two_step(algebra, adjoint, field):

@@ -1,4 +1,5 @@
-"""Recognition of π_ij = g_i(x_i) A_ij g_j(x_j) with constant A: constant in the coordinates ∫ dx_i/g_i(x_i)."""
+"""Recognition of π_ij = g_i(x_i) A_ij g_j(x_j) with constant A, which is constant in the coordinates ∫
+dx_i/g_i(x_i)."""
 
 from __future__ import annotations
 
@@ -12,14 +13,14 @@ from phigen.symbolic.tower import Poly, Tower
 
 @dataclass(frozen=True)
 class Separated:
-    """``factors[i]`` is g_i, an expression in x_i (and parameters); ``matrix`` is A."""
+    """Factors of π_ij = g_i(x_i) A_ij g_j(x_j): ``factors[i]`` is g_i, and ``matrix`` is A."""
 
     factors: tuple[Expression, ...]
     matrix: Matrix
 
 
 def separated(coordinates: Sequence[str], poisson: Matrix) -> Separated | None:
-    """The factors of π, up to constants that go into A; None if π is not of this form.
+    """Return the factors g_i and A of π, with constant factors in A; None if π does not have this form.
 
     Each entry is factored into irreducible polynomials over Q in coordinates, parameters and function values.
     """
@@ -44,7 +45,10 @@ def separated(coordinates: Sequence[str], poisson: Matrix) -> Separated | None:
 
 
 def _parts(tower: Tower, element: Poly, coordinates: Sequence[str]) -> dict[int, list[tuple[Poly, int]]] | None:
-    """Irreducible factors by the coordinate they depend on, constants under −1; None if one mixes coordinates."""
+    """Return the irreducible factors by the index of the coordinate on which they depend, with −1 for constants.
+
+    Returns None if a factor depends on several coordinates.
+    """
     content, factors = element.factor()
     parts: dict[int, list[tuple[Poly, int]]] = {-1: [(tower.context.constant(content), 1)]}
     for factor, multiplicity in factors:

@@ -1,4 +1,4 @@
-"""Structural recognition of a Poisson tensor: what kind of matrix π is, however it was typed.
+"""Shapes of Poisson tensors: recognition of the kind of a matrix π, for any notation of its entries.
 
 Coefficients may contain parameters, and functions of parameters.
 """
@@ -14,13 +14,13 @@ from phigen.symbolic.expression import ZERO, Expression, symbols_of
 from phigen.symbolic.tower import Poly, Tower
 
 Matrix = tuple[tuple[Expression, ...], ...]
-#: Exponents of the coordinates → coefficient, an expression in the parameters.
+#: Polynomial: the exponents of the coordinates → coefficient, an expression in the parameters.
 Terms = dict[tuple[int, ...], Expression]
 
 
 @dataclass(frozen=True)
 class Constant:
-    """π does not depend on the coordinates."""
+    """Shape of a π that does not depend on the coordinates."""
 
     matrix: Matrix
 
@@ -30,7 +30,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class Canonical:
-    """Constant, with {q_i, p_i} = 1 and all other brackets 0; the remaining coordinates are Casimirs."""
+    """Shape of a constant π with {q_i, p_i} = 1 and all other brackets 0; the remaining coordinates are Casimirs."""
 
     q: tuple[str, ...]
     p: tuple[str, ...]
@@ -44,7 +44,7 @@ class Canonical:
 
 @dataclass(frozen=True)
 class LogCanonical:
-    """{x_i, x_j} = a_ij x_i x_j with constant a_ij."""
+    """Shape {x_i, x_j} = a_ij x_i x_j with constant a_ij."""
 
     a: Matrix
 
@@ -54,7 +54,7 @@ class LogCanonical:
 
 @dataclass(frozen=True)
 class LiePoisson:
-    """{x_i, x_j} = Σ_k c_ij^k x_k on the dual of a Lie algebra (Jacobi is not checked here)."""
+    """Shape {x_i, x_j} = Σ_k c_ij^k x_k, on the dual of a Lie algebra; the Jacobi identity is not checked here."""
 
     algebra: LieAlgebra
 
@@ -64,10 +64,10 @@ class LiePoisson:
 
 @dataclass(frozen=True)
 class Affine:
-    """{x_i, x_j} = Σ_k c_ij^k x_k + b_ij, a Lie algebra with a cocycle b.
+    """Shape {x_i, x_j} = Σ_k c_ij^k x_k + b_ij, from a Lie algebra with a cocycle b.
 
-    ``extension`` is the central extension by it: one more basis element z, the last, with [E_i, E_j] =
-    Σ_k c_ij^k E_k + b_ij z; π is its Lie–Poisson tensor at z = 1 (Jacobi is not checked here).
+    ``extension`` is the central extension by b: it has one more basis element z, the last one, and [E_i, E_j] = Σ_k
+    c_ij^k E_k + b_ij z. π is its Lie–Poisson tensor at z = 1. The Jacobi identity is not checked here.
     """
 
     extension: LieAlgebra
@@ -78,7 +78,7 @@ class Affine:
 
 @dataclass(frozen=True)
 class General:
-    """π of a shape for which there is no class of its own."""
+    """Any other shape."""
 
     def __str__(self) -> str:
         return "general"
@@ -88,7 +88,7 @@ Shape = Constant | Canonical | LogCanonical | LiePoisson | Affine | General
 
 
 def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
-    """The shape of π; constant is preferred to log-canonical, and that to Lie–Poisson."""
+    """Return the shape of π; the first that applies of constant, log-canonical, Lie–Poisson, affine and general."""
     upper = {(i, j): poisson[i][j] for j in range(len(coordinates)) for i in range(j)}
     terms = coordinate_terms(coordinates, list(upper.values()))
     if terms is None:
@@ -104,7 +104,10 @@ def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
 
 
 def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expression]) -> list[Terms] | None:
-    """The expressions as polynomials in the coordinates, be it by an identity; None if one of them is not."""
+    """Return the expressions as polynomials in the coordinates; None if one of them is no polynomial.
+
+    Identities are used, such as sin² + cos² = 1.
+    """
     names = list(coordinates) + [s for s in symbols_of(*expressions) if s not in coordinates]
     tower = Tower(names, expressions)
     terms_of_coordinates = []
@@ -120,7 +123,7 @@ def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expressio
 
 
 def _split(tower: Tower, element: Poly, coordinates: Sequence[str]) -> Terms | None:
-    if element == 0:  # nearly all entries of large structures
+    if element == 0:  # Most entries of large structures are 0.
         return {}
     size = len(coordinates)
     degrees = element.degrees()
@@ -188,7 +191,7 @@ def _affine(coordinates: Sequence[str], entries: dict[tuple[int, int], Terms]) -
 
 
 def skew(upper: dict[tuple[int, int], Expression], n: int) -> Matrix:
-    """The skew n×n matrix with the given entries above the diagonal."""
+    """Return the skew n×n matrix with these entries above the diagonal; absent entries are 0."""
 
     def entry(i: int, j: int) -> Expression:
         return upper.get((i, j), ZERO) if i < j else -upper.get((j, i), ZERO)

@@ -1,4 +1,4 @@
-"""Systems inside a system: the blocks of a π, and a structure in other coordinates."""
+"""Systems inside a system: blocks of π, and structures in other coordinates."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from phigen.symbolic.expression import ZERO
 
 
 def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> System:
-    """The system of a form in some coordinates, with the parameters of the given one; its Hamiltonian is 0.
+    """Return a system with the form ``form`` of π in some coordinates, with the parameters of ``system`` and H = 0.
 
-    Casimirs are not searched for. Raises `SpecError` as `structure` does.
+    Casimirs are not searched for. Raises the errors of `structure`.
     """
     matrix, shape = structure(form, coordinates)
     return replace(
@@ -33,7 +33,8 @@ def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> Syste
 
 
 def block_of(system: System, indices: Sequence[int]) -> System:
-    """The system of some coordinates that form a block, by the form that the spec gives for it if it does."""
+    """Return the system of the coordinates of a block; its form is the one in the spec, if the spec has one for the
+    block."""
     names = tuple(system.coordinates[i] for i in indices)
     if isinstance(system.form, ProductForm):
         for coordinates, form in system.form.blocks:

@@ -1,4 +1,4 @@
-"""Conversion between sympy and `Expression`: systems built from sympy objects, systems as sympy objects, LaTeX.
+"""Conversions between sympy and `Expression`, for expressions and for systems.
 
 Only modules that need sympy import this module, since importing sympy takes a quarter of a second.
 """
@@ -33,16 +33,16 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.special import SPECIAL, order_of
 from phigen.symbolic.symbols import plain
 
-#: sympy's names of functions where they differ.
+#: Functions whose names differ: name in sympy → name in phigen.
 _FROM_SYMPY = {"Abs": "abs"}
 _TO_SYMPY = {"abs": "Abs"}
 
 
 def expression(value: Any) -> Expression:
-    """A sympy expression or a number as an `Expression`; Floats as the decimals they print.
+    """Return a sympy expression or a number as an `Expression`; Floats become the decimals that they print.
 
-    Raises `SpecError` for functions and constants that phigen does not have, `LimitError` for numbers out of range.
-    Text is refused: parsing it with sympy would evaluate it as Python.
+    Raises `SpecError` for functions and constants that phigen does not have, and for text, which sympy would evaluate
+    as Python. Raises `LimitError` for numbers out of range.
     """
     if isinstance(value, str):
         raise SpecError([Diagnostic(f"{value!r} is text, not a sympy expression")])
@@ -83,8 +83,8 @@ def _node(e: Any, args: list[Expression]) -> Expression:
 
 
 def _rational(e: Any) -> Fraction:
-    """A number, within the limits that hold in spec files."""
-    # Checked before the conversion: a Float of 1e999999 would have as many digits.
+    """Return a number as a fraction. Raises `LimitError` beyond the limits for numbers in specs."""
+    # Checked before the conversion, since a Float of 1e999999 has a million digits as a fraction.
     if abs(e) < limits.NUMBER and (e == 0 or abs(e) > Fraction(1, limits.DENOMINATOR)):
         value = Fraction(str(e)) if e.is_Float else Fraction(int(e.p), int(e.q))
         if limits.number_is_bounded(value):
@@ -94,25 +94,25 @@ def _rational(e: Any) -> Fraction:
 
 
 def named_function(order: int, s: Any) -> Any:
-    """A derivative of φ (`phigen.symbolic.special`) as a symbol, as formulas print it."""
+    """Return a derivative of φ (`phigen.symbolic.special`) as a symbol, in the notation of formulas."""
     return sympy.Function(r"\varphi" + "'" * order)(s)
 
 
 def closed_function(order: int, s: Any) -> Any:
-    """A derivative of φ in closed form, φ(s) = (1 − (√s/2) cot(√s/2))/s."""
+    """Return a derivative of φ(s) = (1 − (√s/2) cot(√s/2))/s in closed form."""
     u = sympy.Dummy("u")
     return sympy.diff((1 - sympy.sqrt(u) / 2 * sympy.cot(sympy.sqrt(u) / 2)) / u, u, order).subs(u, s)
 
 
 def expanded_function(order: int, s: Any, degree: int) -> Any:
-    """A derivative of φ as a polynomial in s, correct up to a degree: φ(s) = Σ |B_{2n+2}| s^n/(2n+2)!."""
+    """Return a derivative of φ(s) = Σ |B_{2n+2}| s^n/(2n+2)! as a polynomial in s, correct up to a degree."""
     u = sympy.Dummy("u")
     terms = (abs(sympy.bernoulli(2 * n + 2)) / sympy.factorial(2 * n + 2) * u**n for n in range(degree + order + 1))
     return sympy.diff(sum(terms), u, order).subs(u, s)
 
 
 class _Sympy(Arithmetic[Any]):
-    """Expressions of sympy; see `to_sympy`."""
+    """Visitor that converts an `Expression` to sympy; see `to_sympy`."""
 
     def __init__(self, symbols: Mapping[str, Any], special: Callable[[int, Any], Any]) -> None:
         self._symbols, self._special = symbols, special
@@ -140,21 +140,21 @@ def to_sympy(
     symbols: Mapping[str, Any] | None = None,
     special: Callable[[int, Any], Any] = named_function,
 ) -> Any:
-    """The expression in sympy, e.g. for ``sympy.latex``.
+    """Return the expression in sympy, for instance for ``sympy.latex``.
 
-    ``symbols`` maps names to symbols of sympy; others are real, and the momentum of x becomes ``p_x``. ``special``
-    selects the form of the derivatives of φ.
+    ``symbols`` maps names to sympy symbols; other names become real symbols, and the momentum of x becomes ``p_x``.
+    ``special`` selects the form of the derivatives of φ.
     """
     return _Sympy(symbols or {}, special).values(familiar([e]))[0]
 
 
 @dataclass(frozen=True)
 class SympySystem:
-    """A `System` in sympy; `System.from_sympy` converts it back.
+    """`System` as sympy objects; `System.from_sympy` converts it back.
 
-    Symbols are real, those of parameters that are positive in the system positive. ``poisson`` is an immutable n×n
-    matrix, ``parameters`` maps symbols to their default values. ``casimirs`` are the declared ones and those found.
-    ``time`` is the symbol of the time, None if there is none.
+    Symbols are real, and positive for parameters that are positive in the system. ``poisson`` is an immutable n×n
+    matrix, ``parameters`` maps symbols to default values, and ``casimirs`` has the declared Casimirs and those found.
+    ``time`` is the symbol of the time, or None.
     """
 
     name: str
@@ -168,7 +168,7 @@ class SympySystem:
 
 
 class Described(Protocol):
-    """Attributes of a `System` that have a counterpart in sympy."""
+    """Protocol: attributes of a `System` that have a counterpart in sympy."""
 
     @property
     def name(self) -> str: ...
@@ -191,7 +191,7 @@ class Described(Protocol):
 
 
 def symbols_in_sympy(system: Described) -> dict[str, Any]:
-    """The symbols of the coordinates, the parameters and the time, by name."""
+    """Return the sympy symbols of the coordinates, the parameters and the time by name."""
     real = {c: sympy.Symbol(c, real=True) for c in (*system.coordinates, *system.times)}
     parameters = {p.name: sympy.Symbol(p.name, **_assumed(p)) for p in system.parameters}
     return real | parameters
@@ -202,7 +202,7 @@ def _assumed(parameter: Parameter) -> dict[str, bool]:
 
 
 def free_symbols(names: Iterable[str], used_names: Iterable[str]) -> list[Any]:
-    """Real symbols of these names, with _ after names in use."""
+    """Return real symbols with these names; names in use get a trailing underscore."""
     taken_names = {str(name) for name in used_names}
     result = []
     for name in names:
@@ -214,7 +214,7 @@ def free_symbols(names: Iterable[str], used_names: Iterable[str]) -> list[Any]:
 
 
 def given_back(system: Described) -> SympySystem:
-    """See `System.to_sympy`."""
+    """Return a system as sympy objects; see `System.to_sympy`."""
     symbols = symbols_in_sympy(system)
 
     def formula(e: Expression) -> Any:
@@ -241,7 +241,7 @@ def parts(
     invariants: Mapping[str, Any] | None,
     time: Any = None,
 ) -> dict[str, Any]:
-    """Arguments of `build_system` for a system from sympy; see `System.from_sympy`."""
+    """Return the arguments of `build_system` for a system from sympy objects; see `System.from_sympy`."""
     when = "" if time is None else _name(time)
     names = tuple(_name(c) for c in coordinates)
     matrix = sympy.Matrix(poisson)

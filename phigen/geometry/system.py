@@ -1,4 +1,4 @@
-"""A Hamiltonian system on a Poisson manifold with global coordinates: the second stage of the compiler."""
+"""Hamiltonian system on a Poisson manifold with global coordinates: the result of the second stage of the compiler."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from phigen.symbolic.symbols import increment
 if TYPE_CHECKING:
     from phigen.geometry.sympy_bridge import SympySystem
 
-#: Characters of a Hamiltonian that the representation of a system shows.
+#: Largest number of characters of H in the representation of a system.
 _SHOWN = 60
 
 
 @dataclass(frozen=True, repr=False)
 class System:
-    """ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), possibly with ``forces`` and sources of ``noise``.
+    """System ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), possibly with ``forces`` and sources of ``noise``.
 
     ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; expressions use the coordinates and parameters as symbols.
-    ``casimirs`` holds the declared ones first, in the order of the spec, then the found ones (``C1``, ``C2``, …;
-    ``declared`` has the names of the former). ``shape`` is the recognised shape of π, ``form`` the form in the spec.
-    ``time`` is the symbol of t, which H and the invariants may contain; empty if there is none. ``observables`` are
-    quantities to record; nothing is proved about them. ``notes`` says which searches were omitted, and why. ``spec``
-    is the spec of the system, None if it was built in Python.
+    ``shape`` is the recognised shape of π, ``form`` the form in the spec. ``casimirs`` has the declared Casimirs in the
+    order of the spec, then those found (``C1``, ``C2``, …); ``declared`` has the names of the declared ones. ``time``
+    is the symbol of t, which H and the invariants may contain, or "". ``observables`` are quantities to record, about
+    which nothing is proved. ``notes`` says which searches were omitted, and why. ``spec`` is the spec of the system;
+    None if it was built in Python.
     """
 
     name: str
@@ -59,7 +59,8 @@ class System:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Raise an `AttributeError` that says where runs are."""
+            """Raise an `AttributeError`; for ``run``, ``runs`` and ``integrate``, its message says that solvers have
+            these."""
             raise missing_attribute(self, name)
 
     def __repr__(self) -> str:
@@ -69,17 +70,17 @@ class System:
 
     @property
     def dimension(self) -> int:
-        """Number of coordinates."""
+        """The number of coordinates."""
         return len(self.coordinates)
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Names of the parameters, in the order of the spec."""
+        """The names of the parameters, in the order of the spec."""
         return tuple(p.name for p in self.parameters)
 
     @property
     def times(self) -> tuple[str, ...]:
-        """The symbol of the time, if there is one."""
+        """The symbol of the time as a tuple; empty if the system does not depend on the time."""
         return (self.time,) if self.time else ()
 
     @property
@@ -89,28 +90,28 @@ class System:
 
     @property
     def driven(self) -> bool:
-        """Whether H is not an invariant: it depends on the time, or forces or noise do work."""
+        """Whether H is not conserved: it depends on the time, or forces or noise do work."""
         return bool(self.time) or self.forces is not None or bool(self.noise)
 
     @property
     def frozen(self) -> System:
-        """The system with its time as one more parameter."""
+        """The system in which the time is one more parameter."""
         standing = tuple(Parameter(t, Fraction(0)) for t in self.times)
         return replace(self, parameters=(*self.parameters, *standing), time="")
 
     @property
     def positive(self) -> tuple[str, ...]:
-        """Names of the parameters that are positive or nonnegative: a statement for all positive values also holds
-        at 0."""
+        """Names of the parameters that are positive or nonnegative; a statement for all positive values also holds at
+        0."""
         return tuple(p.name for p in self.parameters if p.bound)
 
     @property
     def lie_algebra(self) -> LieAlgebra | None:
-        """The Lie algebra of a Lie–Poisson π, else None."""
+        """The Lie algebra of a Lie–Poisson π; None for other shapes."""
         return self.shape.algebra if isinstance(self.shape, LiePoisson) else None
 
     def vector_field(self) -> tuple[Expression, ...]:
-        """π∇H plus the forces, one expression for each coordinate."""
+        """Return the vector field π∇H plus forces, one expression for each coordinate."""
         slope = gradient(self.hamiltonian, self.coordinates)
         if self.forces is None:
             return hamiltonian_vector_field(self.poisson, slope)
@@ -119,7 +120,8 @@ class System:
         return tuple(a + b for a, b in zip(tangent, self.forces.vector, strict=True))
 
     def forced_rate(self, function: Expression) -> Expression:
-        """Contribution of the forces to the rate of change of a function F: ∇F·(πζ + f). For H it is their power."""
+        """Return the contribution of forces to dF/dt for a function F: ∇F·(πζ + f). For H, this is the power of the
+        forces."""
         if self.forces is None:
             return ZERO
         field = hamiltonian_vector_field(self.poisson, self.forces.covector)
@@ -127,7 +129,7 @@ class System:
         return total(s * (a + b) for s, a, b in zip(slopes, field, self.forces.vector, strict=True) if not s.is_zero)
 
     def forced_rate_of_casimir(self, casimir: Expression) -> Expression:
-        """Contribution of the forces to the rate of change of a Casimir: ∇C·f, since πζ conserves it."""
+        """Return the contribution of forces to dC/dt for a Casimir C: ∇C·f, since πζ conserves C."""
         if self.forces is None:
             return ZERO
         slopes = gradient(casimir, self.coordinates)
@@ -151,38 +153,38 @@ class System:
         name: str = "system",
         time: Any = None,
     ) -> System:
-        """A system from sympy objects.
+        """Return a system from sympy objects.
 
-        ``coordinates`` are symbols (or names), ``poisson`` an n×n matrix or nested sequence, ``parameters``
-        maps symbols (or names) to default values; a symbol declared positive makes a positive parameter. ``time`` is
-        the symbol (or name) of the time, if the Hamiltonian depends on it.
-        Raises `SpecError` for a matrix of the wrong size, unknown symbols and functions.
+        ``coordinates`` are symbols or names. ``poisson`` is an n×n matrix or a nested sequence. ``parameters`` maps
+        symbols or names to default values; a symbol declared positive makes a positive parameter. ``time`` is the
+        symbol or name of the time, if the Hamiltonian depends on it. Raises `SpecError` for a matrix of the wrong size,
+        and for unknown symbols and functions.
         """
         from phigen.geometry.sympy_bridge import parts
 
         return build_system(name, **parts(coordinates, poisson, hamiltonian, parameters, casimirs, invariants, time))
 
     def to_sympy(self) -> SympySystem:
-        """Coordinates, π, H, parameters, Casimirs and invariants as sympy objects; see `SympySystem`."""
+        """Return coordinates, π, H, parameters, Casimirs and invariants as sympy objects; see `SympySystem`."""
         from phigen.geometry.sympy_bridge import given_back
 
         return given_back(self)
 
     def _repr_latex_(self) -> str:
-        """π, H, Casimirs and invariants, for notebooks."""
+        """The formulas of π, H, Casimirs and invariants as LaTeX, for notebooks."""
         return cast(str, display("formulas of a system")(self))
 
     def _repr_html_(self) -> str:
-        """HTML of the system with its parameters, for notebooks."""
+        """The formulas and parameters of the system as HTML, for notebooks."""
         return cast(str, display("page of a system")(self))
 
 
 def system_from_spec(spec: Spec) -> System:
-    """The system of a spec: π in matrix form, its shape, and the Casimirs that the form gives.
+    """Return the system of a spec: π as a matrix, its shape, and the Casimirs that the form of π gives.
 
-    Nothing is proved here (`phigen.geometry.checks` does that), except what a Lie algebra needs to exist.
-    Raises `SpecError` for matrices that do not span a Lie algebra, structure constants without Jacobi
-    identity, and sizes that do not match the number of coordinates.
+    Nothing is proved here, apart from the conditions under which a Lie algebra exists; see `phigen.geometry.checks`.
+    Raises `SpecError` for matrices that do not span a Lie algebra, for structure constants without Jacobi identity, and
+    for sizes that do not match the number of coordinates.
     """
     if spec.lattice:
         raise system_of_lattice(spec)
@@ -203,8 +205,8 @@ def system_from_spec(spec: Spec) -> System:
 
 
 def system_of_lattice(spec: Spec) -> SpecError:
-    """Refuse a lattice where one system of a few coordinates is required."""
-    message = f"{spec.name} is a lattice, and this is for one system of a few coordinates"
+    """Return the error for a lattice that is used where a system with a fixed number of coordinates is required."""
+    message = f"{spec.name} is a lattice; a system with a fixed number of coordinates is needed here"
     hint = "phigen.compile accepts it; phigen show --expand SIZES prints a small one as an ordinary spec"
     return SpecError([spec.diagnostic(("lattice",), message, hint)])
 
@@ -223,7 +225,7 @@ def build_system(
     forces: SpecForces | None = None,
     noise: Mapping[str, SpecNoise] | None = None,
 ) -> System:
-    """A `System` from its parts; see `system_from_spec`."""
+    """Return a `System` from its parts, with shape and further Casimirs; see `system_from_spec`."""
     locations = locations or {}
     declared = dict(casimirs or {})
     try:
@@ -255,7 +257,7 @@ def build_system(
 
 
 def hamiltonian_vector_field(poisson: Matrix, differential: Sequence[Expression]) -> tuple[Expression, ...]:
-    """The product of an n×n matrix and a covector, zero entries skipped."""
+    """Return the product of an n×n matrix and a covector."""
     return tuple(
         total(entry * d for entry, d in zip(row, differential, strict=True) if not (entry.is_zero or d.is_zero))
         for row in poisson
@@ -263,7 +265,7 @@ def hamiltonian_vector_field(poisson: Matrix, differential: Sequence[Expression]
 
 
 def _with_place(error: SpecError, locations: Mapping[tuple[Any, ...], Location]) -> SpecError:
-    """The error, with the place of the spec's ``poisson`` section if it has no place."""
+    """Return the error; diagnostics without a location get that of the section ``poisson`` of the spec."""
     place = locations.get(("poisson",))
     return SpecError(
         [Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity) for d in error.diagnostics]

@@ -10,16 +10,17 @@ from phigen.geometry.linear import Span, coprime_integers
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.tower import Poly, Tower
 
-#: Largest size of matrices whose powers are expanded.
+#: Largest number of rows of matrices whose powers are expanded.
 _LARGEST = 8
 _MOST_TERMS, _MOST_PRODUCTS = 300, 100_000
 
 
 def trace_casimirs(coordinates: Sequence[str], representation: Representation) -> Iterator[Expression]:
-    """tr X^m for m = 1, 2, …, size, where X = Σ x_i E^i and E^i is dual to E_i under tr(E_i E_j).
+    """Yield tr X^m for m = 1, 2, …, where X = Σ x_i E^i, and the E^i are dual to the E_i with respect to tr(E_i E_j).
 
-    They generate the coefficients of the characteristic polynomial of X. Empty if the trace form is degenerate, a
-    matrix contains parameters, or the matrices are large; traces with too many terms are left out.
+    m goes up to the number of rows; the traces generate the coefficients of the characteristic polynomial of X. Nothing
+    is yielded if the trace form is degenerate, if a matrix contains parameters, or if the matrices are large. Traces
+    with too many terms are left out.
     """
     if representation.size > _LARGEST:
         return
@@ -37,7 +38,7 @@ def trace_casimirs(coordinates: Sequence[str], representation: Representation) -
     for m in range(1, representation.size + 1):
         if m > 2 and m % 2:
             powers.append(_times(tower, powers[-1], element))
-        # tr X^m from powers with half of the exponent, which have far fewer terms than X^(m-1).
+        # tr X^m is computed from two powers with about half of the exponent, which have far fewer terms than X^(m-1).
         pairs = [(powers[m // 2][i][j], powers[m - m // 2][j][i]) for i in n for j in n]
         if sum(len(a) * len(b) for a, b in pairs) > _MOST_PRODUCTS:
             return
@@ -67,7 +68,7 @@ def _dual_element(
 ) -> list[list[Poly]]:
     rows = [[tower.zero for _ in range(size)] for _ in range(size)]
     for i, name in enumerate(coordinates):
-        # The form is symmetric: coordinates of the i-th unit vector in its rows are a row of its inverse.
+        # The form is symmetric, so the coordinates of unit vector i in its rows are row i of its inverse.
         for j, c in (span.coordinates({i: field.one}) or {}).items():
             for (r, column), v in matrices[j].items():
                 rows[r][column] = rows[r][column] + tower.variable(name) * (c * v)

@@ -1,1 +1,1 @@
-"""The loop IR: typed statements and loops between kernels and text."""
+"""The loop IR: typed statements and loops, built from kernels and printed as source code."""

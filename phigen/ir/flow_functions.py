@@ -1,7 +1,7 @@
-"""Builders of the functions of a splitting: its flows, the order of the flows in a step, and the transposes of both.
+"""Builders of the functions of a splitting: flows, the sequence of flows in a step, and the transposes of both.
 
-A flow is a kernel that computes an increment, and a function that adds it. Variants for SIMD batches of members act on
-a group of members, which is divided into packs.
+The functions of a flow call a kernel that computes an increment, and add it to the state. Variants for SIMD batches act
+on a group of members of an ensemble, which consists of packs, one member in each lane.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _LANES = ir.Pointer(constant=False, lanes=True)
 
 @dataclass(frozen=True)
 class FlowFunctions:
-    """The functions of the flows of one splitting.
+    """The functions of the flows of a splitting, for a single trajectory.
 
-    Flows update ``along`` values: the ``dimension`` coordinates, and with a monitor two more. With ``turns`` they also
-    update a group element, the attitude. A state is stored on a tape before each flow if the solver has one
-    (``stores``).
+    A flow updates ``along`` values: the ``dimension`` coordinates, and with a monitor two more. With ``turns``, it also
+    updates a group element, the attitude. With ``stores``, the solver has a tape, on which the state is stored before
+    each flow.
     """
 
     dimension: int
@@ -39,11 +39,11 @@ class FlowFunctions:
 
     @property
     def arguments(self) -> tuple[ir.Value, ...]:
-        """The arguments of a flow after its coefficients."""
+        """The arguments of a flow that follow its coefficients."""
         return (X, DISPLACEMENT, START, *[ELEMENT] * self.turns)
 
     def function(self, name: str, doc: str, parameters: Sequence[str], body: ir.Block) -> ir.Function:
-        """Return a function whose parameters are some of those of flows."""
+        """Return a function of these parameters, whose types are those of the functions of flows."""
         state, length = ir.Vector(ir.Constant(self.along)), ir.Constant(self.dimension)
         types: dict[str, ir.ParameterType] = {
             "x": state,
@@ -57,7 +57,8 @@ class FlowFunctions:
         return typed_function(name, doc, parameters, body, types)
 
     def flow(self, number: int, updated: Sequence[int]) -> ir.Function:
-        """Return the function that adds the increments of the ``updated`` values."""
+        """Return the function of flow ``number``, which adds its increments to the values with the indices
+        ``updated``."""
         count = ir.Constant(max(1, len(updated)))
         body: list[ir.Statement] = [ir.vectors(ir.Vector(count), CHANGE)]
         called = (COEF, X, *[ELEMENT] * self.turns, CHANGE, *[TURNED] * self.turns)
@@ -72,19 +73,20 @@ class FlowFunctions:
         return self.function(f"flow{number}", doc, parameters, tuple(body))
 
     def schedule(self, schedule: Schedule) -> ir.Function:
-        """Return the function of all flows of a step, each with its row of coefficients."""
+        """Return the function that applies all flows of a step, each with its row of coefficients."""
         parameters = ("coef", "x", "displacement", "start", *["element"] * self.turns, *["tape"] * self.stores)
         body = _in_order(schedule, COEF, ROW_SIZE, self._flow)
         return self.function("flows", "The flows of one step, one after the other", parameters, tuple(body))
 
     def _flow(self, part: int, coefficients: ir.Value) -> Iterator[ir.Statement]:
-        """Yield the statements that store the state and apply the flow of a part."""
+        """Yield the statements that store the state on the tape and apply the flow of part ``part``, counted from 0."""
         if self.stores:
             yield ir.Append(TAPE, X)
         yield ir.Call(f"flow{part + 1}", (coefficients, *self.arguments))
 
     def corrector(self, schedule: Schedule) -> ir.Function:
-        """Return the function of the flows before the first step and after the last one, of two parts in turn."""
+        """Return the function of the corrector: alternating flows of two parts, before the first step or after the last
+        one."""
         (outer, first), *others = schedule.begin
         (_, last), *_ = schedule.end
         begin = ir.Select(ir.fixed("after"), ir.Constant(last), ir.Constant(first))
@@ -93,12 +95,13 @@ class FlowFunctions:
             pair = (*self._flow(others[0][0], _row(K)), *self._flow(outer, _row(ir.plus(K, 1))))
             count, two = ir.Constant(len(schedule.begin)), ir.Constant(2)
             body.append(ir.Loop("stages", pair, "k", ir.Constant(1), count, step=two))
-        doc = "Corrector: flows before the first step of a run or after the last; has half a flow of the larger part"
+        doc = "Corrector: flows before the first step of a run or after the last, with half a flow of the larger part"
         parameters = ("after", "coef", "x", "displacement", "start", *["tape"] * self.stores)
         return self.function("corrector", doc, parameters, tuple(body))
 
     def tangent(self, count: int) -> ir.Function:
-        """Return the function that applies one of ``count`` flows, after the derivative of its increment."""
+        """Return the function that computes the derivative of the increment of one of ``count`` flows, then applies
+        this flow."""
         cases = tuple(
             (
                 ir.Call(f"tangent{k}", (COEF, X, ir.fixed("slope"))),
@@ -115,16 +118,17 @@ class FlowFunctions:
 
 
 def _row(number: ir.Value) -> ir.Value:
-    """Return the address of a row of coefficients."""
+    """Return the address of row ``number`` of coefficients."""
     return ir.Binary("+", COEF, ir.Binary("*", number, ROW_SIZE))
 
 
 def _in_order(
     schedule: Schedule, rows: ir.Name, size: ir.Value | None, flow: Callable[[int, ir.Value], Iterator[ir.Statement]]
 ) -> Iterator[ir.Statement]:
-    """Yield the flows of a step: the first one, then a pattern that is repeated.
+    """Yield the flows of a step: the first flow, then a loop over a repeated pattern of flows.
 
-    ``rows`` counts rows of coefficients or, if a row has a ``size``, is the address of one.
+    ``flow`` yields the statements for a part and its row of coefficients. ``rows`` is the row of the next flow: the
+    address of the row if ``size`` is the size of a row, or its number if ``size`` is None.
     """
 
     def further(count: int) -> ir.Value:
@@ -146,7 +150,10 @@ def _in_order(
 
 
 def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
-    """Return the function that adds the increments of a flow to the ``updated`` values of all members of a group."""
+    """Return the function that adds the increments of a flow to the values ``updated`` of all members of a group.
+
+    ``form`` is the suffix of its version for small or all arguments, see `phigen.ir.passes.forms`.
+    """
     count = ir.Constant(max(1, len(updated)))
     x, start, compensation = (ir.Member(PACK, name) for name in ("x", "start", "carry"))
     coefficients = ir.Entry(ir.Member(GROUP, "coef"), ir.Binary("*", DISTINCT_COEF, K))
@@ -164,7 +171,7 @@ def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
 
 
 def group_schedule(schedule: Schedule, form: str) -> ir.Function:
-    """Return the function of all flows of a step, for all members of a group."""
+    """Return the function that applies all flows of a step to all members of a group."""
 
     def flow(part: int, row: ir.Value) -> Iterator[ir.Statement]:
         yield ir.Call(f"flow{part + 1}{form}_lanes", (row, DISTINCT_COEF, GROUP))
@@ -177,7 +184,7 @@ def _over_packs(body: ir.Block) -> ir.Loop:
     return ir.Loop("packs", body, "k", ir.Constant(0), PACKS)
 
 
-#: The types of the parameters of functions of a group.
+#: Types of the parameters of functions for groups.
 _TYPES: Mapping[str, ir.ParameterType] = {"row": ir.Type.FLAG, "distinct_coef": ir.Type.FLAG, "group": _GROUP}
 
 
@@ -186,11 +193,12 @@ _TYPES: Mapping[str, ir.ParameterType] = {"row": ir.Type.FLAG, "distinct_coef": 
 
 @dataclass(frozen=True)
 class Transposed:
-    """The transpose of a flow: the numbers of the values that it computes, without those that are always zero.
+    """The transpose of one flow, by the indices of the values that it computes, without those that are always 0.
 
-    These are cotangents of the ``state`` and of the ``row`` of coefficients, and the coordinates ``before`` the flow
-    that it recomputes. ``reads`` are the runs of coordinates that it reads, each with its length. ``far`` and
-    ``far_back`` say whether the flow and its transpose have a version with full-range functions.
+    ``state`` and ``row`` are the indices of the cotangents of coordinates and of coefficients. ``before`` are the
+    coordinates before the flow that the transpose recomputes. ``reads`` are the ranges of coordinates that it reads, as
+    pairs (first index, length). ``far`` and ``far_back`` say whether the flow and its transpose have a version with
+    full-range functions.
     """
 
     state: Sequence[int]
@@ -203,10 +211,10 @@ class Transposed:
 
 @dataclass(frozen=True)
 class FlowTransposes:
-    """The functions that pull cotangents back through the flows of a splitting, of ``dimension`` coordinates.
+    """The functions that pull cotangents back through the flows of a splitting with ``dimension`` coordinates.
 
-    A row has ``row`` coefficients. ``recomputes`` says whether the transposes also compute the states before the flows,
-    so that no tape is needed.
+    ``row`` is the number of coefficients in a row. ``recomputes`` says whether the transposes also recompute the states
+    before the flows, so that no tape is needed.
     """
 
     flows: Sequence[Transposed]
@@ -215,7 +223,7 @@ class FlowTransposes:
     recomputes: bool
 
     def _switch(self, case: Callable[[int, Transposed], Iterator[ir.Statement]]) -> ir.Switch:
-        """Return the switch over the parts of H."""
+        """Return the switch over the parts of H, with the statements that ``case`` yields for each part."""
         cases = tuple(tuple(case(k, flow)) for k, flow in enumerate(self.flows, 1))
         return ir.Switch(PART, tuple(range(1, len(cases) + 1)), cases)
 
@@ -226,7 +234,7 @@ class FlowTransposes:
         return (ir.vectors(ir.Vector(ir.Constant(length), lanes=lanes), name) for name, length in lengths.items())
 
     def back(self) -> ir.Function:
-        """Return the function for one member."""
+        """Return the function that pulls the cotangent of a single trajectory back through a flow."""
 
         def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
             yield ir.Call(f"flow{k}_adjoint", (COEF, X, BAR, BACK, SLOPES))
@@ -246,11 +254,12 @@ class FlowTransposes:
 
     @property
     def _stored(self) -> Mapping[str, ir.ParameterType]:
-        """The types of parameters: on the tape are the coordinates of all packs of a group."""
+        """Types of the parameters; the tape has the coordinates of all packs of a group."""
         return {**_TYPES, "tape": ir.Vector(ir.Constant(self.dimension), rows=ir.fixed("BACK_PACKS"), lanes=True)}
 
     def group_flows(self) -> ir.Function:
-        """Return the function that applies a flow to all members of a group, and stores what its transpose reads."""
+        """Return the function that applies a flow to all members of a group, after storing the coordinates its
+        transpose reads."""
 
         def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
             pack = ir.Member(ir.Entry(ir.Member(GROUP, "pack"), K), "x")
@@ -298,7 +307,7 @@ class FlowTransposes:
 
 
 def _in_form(name: str, has_far: bool, arguments: tuple[ir.Value, ...]) -> ir.Statement:
-    """Return the call of a function for lanes, with full-range functions for groups that need them."""
+    """Return the call of a function for lanes; for groups marked ``far``, of its version with full-range functions."""
     near = ir.Call(f"{name}_lanes", arguments)
     if not has_far:
         return near

@@ -1,7 +1,7 @@
-"""Builder of the loops of a lattice: from kernels at a site to functions with loops over sites, bonds or pairs.
+"""Builder of the loops of a lattice: functions that evaluate kernels of a site in loops over sites, bonds or pairs.
 
-The meaning of every symbol that kernels read is defined here, once for all targets. The functions are on the level of
-sites. Their stores hold whole expression graphs, which `phigen.ir.passes.temporaries` turns into statements.
+This module defines for all targets which value each symbol of a kernel stands for. The functions are on the level of
+sites. Their stores contain whole expression graphs, which `phigen.ir.passes.temporaries` converts to statements.
 """
 
 from __future__ import annotations
@@ -21,19 +21,20 @@ from phigen.symbolic import symbols
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: The share of each of its two sites in the energy of a bond or pair.
+#: Half of the energy of a bond or pair belongs to each of its two sites.
 _HALF = number(Fraction(1, 2))
 
 
 @dataclass(frozen=True)
 class LatticeLoops:
-    """The functions of the kernels of one program."""
+    """Builder of the functions of all kernels of a lattice program."""
 
     program: Program
     step: Sweeps
 
     def sweep(self, sweep: Sweep) -> ir.Function:
-        """Return the function that adds a sweep to the fields, or its derivative to their variation."""
+        """Return the function that adds the increments of a sweep to the fields; of a tangent sweep, to the variations
+        of fields."""
         storage = ir.Storage.VARIATION if sweep.is_tangent else ir.Storage.STATE
         arrays = (ir.Array(storage, k, self.program.coordinates[k]) for k in sweep.moved)
         stores = [ir.Store(array, e) for array, e in zip(arrays, sweep.kernel.roots, strict=True)]
@@ -47,7 +48,8 @@ class LatticeLoops:
         return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window, sweep.first)
 
     def stage(self, kernel: Kernel) -> ir.Function:
-        """Return the function of a kernel of the equation of a stage; the fields that it reads are those of y."""
+        """Return the function of a kernel of the stage equation; the fields that it reads are those of the unknown
+        y."""
         gather = self.step.others.varied if kernel.reads_variations else self.step.others.field
         read = gather if kernel.inputs["gathered"] else None
         starts, varied = ["start"] * kernel.reads_start, ["varied"] * kernel.reads_variations
@@ -55,7 +57,8 @@ class LatticeLoops:
         return self._over_sites(kernel, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read)
 
     def observable(self, kernel: Kernel) -> ir.Function:
-        """Return the function of a density, an energy or the vector field; sites share the energy of bonds."""
+        """Return the function of a density, an energy or the vector field; half of each bond energy is added at each
+        end."""
         others = self.step.others
         gather = others.sums_of(kernel)
         body: list[ir.Statement] = [*self._outputs(ir.Storage.OBSERVABLE, kernel.roots)]
@@ -67,7 +70,7 @@ class LatticeLoops:
         return self._over_sites(kernel, parameters, body, gather if gather.names else None)
 
     def sums(self, ends: Ends) -> ir.Function:
-        """Return the function that sums over the bonds of one kind, or over the pairs, of each site."""
+        """Return the function that computes sums at each site, over its bonds of one kind or over all other sites."""
         kernel = ends.kernel
         source = "params" if "params" in kernel.inputs else "coef"
         varied = "varied" in kernel.inputs or ends in self.step.others.varied.ends
@@ -81,15 +84,15 @@ class LatticeLoops:
     def transposed(
         self, kernel: Kernel, gather: Gather | None, sweep: Sweep | None = None, fields: Sequence[str] = ()
     ) -> ir.Function:
-        """Return the transpose of a kernel of the equation of a stage, or of a ``sweep``.
+        """Return the transpose of a kernel of the stage equation, or of a ``sweep``.
 
-        ``gather`` has the sums that it reads; ``fields`` before the sweep are recomputed by the inverse flow.
+        ``gather`` are the sums that the kernel reads. ``fields`` are recomputed before the sweep by the inverse flow.
         """
         stores = self._cotangents(kernel, gather.names if gather else (), fields)
         return self._over_sites(kernel, ("coef",), stores, gather, self._selection(sweep))
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
-        """Return the transpose of the function that sums over bonds or pairs; ``kernel`` is the transposed kernel."""
+        """Return the transpose of the function for sums over bonds or pairs; ``kernel`` is the transposed kernel."""
         source = "params" if "params" in kernel.inputs else "coef"
         return self._over_ends(ends, kernel, (source,), self._cotangents(kernel))
 
@@ -103,7 +106,7 @@ class LatticeLoops:
         return _function(kernel, parameters, loop)
 
     def _cotangents(self, kernel: Kernel, sums: Sequence[str] = (), fields: Sequence[str] = ()) -> Iterator[ir.Update]:
-        """Yield the stores of a transposed kernel, without zeros; ``fields`` are the fields that it recomputes."""
+        """Yield the stores of a transposed kernel, without those of 0; ``fields`` are the fields that it recomputes."""
         for output in kernel.outputs:
             array = output.name.removesuffix("_bar")
             names = fields if array == STATE_BEFORE else kernel.inputs.get(array, [""] * len(output.values))
@@ -147,11 +150,12 @@ class LatticeLoops:
         return [ir.Store(ir.Array(storage, k), e, adds) for k, e in enumerate(values)]
 
     def _reads(self, kernel: Kernel, sums: Sequence[str]) -> Iterator[ir.Statement]:
-        """Yield the declarations of the values that a kernel reads, in the order of its inputs."""
+        """Return the declarations of the values that a kernel reads, in the order of its inputs."""
         return (ir.real(s, self.meaning(s, sums)) for listed in kernel.inputs.values() for s in listed)
 
     def meaning(self, s: str, sums: Sequence[str] = ()) -> ir.Value:
-        """Return the value that a symbol of a kernel stands for; ``sums`` are the names of the gathered sums."""
+        """Return the value that a symbol of a kernel stands for; ``sums`` are the names of the sums that the kernel
+        reads."""
         sites, fields = self.step.sites, self.program.coordinates
         key = s.key if isinstance(s, Symbol) else ()
         match kind_of(s):
@@ -195,7 +199,7 @@ class LatticeLoops:
 
     @cached_property
     def arrays(self) -> tuple[str, ...]:
-        """The arrays of the state."""
+        """The arrays of the state by name: fields, parameters at sites, increments of noise, derived arrays."""
         sites = self.step.sites
         return (*self.program.coordinates, *sites.parameters, *sites.increments, *sites.derived)
 
@@ -206,25 +210,25 @@ class LatticeLoops:
 
     @cached_property
     def numbers(self) -> tuple[str, ...]:
-        """The parameters with one value for all sites."""
+        """The names of the parameters with one value for all sites."""
         arrays = {*self.step.sites.parameters, *self.step.sites.at_bonds}
         return tuple(p.name for p in self.program.parameters if p.name not in arrays)
 
     @cached_property
     def neighbours(self) -> list[tuple[int, ...]]:
-        """The offsets of all neighbours."""
+        """The offsets of all neighbours whose values kernels read, sorted."""
         return sorted({offset for _, offset in self.step.sites.places.values() if any(offset)})
 
     @cached_property
     def weights(self) -> tuple[Symbol, ...]:
-        """The weights of terms at open ends, in the order in which kernels read them."""
+        """The symbols of the weights at open ends, in the order in which kernels read them."""
         equation = self.step.equation
         kernels = (*(sweep.kernel for sweep in self.step.sweeps), *(equation.kernels if equation else ()))
         return _present((*kernels, *self.program.observables.kernels), symbols.PRESENT)
 
     @cached_property
     def seams(self) -> tuple[Symbol, ...]:
-        """The tests for boundary seams, in the order in which kernels read them."""
+        """The symbols that test for boundary seams, in the order in which kernels read them."""
         return _present((sweep.kernel for sweep in self.step.sweeps), symbols.BEGINS)
 
 
@@ -233,12 +237,13 @@ def _function(kernel: Kernel, parameters: tuple[str, ...], *body: ir.Statement) 
 
 
 def _present(kernels: Iterable[Kernel], kind: str) -> tuple[Symbol, ...]:
-    """Return the symbols of a kind that are 1 at some sites only, in the order in which kernels read them."""
+    """Return the symbols of a kind in the inputs ``present``, which are 1 at some sites and 0 at others, in order of
+    use."""
     read = (s for kernel in kernels for s in kernel.inputs["present"])
     return tuple(dict.fromkeys(s for s in read if isinstance(s, Symbol) and kind_of(s) == kind))
 
 
 def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:
-    """Return the least and the largest offset of a term along each axis, from the key of its weight."""
+    """Return the least and the largest offset of a term along each axis, from the key of the symbol of its weight."""
     ends = [int(k) for k in key]
     return list(zip(ends[::2], ends[1::2], strict=True))

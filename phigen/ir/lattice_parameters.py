@@ -1,6 +1,7 @@
-"""Builders of the functions on the parameters of a lattice: tests, copies to rows, and sums of derivatives by them.
+"""Builders of functions on the parameters of a lattice: checks, copies into rows, and sums of derivatives.
 
-Parameters have one value, or one at each site or bond. ``members`` are their names in the record of the parameters.
+A parameter has one value, or a value at each site or bond. ``members`` maps parameters to their names in the record of
+parameters.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _TYPES: Mapping[str, ir.ParameterType] = {
 
 
 def are_allowed(parameters: Sequence[Parameter], members: Mapping[str, str], *, graph: bool) -> ir.Function:
-    """Return the function whose value is 1 if all parameters are finite, and positive where they have to be."""
+    """Return the function that is 1 if all parameters are finite and have the required signs, else 0."""
     body, conditions = list[ir.Statement](), list[ir.Value]()
     for p in parameters:
         array, zero = ir.Member(PARAMS, members[p.name]), ir.Constant(0.0)
@@ -51,7 +52,8 @@ def are_allowed(parameters: Sequence[Parameter], members: Mapping[str, str], *, 
 def copies(
     parameters: Sequence[Parameter], members: Mapping[str, str], arrays: Sequence[str], at_bonds: Sequence[str]
 ) -> Iterator[ir.Function]:
-    """Yield the functions that copy parameters at sites to ``arrays`` of rows, and parameters ``at_bonds``."""
+    """Yield the functions that copy parameters at sites into rows of the ``arrays``, and parameters at bonds into
+    ``at_bonds``."""
     sites, bonds = ([p for p in parameters if p.at == at] for at in ("sites", "bonds"))
     types = {**_TYPES, "s": ir.RecordType("solver", mutable=True)}
     if sites:
@@ -76,7 +78,7 @@ def copies(
 
 
 def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.Assign:
-    """Return the statement that forgets the arrays of the caller."""
+    """Return the statement that sets the pointers to the caller's arrays to null, once they are copied."""
     first, *others = (_of(ir.Member(S, "params"), p, members) for p in parameters)
     return ir.Assign(first, NULL, too=tuple(others))
 
@@ -84,10 +86,10 @@ def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.A
 def sums_of_derivatives(
     parameters: Sequence[Parameter], members: Mapping[str, str], bars: Mapping[str, int]
 ) -> Iterator[ir.Function]:
-    """Yield the functions that add derivatives by parameters to those of the caller.
+    """Yield the functions that add derivatives with respect to parameters to the results of the caller.
 
-    Parameters with one value have a number each. ``bars`` are the arrays of the others, in the order in which they are
-    added.
+    ``bars`` maps the parameters at sites and bonds to the numbers of their cotangent arrays. Parameters with one value
+    have one derivative each.
     """
     numbers = [p for p in parameters if p.at == "all"]
     if numbers:

@@ -1,4 +1,4 @@
-"""Launches of the kernels of a solver on a device, as plain data."""
+"""Descriptions of the kernels of a solver on a device, as plain data from which the runtime launches them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class EnsembleLaunch:
-    """The kernel of an ensemble: the usual number of work items in a ``group``, and numbers of values.
+    """The kernel of an ensemble, with the default number of work items in a ``group`` and the sizes of its data.
 
-    ``predictors`` are the values of a member in shared memory, ``coefficients`` those that members with the same
-    parameters, step and gauge can share; 0 if there are none. ``gauges`` are the factors of a gauge.
+    ``predictors`` is the number of values of a member in shared memory, or 0. ``coefficients`` is the number of values
+    that members with the same parameters, step and gauge can share, or 0. ``gauges`` is the number of factors of a
+    gauge.
     """
 
     group: int = 0
@@ -22,9 +23,11 @@ class EnsembleLaunch:
 
 @dataclass(frozen=True)
 class SumLaunch:
-    """Sums over the bonds of each site, or over pairs; ``end`` and ``chosen`` are those of `phigen.scheme.steps.Ends`.
+    """The kernel of sums over the bonds of each site, or over pairs; ``end`` and ``chosen`` are as in
+    `phigen.scheme.steps.Ends`.
 
-    ``values`` is the number of sums of a site. Those ``of_parameters`` read parameters in place of coefficients.
+    ``values`` is the number of sums at a site. ``of_parameters`` says that the kernel reads parameters, not
+    coefficients.
     """
 
     kernel: str
@@ -36,7 +39,8 @@ class SumLaunch:
 
 @dataclass(frozen=True)
 class SiteLaunch:
-    """A kernel over sites, after the ``sums`` that it reads; ``outputs`` is the number of its outputs at a site.
+    """A kernel over sites, launched after the kernels of the ``sums`` that it reads; ``outputs`` is its number of
+    outputs per site.
 
     ``colour``, ``inside`` and ``window`` select sites as in `phigen.ir.nodes.Selection`.
     """
@@ -51,17 +55,19 @@ class SiteLaunch:
 
 @dataclass(frozen=True)
 class LatticeLaunches:
-    """All kernels of a lattice: the sweeps of each of the ``parts`` of H, and others by their names.
+    """All kernels of a lattice: the sweeps of each of the ``parts`` of H, and other kernels by name.
 
-    ``arrays`` are the arguments of all kernels after the first five, in order. ``seams`` are the conditions on
-    boundary seams, each a colour and an offset; ``numbers`` the parameters with one value, in the order of kernels.
+    ``arrays`` are the arguments of all kernels after the first five, in order. ``seams`` are the conditions on boundary
+    seams, each a colour and an offset. ``numbers`` are the parameters with one value, in the order of kernels.
     """
 
     parts: tuple[tuple[SiteLaunch, ...], ...] = ()
     others: Mapping[str, SiteLaunch] = field(default_factory=dict)
     arrays: tuple[str, ...] = ()
     neighbours: tuple[tuple[int, ...], ...] = ()  # offsets of the sites whose fields kernels read
-    bounds: tuple[tuple[tuple[int, int], ...], ...] = ()  # of each weight of a term at open ends, along each axis
+    # for each weight at open ends, the least and largest offset of its term along each axis
+    bounds: tuple[tuple[tuple[int, int], ...], ...] = ()
     seams: tuple[tuple[int, tuple[int, ...]], ...] = ()
     numbers: tuple[str, ...] = ()
-    reductions: tuple[tuple[str, str], ...] = ()  # of each observable, over sites, bonds or pairs
+    # for each observable, its reduction, and whether it is over sites, bonds or pairs
+    reductions: tuple[tuple[str, str], ...] = ()

@@ -1,12 +1,13 @@
-"""Nodes of the loop IR. Real arithmetic is an `Expression` over symbols that statements declare.
+"""Nodes of the loop IR: statements, loops and values. Real arithmetic is an `Expression` over symbols that statements
+declare.
 
-There are two levels. On the level of *sites*, `Load` and `Store` name an array and the offset of a site, and loops
-run over sites, bonds or pairs. On the level of *memory*, `Entry`, `Member` and plain loops name elements of arrays.
-Each target has one lowering pass from sites to memory; printers accept the level of memory only.
+There are two levels. On the level of *sites*, `Load` and `Store` name an array and the offset of a site, and loops run
+over sites, bonds or pairs. On the level of *memory*, `Entry`, `Member` and plain loops name elements of arrays. Each
+target has one lowering pass from the level of sites to the level of memory; printers only accept the latter.
 
-A dialect of C, such as that of a device, takes the functions of the lowering by rows (`phigen.ir.passes.by_rows`) or
-by tables (`phigen.ir.passes.by_tables`) and prints them by a `phigen.targets.spelling.Dialect`. It maps the loops that
-are ``independent`` and the loops over row segments to its threads; all other nodes have one meaning everywhere.
+A dialect of C, such as that of a device, applies the lowering by rows (`phigen.ir.passes.by_rows`) or by tables
+(`phigen.ir.passes.by_tables`), and prints the result by a `phigen.targets.spelling.Dialect`. It maps ``independent``
+loops and loops over row segments to its threads.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
-#: The kind of symbols that are printed unchanged, since the printed function reserves them; and the kind of symbols
-#: that are printed by their text, unless the user has the same name.
+#: Kinds of symbols of variables that are not in the spec. FIXED ones are printed unchanged, since the generated
+#: function reserves their names. LABEL ones are printed unchanged too, but renamed if the spec uses the same name.
 FIXED, LABEL = "fixed", "label"
 
 
@@ -30,18 +31,19 @@ class Type(Enum):
 
     REAL = auto()
     INDEX = auto()
-    SIZE = auto()  # a number of elements, or the number of a row segment
-    FLAG = auto()  # a small integer
-    ARRAY = auto()  # an array of reals, in a language without pointers
-    INDICES = auto()  # an array of indices, likewise
-    ARRAYS = auto()  # pointers to the first elements of several arrays of reals
+    SIZE = auto()  # number of elements, or number of a row segment
+    FLAG = auto()  # small integer
+    ARRAY = auto()  # array of reals, in a language without pointers
+    INDICES = auto()  # array of indices, in a language without pointers
+    ARRAYS = auto()  # array of pointers to the first elements of arrays of reals
 
 
 @dataclass(frozen=True)
 class Pointer:
-    """Pointer to reals, or to reals in SIMD ``lanes``.
+    """Pointer to reals, or to SIMD vectors of reals if ``lanes``.
 
-    A ``constant`` one is only read through, a ``restricted`` one has no alias that is written.
+    Through a ``constant`` pointer, the function only reads. The elements of a ``restricted`` pointer are not written
+    through any other pointer.
     """
 
     constant: bool = True
@@ -51,10 +53,10 @@ class Pointer:
 
 @dataclass(frozen=True)
 class Vector:
-    """Array of reals, or of reals in SIMD ``lanes``; a matrix if it has several ``rows``.
+    """Array of reals, or of SIMD vectors of reals if ``lanes``; a matrix if it has several ``rows``.
 
-    As a parameter it is an address, of any length if it has none; a ``constant`` one is only read through, a
-    ``restricted`` one has no alias.
+    A parameter of this type is an address, and its ``length`` may be unknown (None). ``constant`` and ``restricted``
+    are as in `Pointer`.
     """
 
     length: Value | None
@@ -66,16 +68,16 @@ class Vector:
 
 @dataclass(frozen=True)
 class Tape:
-    """Address of the next vector of a tape, or nothing if none are stored."""
+    """Pointer to the next free vector of a tape, or null if no states are stored."""
 
     length: Value
 
 
 @dataclass(frozen=True)
 class RecordType:
-    """Record of the runtime, by its name: the solver, or a row segment.
+    """Record of the runtime by its name, such as the solver or a row segment.
 
-    Parameters of this type are addresses, and so are local names if it is an ``address``. A function changes only
+    Parameters of this type are addresses; local variables are addresses if ``address`` is set. A function only changes
     records that are ``mutable``.
     """
 
@@ -88,15 +90,15 @@ ParameterType = Type | Pointer | Vector | Tape | RecordType
 
 
 class Storage(Enum):
-    """Kinds of arrays over the sites."""
+    """Kinds of arrays over the sites; the value is their name in kernels."""
 
-    STATE = "x"  # fields, then parameters at sites, then increments of noise
+    STATE = "x"  # fields, then parameters at sites, then increments of noise, then derived arrays
     VARIATION = "varied"
-    START = "start"  # the fields at the start of a stage
+    START = "start"  # fields at the start of a stage
     OUTPUT = "out"
-    OBSERVABLE = "observable"  # output for callers, without padding between rows
+    OBSERVABLE = "observable"  # results for callers, in arrays without padding between rows
     SUM = "gathered"  # sums over bonds or pairs
-    COTANGENT = "bar"  # of the state, then of parameters at bonds
+    COTANGENT = "bar"  # cotangents of the state, then of parameters at bonds
     START_COTANGENT = "start_bar"
     SUM_COTANGENT = "gathered_bar"
     SEED = "seed"  # cotangents of the outputs of a kernel
@@ -104,41 +106,42 @@ class Storage(Enum):
 
 @dataclass(frozen=True)
 class Array:
-    """Array over the sites: its number among the arrays of one kind of storage."""
+    """Array over the sites, by its kind of storage and its number among the arrays of this kind."""
 
     storage: Storage
     number: int
     name: str = ""
 
 
-# ---- values; beside these, every `Expression` is a value
+# ---- values; an `Expression` is a value too
 
 
 @dataclass(frozen=True)
 class Name:
-    """A variable that is declared in the function, by its name."""
+    """Variable of the function, by its symbol."""
 
     symbol: str
 
     @property
     def text(self) -> str:
-        """The text of a fixed name."""
+        """The text of a name of the kind FIXED or LABEL; "" for others."""
         return str(self.symbol.key[0]) if isinstance(self.symbol, Symbol) else ""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """A number in its shortest form, a string, or nothing."""
+    """Number, string, or null."""
 
     value: int | float | str | None
 
 
 @dataclass(frozen=True)
 class Load:
-    """Element of an array at an offset from the site of the loop, or at the ``end``, a or b, of a bond or pair.
+    """Element of an array over the sites: at an ``offset`` from the site of the loop, or at the ``end`` of a bond or
+    pair.
 
-    In transposed functions the end "bond" is the bond itself: arrays of cotangents of parameters at bonds are loaded
-    and stored there.
+    ``end`` is "a" or "b". In transposed functions it may be "bond", the bond itself, for the cotangents of parameters
+    at bonds.
     """
 
     array: Array
@@ -148,21 +151,21 @@ class Load:
 
 @dataclass(frozen=True)
 class Coefficient:
-    """State-independent value, computed by ``prepare``."""
+    """Coefficient by number: a value that does not depend on the state and is computed by ``prepare``."""
 
     number: int
 
 
 @dataclass(frozen=True)
 class SystemParameter:
-    """Parameter that is the same at all sites."""
+    """Parameter with the same value at all sites."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class BondParameter:
-    """Parameter at the bond of the loop; an ``oriented`` one has the opposite sign seen from the end b."""
+    """Parameter at the bond of the loop; if ``oriented``, it has the opposite sign when seen from the end b."""
 
     number: int
     name: str
@@ -176,7 +179,10 @@ class Time:
 
 @dataclass(frozen=True)
 class Inside:
-    """1 where a term with these least and largest offsets along each axis lies within the open ends, else 0."""
+    """Weight of a term at open ends: 1 at sites where all offsets of the term are inside the lattice, else 0.
+
+    ``bounds`` has the least and the largest offset of the term along each axis.
+    """
 
     number: int
     bounds: tuple[tuple[int, int], ...]
@@ -189,7 +195,7 @@ class HasColour:
 
 @dataclass(frozen=True)
 class OnSeam:
-    """1 where the site at an offset has a colour and lies on the boundary seams of the sweep, else 0."""
+    """1 if the site at ``offset`` has the colour ``colour`` and lies on the boundary seams of the sweep, else 0."""
 
     number: int
     colour: int
@@ -198,7 +204,7 @@ class OnSeam:
 
 @dataclass(frozen=True)
 class Member:
-    """A member of a record, such as the solver."""
+    """Member of a record, such as the solver."""
 
     record: Value
     name: str
@@ -214,7 +220,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class Binary:
-    """Infix operator on two values."""
+    """Infix operator with two operands."""
 
     operator: str
     left: Value
@@ -223,7 +229,7 @@ class Binary:
 
 @dataclass(frozen=True)
 class Accumulated:
-    """A value, plus the terms of another value added one by one, from the left."""
+    """Sum of a value and the terms of another value, added one by one from the left."""
 
     start: Value
     terms: Value
@@ -231,7 +237,7 @@ class Accumulated:
 
 @dataclass(frozen=True)
 class Cast:
-    """A value as an index, as a size, or as a real number."""
+    """Value converted to an index, a size, or a real number."""
 
     value: Value
     kind: str = "index"
@@ -248,7 +254,7 @@ class Select:
 
 @dataclass(frozen=True)
 class Prefix:
-    """A prefix operator, ``not`` or ``-``, on a value."""
+    """Prefix operator, such as ``not`` or ``-``, with its operand."""
 
     operator: str
     value: Value
@@ -263,21 +269,21 @@ class Grouped:
 
 @dataclass(frozen=True)
 class Listed:
-    """Values in the brackets of a list."""
+    """List of values, in the brackets of the language."""
 
     values: tuple[Value, ...]
 
 
 @dataclass(frozen=True)
 class Several:
-    """Values separated by commas."""
+    """Several values, separated by commas."""
 
     values: tuple[Value, ...]
 
 
 @dataclass(frozen=True)
 class Called:
-    """Value of a function, or of a method of an ``instance``."""
+    """Result of a function, or of a method of an ``instance``."""
 
     name: str
     arguments: tuple[Value, ...] = ()
@@ -295,7 +301,10 @@ Value = (
 
 @dataclass(frozen=True)
 class Declare:
-    """Constants of one type; a constant ``in_place`` gets no name: its value is printed wherever it is used."""
+    """Declaration of variables of one type, constants unless ``mutable``.
+
+    If it is ``in_place``, there is no variable: the value is printed wherever the name is used.
+    """
 
     type: Type | Pointer | Vector | RecordType
     items: tuple[tuple[str, Value], ...]
@@ -306,7 +315,7 @@ class Declare:
 
 @dataclass(frozen=True)
 class Unpack:
-    """Constants for the members, or the items, of one value."""
+    """Declaration of constants for the members, or the items, of one value."""
 
     names: tuple[str, ...]
     value: Value
@@ -314,10 +323,11 @@ class Unpack:
 
 @dataclass(frozen=True)
 class Store:
-    """Assign a value to the element at the site of the loop or, if it ``adds``, add the value to the element.
+    """Assignment of a value to the element of an array at the site of the loop; if it ``adds``, addition to the
+    element.
 
-    An ``extreme``, ``max`` or ``min``, replaces the element only if it is larger or smaller. ``offset`` and ``end``
-    select other elements, as in `Load`.
+    An ``extreme``, "max" or "min", only replaces the element by larger or smaller values. ``offset`` and ``end`` select
+    other elements, as in `Load`.
     """
 
     array: Array
@@ -330,21 +340,21 @@ class Store:
 
 @dataclass(frozen=True)
 class Reduce:
-    """Add a value to the cotangent of a coefficient or a parameter, which is the same at all sites."""
+    """Addition of a value, at each site, to the cotangent of a coefficient or of a parameter with one value."""
 
-    source: str  # coef or params
+    source: str  # "coef" or "params"
     number: int
     name: str
     value: Value
 
 
-#: Statements whose values are graphs before the pass `phigen.ir.passes.temporaries`.
+#: Statements whose values are expression graphs before the pass `phigen.ir.passes.temporaries`.
 Update = Store | Reduce
 
 
 @dataclass(frozen=True)
 class GatherSums:
-    """Compute sums over bonds or pairs for all sites, by the functions of these names."""
+    """Computation of ``count`` sums over bonds or pairs at all sites, by the functions with these names."""
 
     functions: tuple[str, ...]
     count: int
@@ -352,7 +362,7 @@ class GatherSums:
 
 @dataclass(frozen=True)
 class Assign:
-    """Assign a value to a place in memory and to the places ``too`` or, if it ``adds``, add it."""
+    """Assignment of a value to a place in memory, and to the places ``too``; if it ``adds``, addition."""
 
     target: Value
     value: Value
@@ -362,14 +372,14 @@ class Assign:
 
 @dataclass(frozen=True)
 class Together:
-    """Assignments that make up one statement."""
+    """Assignments that are printed as one statement."""
 
     assignments: tuple[Assign, ...]
 
 
 @dataclass(frozen=True)
 class Clear:
-    """Set ``count`` elements of an array to zero, from the index ``first`` on, or all without a count."""
+    """Assignment of 0 to ``count`` elements of an array from index ``first`` on; to all elements without a count."""
 
     array: Value
     first: Value | None
@@ -378,7 +388,7 @@ class Clear:
 
 @dataclass(frozen=True)
 class Copy:
-    """Copy a vector to another one, or ``count`` elements."""
+    """Copy of a vector, or of its first ``count`` elements, to another vector."""
 
     target: Value
     source: Value
@@ -387,7 +397,7 @@ class Copy:
 
 @dataclass(frozen=True)
 class Append:
-    """Append a vector to a tape, if there is one."""
+    """Append a vector to a tape, if the tape is not null."""
 
     tape: Value
     vector: Value
@@ -395,11 +405,11 @@ class Append:
 
 @dataclass(frozen=True)
 class Selection:
-    """The sites that a sweep updates: those of one ``colour``, those away from boundary seams, or those on a seam.
+    """Sites over which a loop runs.
 
-    ``inside`` excludes boundary seams; ``window`` selects the sites on the seams of these axes. Sites before the
-    ``first`` are left out, in loops over pairs as the other site. Loops over ``massive`` sites end with the last one
-    that has a mass.
+    They have one ``colour``, if it is not None. ``inside`` excludes the sites on boundary seams, and ``window`` is the
+    axis to whose seams the loop is restricted. Sites with numbers below ``first`` are excluded; in loops over pairs,
+    this applies to the other site. ``massive`` ends a loop with the last site that has a mass.
     """
 
     colour: int | None = None
@@ -414,11 +424,12 @@ ALL_SITES = Selection()
 
 @dataclass(frozen=True)
 class Loop:
-    """Loop over sites, bonds or pairs; in memory, over a variable from ``low`` to before ``high``.
+    """Loop over sites, bonds or pairs; on the level of memory, over a ``variable`` from ``low`` to below ``high``.
 
-    ``end`` and ``chosen`` say which bonds a loop over bonds runs over, as in `phigen.scheme.steps.Ends`. A loop of the
-    kind "segments" runs over row segments, by several threads if there are more sites than ``threads``, unless this is
-    0. Loops of the kinds "line" and "search" have one statement; that of a search may end the function.
+    ``end`` and ``chosen`` say over which bonds a loop runs, as in `phigen.scheme.steps.Ends`. A loop of the kind
+    "segments" runs over row segments; if ``threads`` is not 0, it uses several threads for lattices of more than
+    ``threads`` sites. Loops of the kinds "line" and "search" have one statement; in a "search" this may end the
+    function.
     """
 
     kind: str
@@ -430,32 +441,32 @@ class Loop:
     end: str = ""
     chosen: str = ""
     step: Value | None = None
-    limit: str = ""  # the name of a variable that holds ``high``
-    condition: Value | None = None  # the loop runs while it holds
-    independent: str = ""  # SITE or LANE: the iterations that the compiler may vectorise
+    limit: str = ""  # name of a variable for ``high``
+    condition: Value | None = None  # the loop only runs if this value is true
+    independent: str = ""  # SITE or LANE if the compiler may vectorise the iterations
     note: str = ""
     threads: int = 0
 
     def with_body(self, statements: Iterable[Statement]) -> Loop:
-        """Return the loop with other statements."""
+        """Return the loop with a different body."""
         return replace(self, body=tuple(statements))
 
     @property
     def stores(self) -> list[Store]:
-        """The stores among its statements."""
+        """The stores in the body of the loop."""
         return [s for s in self.body if isinstance(s, Store)]
 
 
 @dataclass(frozen=True)
 class Discard:
-    """Mark a parameter as unused, for the compiler."""
+    """Mark a parameter as unused, to avoid a warning of the compiler."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class If:
-    """Run statements if a condition holds, else the others."""
+    """Statements that run if a condition is true, and others that run if it is false."""
 
     condition: Value
     then: Block
@@ -464,7 +475,7 @@ class If:
 
 @dataclass(frozen=True)
 class Switch:
-    """Run the statements of the case whose label equals a value; the last case is also that of all other values."""
+    """Statements of the case whose label equals a value; the last case applies to all other values too."""
 
     value: Value
     labels: tuple[int, ...]
@@ -480,7 +491,7 @@ class Comment:
 
 @dataclass(frozen=True)
 class Within:
-    """Statements in a context, such as one that silences warnings."""
+    """Statements in a context manager of Python, such as one that silences warnings."""
 
     context: Value
     body: Block
@@ -488,7 +499,7 @@ class Within:
 
 @dataclass(frozen=True)
 class Continue:
-    """Go to the next iteration."""
+    """Continue with the next iteration of the loop."""
 
 
 @dataclass(frozen=True)
@@ -502,7 +513,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Return:
-    """End a function, with a value or without."""
+    """Return from a function, with a value or without."""
 
     value: Value | None = None
 
@@ -531,13 +542,13 @@ Statement = (
 Block = tuple[Statement, ...]
 
 
-#: The parameters of functions on the level of sites; a target gives them its own names.
+#: Parameters of functions on the level of sites; each target gives them its own names.
 PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "out")
 
 _NUMBERED = dict.fromkeys(("first", "end", "unit"), Type.SIZE)
 _ARRAYS = dict.fromkeys(("x", "y", "v", "to", "bar", "handed", "received", "at_bonds"), Type.ARRAYS)
 _SUMMED = dict.fromkeys(("sums", "numbers"), Pointer(constant=False))
-#: The types of the parameters of functions by rows, by their names.
+#: Types of the parameters of functions by rows, by name.
 TYPES: dict[str, ParameterType] = {
     "s": RecordType("solver"),
     "row": RecordType("row"),
@@ -554,19 +565,20 @@ TYPES: dict[str, ParameterType] = {
 
 @dataclass(frozen=True)
 class ConstantTable:
-    """Constants of the model: an array of integers with a name."""
+    """Named array of integers, the constants of a model."""
 
     name: str
     values: tuple[int, ...]
-    length: Value | None = None  # the number of the values, if it has no name
+    length: Value | None = None  # the macro or constant for the number of values, if there is one
 
 
 @dataclass(frozen=True)
 class Function:
-    """A function; ``doc`` is its purpose, ``role`` the purpose of its kernel, ``returns`` the type of its value.
+    """Function of the generated code.
 
-    On the level of sites its parameters are some of `PARAMETERS`. On the level of memory the types of the parameters
-    are in ``types``; types that are not listed there are in `TYPES`.
+    ``doc`` becomes its comment. ``role`` is the purpose of its kernel, and ``returns`` the type of its result. On the
+    level of sites, its parameters are some of `PARAMETERS`. On the level of memory, the types of parameters are in
+    ``types`` or else in `TYPES`.
     """
 
     name: str
@@ -579,62 +591,62 @@ class Function:
 
     @property
     def loop(self) -> Loop:
-        """The loop of a function on the level of sites, its last statement."""
+        """The loop of a function on the level of sites, which is its last statement."""
         loop = self.body[-1]
         assert isinstance(loop, Loop)
         return loop
 
     @property
     def known_types(self) -> dict[str, ParameterType]:
-        """The types of parameters on the level of memory, by their names."""
+        """The types of parameters on the level of memory, by name."""
         return {**TYPES, **dict(self.types)}
 
     def with_body(self, *body: Statement) -> Function:
-        """Return the function with other statements."""
+        """Return the function with a different body."""
         return replace(self, body=body)
 
 
 def fixed(name: str) -> Name:
-    """Return a name that is printed as it is."""
+    """Return a variable that is printed as ``name``."""
     return Name(Symbol(FIXED, name))
 
 
 def label(text: str) -> Name:
-    """Return a name that is printed by its text, unless the user has the same name."""
+    """Return a variable that is printed as ``text``, unless a name in the spec is the same."""
     return Name(Symbol(LABEL, text))
 
 
 def in_place(name: str, value: Value) -> Declare:
-    """Return the declaration of a symbol whose value is printed wherever it is used."""
+    """Return the declaration of a symbol whose value is printed wherever the symbol is used."""
     return Declare(Type.REAL, ((name, value),), in_place=True)
 
 
 def real(name: Name | str, value: Value, *, mutable: bool = False) -> Declare:
-    """Return the declaration of one real value."""
+    """Return the declaration of a real variable."""
     return Declare(Type.REAL, ((name.symbol if isinstance(name, Name) else name, value),), mutable=mutable)
 
 
 def index(name: Name, value: Value) -> Declare:
-    """Return the declaration of one index."""
+    """Return the declaration of an index."""
     return Declare(Type.INDEX, ((name.symbol, value),))
 
 
 def vectors(kind: Vector, *names: Name, value: Value | None = None, note: str = "") -> Declare:
-    """Return the declaration of arrays that statements write to, without a value unless one is passed."""
+    """Return the declaration of mutable arrays, without initial values unless ``value`` is passed."""
     items = tuple((name.symbol, value or Constant(None)) for name in names)
     return Declare(kind, items, note=note, mutable=True)
 
 
 def entry(array: Value, number: int | str) -> Entry:
-    """Return the element of an array with a number, or a name."""
+    """Return the element of an array by its number or by the name of a variable."""
     return Entry(array, Constant(number))
 
 
 def joined(operator: str, *values: Value) -> Value:
-    """Return values joined by an infix operator, from the left."""
+    """Return values joined by an infix operator, evaluated from the left."""
     return reduce(lambda left, right: Binary(operator, left, right), values)
 
 
 def plus(value: Value, offset: int) -> Value:
-    """Return a value plus an integer."""
+    """Return the sum of a value and an integer."""
     return Binary("+" if offset > 0 else "-", value, Constant(abs(offset))) if offset else value

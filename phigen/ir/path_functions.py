@@ -1,7 +1,8 @@
-"""Builders of the functions of paths ṁ = π(m)p: Taylor recurrences of the nodes of π(m)p, one order at a time.
+"""Builders of the functions of paths ṁ = π(m)p, by recurrences for the Taylor coefficients of the nodes of π(m)p.
 
-Each series is an array over the orders. All languages have the same recurrences; `PathLayout` says where values are.
-In SIMD lanes (`lane_functions`) the sums over orders are loops, and derivatives of the path are computed with it.
+Each node of the expression graph has a series, an array over the orders. The recurrences are the same in all languages;
+a `PathLayout` says where values are. For SIMD lanes (`lane_functions`), sums over orders are loops, and derivatives of
+the path are computed too.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ from phigen.scheme.steps import PathAdjoint
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, cotangent, momentum, variation
 
-#: Largest number of Taylor terms of a path; a path that needs more is divided into pieces.
+#: Largest number of Taylor terms of a path. A path that needs more is divided into several parts.
 TERMS = 30
 
-#: Most statements in a loop over lanes: compile time is quadratic in the length.
+#: Largest number of statements in a loop over lanes, since compile time is quadratic in this number.
 LONGEST_LOOP = 60
 
 COEF, P, F, S, E, M, K, J, LANE, FIELD, SHARE, SUM, FROM, TO = (
@@ -34,36 +35,36 @@ ZERO, ONE = ir.Constant(0), ir.Constant(1.0)
 
 
 class PathLayout:
-    """The places of the values of a path, in languages with arrays of numbers: one entry for each order of a series."""
+    """Places of the values of a path in arrays; the array of a series has one entry for each order."""
 
     def coefficient(self, i: int) -> ir.Value:
-        """Return coefficient i, a function of the parameters and the step."""
+        """Return coefficient i, a function of parameters and step."""
         return ir.entry(COEF, i)
 
     def covector(self, i: int) -> ir.Value:
-        """Return component i of p."""
+        """Return component i of the covector p."""
         return ir.entry(P, i)
 
     def fixed(self, i: int) -> ir.Value:
-        """Return value i of those that are constant along a path."""
+        """Return value number i among those that are constant along a path."""
         return ir.entry(F, i)
 
     def series(self, i: int) -> ir.Value:
-        """Return the array of the orders of series i."""
+        """Return the array of the Taylor coefficients of series i."""
         return ir.entry(S, i)
 
     def order(self, i: int, k: ir.Value) -> ir.Value:
-        """Return coefficient k of series i."""
+        """Return the Taylor coefficient of order k of series i."""
         return ir.Entry(self.series(i), k)
 
     def following(self, i: int, k: ir.Value, value: ir.Value) -> ir.Statement:
-        """Return the statement that sets coefficient k of series i, the first that is not known."""
+        """Return the statement that sets the Taylor coefficient of order k of series i."""
         return ir.Assign(self.order(i, k), value)
 
 
 @dataclass(frozen=True)
 class PathFunctions:
-    """The recurrences of the path of a program, whose values a ``layout`` places."""
+    """Builder of the recurrences for the path of a program; ``layout`` gives the places of values."""
 
     program: Program
     path: Recurrences
@@ -71,32 +72,32 @@ class PathFunctions:
 
     @property
     def derived(self) -> list[tuple[int, NodeSeries]]:
-        """The series that follow from those of the coordinates, with their numbers."""
+        """The series of nodes other than coordinates, with their numbers."""
         return [*enumerate(self.path.series)][self.program.dimension :]
 
     def blocks(self) -> dict[str, ir.Function]:
-        """Return the statements of the path by their purpose, each as a function without parameters."""
+        """Return the functions of the path by name; they have no parameters."""
         parts = (self.fixed, self.first, self.rules, self.slopes, self.nodes, self.field)
         return {part.__name__: ir.Function(part.__name__, "", Role.OTHER, (), part()) for part in parts}
 
     def fixed(self) -> ir.Block:
-        """Return the statements that compute the values that are constant along the path."""
+        """Return the statements for the values that are constant along the path."""
         reads = self.reads(self.path.fixed)
         return (*reads, *(ir.Assign(self.layout.fixed(i), _expanded(e)) for i, e in enumerate(self.path.fixed)))
 
     def first(self) -> ir.Block:
-        """Return the statements that compute the coefficients of order 0."""
+        """Return the statements for the Taylor coefficients of order 0."""
         layout, derived = self.layout, self.derived
         reads = self.reads(q.first for _, q in derived)
         return (*reads, *(layout.following(i, ZERO, _expanded(q.first)) for i, q in derived))
 
     def rules(self) -> ir.Block:
-        """Return the statements that compute the coefficients of order k ≥ 1."""
+        """Return the statements for the Taylor coefficients of order k ≥ 1."""
         reads = self.reads(factor for _, q in self.derived for _, factor in q.linear)
         return (*reads, *(self.layout.following(i, K, self._rule(q)) for i, q in self.derived))
 
     def slopes(self) -> ir.Block:
-        """Return the statements that compute the coefficients of order k + 1 of the coordinates."""
+        """Return the statements for the Taylor coefficients of order k + 1 of the coordinates."""
         after, layout = ir.plus(K, 1), self.layout
         values = (
             ir.Binary("/", layout.order(derivative_index, K), ir.Cast(after, "real"))
@@ -105,17 +106,17 @@ class PathFunctions:
         return tuple(layout.following(i, after, value) for i, value in enumerate(values))
 
     def nodes(self) -> ir.Block:
-        """Return the statements that compute the values e of the derived series at one point."""
+        """Return the statements that compute the values e of all nodes at one point."""
         reads = self.reads((q.first for _, q in self.derived), at_point=True)
         return (*reads, *(ir.Assign(ir.entry(E, i), _expanded(q.first)) for i, q in self.derived))
 
     def field(self) -> ir.Block:
-        """Return the statements that compute ṁ from these values."""
+        """Return the statements that compute ṁ from the values e of the nodes."""
         derivatives = (ir.entry(E, index) for index in self.path.slopes)
         return tuple(ir.Assign(ir.entry(FIELD, i), value) for i, value in enumerate(derivatives))
 
     def reads(self, expressions: Iterable[Expression], *, at_point: bool = False) -> list[ir.Statement]:
-        """Return the declarations of the symbols of expressions; series are those of one point, or of order 0."""
+        """Return the declarations of the symbols in expressions; series are read at one point, or at order 0."""
         used = {*symbols_of(*expressions)}
         listed = {momentum(c): self.layout.covector(i) for i, c in enumerate(self.program.coordinates)}
         listed |= {coefficient(i): self.layout.coefficient(i) for i in range(self.program.step.coefficients)}
@@ -125,7 +126,7 @@ class PathFunctions:
         return [ir.in_place(s, place) for s, place in listed.items() if s in used]
 
     def linear(self, q: NodeSeries) -> ir.Value | None:
-        """Return the sum of the terms that are multiples of other series; none without such terms."""
+        """Return the sum of the terms that are multiples of other series; None if there are none."""
         total: ir.Value | None = None
         for index, factor in q.linear:
             term = self.layout.order(index, K)
@@ -142,13 +143,14 @@ class PathFunctions:
         return ir.Binary("/", ir.Grouped(total), self.layout.order(q.divisor, ZERO)) if q.divisor is not None else total
 
     def _sum(self, t: ConvolutionTerm) -> ir.Value:
-        """Return the sum over orders, as a call of the runtime."""
+        """Return a convolution over orders, as a call of a function of the runtime."""
         exponent = (_exponent(t),) if t.kind == "power" else ()
         return ir.Called(f"taylor_{t.kind}", (self.layout.series(t.a), self.layout.series(t.b), *exponent, K))
 
 
 def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Function]:
-    """Return the functions of a path: its first coefficients, those of order k, and its slope at a point m."""
+    """Return three functions of a path: coefficients of order 0, coefficients of order k, and the field ṁ at a point
+    m."""
     build, n = PathFunctions(program, path, PathLayout()), ir.Constant(program.dimension)
     series, orders = ir.Constant(len(path.series)), ir.Binary("+", ir.fixed("TERMS"), ir.Constant(1))
     values = ir.Vector(ir.Constant(max(1, len(path.fixed))))
@@ -179,12 +181,12 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
 
 
 def tangent_program(program: Program) -> Program:
-    """Return the program with the coordinates of its tangent path: the state, then its variation."""
+    """Return the program whose coordinates are those of the tangent path: the state and its variation."""
     return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
 
 
 def adjoint_program(program: Program, path: PathAdjoint) -> Program:
-    """Return the program with the coordinates of the path of the reverse pass: the state, then all cotangents."""
+    """Return the program whose coordinates are those of the path in the reverse pass: the state and all cotangents."""
     names = program.coordinates
     bars = [
         *map(cotangent, names),
@@ -198,7 +200,8 @@ def adjoint_program(program: Program, path: PathAdjoint) -> Program:
 
 
 class _LaneLayout(PathLayout):
-    """The places in a record e of expansions, in one lane; the series of derivatives continue those of the path."""
+    """Places of the values of a path in a record e, in one lane; the series of its derivatives follow those of the
+    path."""
 
     def __init__(self, path: Recurrences) -> None:
         self._series, self._fixed = len(path.series), len(path.fixed)
@@ -223,7 +226,8 @@ class _LaneLayout(PathLayout):
 
 
 def lane_functions(program: Program, path: Recurrences, slopes: PathSlopes, used: Sequence[int]) -> list[ir.Function]:
-    """Return the functions of a path and its derivatives in SIMD lanes, also along the coefficients in ``used``."""
+    """Return the functions of a path and its derivatives in SIMD lanes; ``used`` are the coefficients to differentiate
+    by."""
     whole = Recurrences((*path.series, *slopes.series), path.slopes, (*path.fixed, *slopes.fixed))
     build = _LaneFunctions(PathFunctions(program, whole, _LaneLayout(path)))
     base, n = len(path.series), program.dimension
@@ -247,13 +251,15 @@ def lane_functions(program: Program, path: Recurrences, slopes: PathSlopes, used
 
 @dataclass(frozen=True)
 class _LaneFunctions:
+    """Builder of the functions of a path in SIMD lanes."""
+
     path: PathFunctions
 
     def follow(self, name: str, purpose: str, numbers: range) -> ir.Function:
-        """Return the function of coefficient k ≥ 1 of the series of these numbers.
+        """Return the function for the Taylor coefficient of order k ≥ 1 of the series with these numbers.
 
-        It adds the contributions of orders j and k − j to sums over orders, then the remaining terms, which may need
-        coefficients of order k.
+        It first adds the products of coefficients of orders j and k − j for 0 < j < k, then the other terms, which may
+        contain coefficients of order k.
         """
         layout, between, ends = self.path.layout, list[ir.Statement](), list[ir.Statement]()
         series = [(i, self.path.path.series[i]) for i in numbers]
@@ -276,7 +282,11 @@ class _LaneFunctions:
         return typed_function(name, f"{doc} terms", ("coef", "e", "k"), (*share, *body), _TYPES)
 
     def variation(self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, whose: str) -> ir.Function:
-        """Return the function that adds the product of ∂(π p)/∂m and the derivatives so far, rows of a width."""
+        """Return the function that adds the product of ∂(π p)/∂m at order j and derivatives of the path at order k − j.
+
+        The derivatives are rows of ``width`` entries in the member ``array`` of e; ``whose`` describes them in the
+        comment.
+        """
         statements = list[ir.Statement]()
         for e in jacobian:
             entry = ir.Binary("*", SHARE, self.path.layout.order(e.series, J))
@@ -295,7 +305,10 @@ class _LaneFunctions:
     def source(
         self, name: str, array: str, entries: Sequence[tuple[int, ir.Value, SeriesEntry]], whose: str
     ) -> ir.Function:
-        """Return the function that adds order k of entries of ∂(π p)/∂m and ½π, or ∂(π p)/∂c, times factors."""
+        """Return the function that adds ``entries``, at order k, to derivatives of the path.
+
+        Each is a triple: the index of the derivative, a factor, and an entry of ∂(π p)/∂m, π or ∂(π p)/∂c.
+        """
         statements = [
             ir.Assign(_in_lane(ir.entry(TO, i)), ir.Binary("*", factor, self.path.layout.order(e.series, K)), adds=True)
             for i, factor, e in entries
@@ -312,7 +325,7 @@ def _of_order(
     statements: Sequence[ir.Statement],
     places: dict[ir.Name, ir.Value],
 ) -> ir.Function:
-    """Return the function that adds to order k + 1 of an array of derivatives, in one loop over lanes."""
+    """Return the function that adds to order k + 1 of derivatives of the path, in one loop over lanes."""
     pointers = {**places, TO: ir.Entry(ir.Member(E, array), ir.plus(K, 1))}
     body = (
         ir.Declare(ir.Pointer(constant=False, lanes=True), tuple((n.symbol, place) for n, place in pointers.items())),
@@ -322,7 +335,7 @@ def _of_order(
     return typed_function(name, doc, parameters, body if statements else (), _TYPES)
 
 
-#: The types of the parameters of functions in lanes.
+#: Types of the parameters of functions in lanes.
 _TYPES: Mapping[str, ir.ParameterType] = {
     "coef": ir.Vector(None, lanes=True, restricted=True),
     "e": ir.RecordType("expansion", mutable=True),
@@ -336,14 +349,16 @@ def _lanes(statements: Iterable[ir.Statement]) -> ir.Loop:
 
 
 def _over_lanes(statements: Sequence[ir.Statement]) -> Iterator[ir.Loop]:
-    """Yield loops over all lanes of limited length."""
+    """Yield loops over all lanes, each with at most `LONGEST_LOOP` of the statements."""
     for start in range(0, len(statements), LONGEST_LOOP):
         yield _lanes(statements[start : start + LONGEST_LOOP])
 
 
 def _orders(layout: PathLayout, t: ConvolutionTerm) -> tuple[ir.Value, list[ir.Value]]:
-    """Return the parts of one sum over orders (see `ConvolutionTerm`): the term of a_j b_{k-j}, without the factor 1/k
-    of some kinds, and the terms with a coefficient of order 0."""
+    """Return a convolution (see `ConvolutionTerm`) in two parts: the summand of order j, and the terms with order 0.
+
+    The summand contains a_j b_{k−j}; for some kinds, the caller multiplies the sum by 1/k.
+    """
     a, b, real = layout.order(t.a, J), layout.order(t.b, ir.Binary("-", K, J)), ir.Cast(J, "real")
     last = (layout.order(t.a, K), layout.order(t.b, ZERO))
     match t.kind:
@@ -376,6 +391,6 @@ def _expanded(e: Expression) -> Expression:
 
 
 def _exponent(t: ConvolutionTerm) -> ir.Value:
-    """Return the exponent of a power as a quotient."""
+    """Return the exponent of a power as a quotient of two numbers."""
     numerator, denominator = (ir.Constant(float(n)) for n in (t.exponent.numerator, t.exponent.denominator))
     return ir.Binary("/", numerator, denominator)

@@ -1,7 +1,7 @@
-"""Row drivers: functions that call the loops over sites for the row segments of a lattice.
+"""Row drivers: functions that call the loops over sites for each row segment of a lattice.
 
-They are built on the level of memory, for the lowering by rows. A target in which a device distributes row segments
-maps the loop of the kind "segments" to its threads.
+They are on the level of memory, for the lowering by rows. On a device that distributes row segments, the loop of the
+kind "segments" is mapped to threads.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ BEGIN, SECOND, THIRD, STOP, LOW, HIGH = (ir.fixed(name) for name in ("begin", "s
 SEGMENT = ir.Prefix("&", ROW)
 LENGTH, STATE = ir.Member(S, "length"), ir.Member(S, "x")
 
-#: First site of the part of a row segment that a loop runs over, and the site after the last; none for the whole
-#: segment.
+#: Part of a row segment: its first site, and the site after its last; None for the whole segment.
 Sites = tuple[ir.Value, ir.Value] | None
-#: The sites away from open ends and boundary seams, those near them, and all of them in their order.
+#: Parts of a row segment: the sites away from open ends and boundary seams, and the sites near them, before and after.
 AWAY, FIRST_SITES, LAST_SITES = (SECOND, THIRD), (BEGIN, SECOND), (THIRD, STOP)
 
-#: Sites of a vector. Loops that add in vectors begin at multiples of it, and rows have room for whole vectors.
+#: Number of sites of a SIMD vector. Loops that add in vectors begin at multiples of this number, and rows have room for
+#: whole vectors.
 VECTOR = 8
 
 
 def whole_vectors(count: ir.Value) -> ir.Value:
-    """Return the largest multiple of `VECTOR` that a number contains."""
+    """Return the largest multiple of `VECTOR` that is at most ``count``."""
     return ir.Binary("&", count, ir.Prefix("~", ir.Cast(ir.Constant(VECTOR - 1))))
 
 
 @dataclass(frozen=True)
 class RowSegment:
-    """Statements for one row segment: ``calls`` of loops, after a ``setup`` of the record of the segment.
+    """Statements for one row segment: a ``setup`` of its record, and ``calls`` of loops over its sites.
 
-    ``orders`` are declarations that all segments share. The fields with the numbers ``updated`` of some ``arrays`` are
-    changed, so that the copies of the ends of rows beside them are updated.
+    ``orders`` are declarations that all segments share. ``updated`` are the numbers of the fields in ``arrays`` that
+    the calls change; the copies of the ends of their rows in the halo are updated afterwards.
     """
 
     calls: ir.Block
@@ -52,16 +52,17 @@ class RowSegment:
 
     @property
     def near_ends(self) -> bool:
-        """Whether the segment is divided into sites away from open ends and seams, and sites near them."""
+        """Whether the calls distinguish sites near open ends and seams from the other sites."""
         return divides(self.calls)
 
 
 @dataclass(frozen=True)
 class RowDrivers:
-    """Builder of the row drivers of one lattice.
+    """Builder of the row drivers of a lattice.
 
-    ``halo`` is the number of sites in the halo beside a row. With ``may_be_empty`` segments may have no site. With
-    ``one_loop`` the parts of H are distinguished inside one loop over row segments, else each part has its own loop.
+    ``halo`` is the number of sites in the halo on each side of a row. With ``may_be_empty``, segments may have no
+    sites. With ``one_loop``, one loop over row segments has a switch over the parts of H; otherwise each part has its
+    own loop.
     """
 
     layout: RowLayout
@@ -81,11 +82,12 @@ class RowDrivers:
         alone: bool = False,
         vectors: bool = False,
     ) -> ir.Function:
-        """Return a function that treats the row segments from ``first`` on, before ``end``, by one of some cases.
+        """Return a function that processes row segments, by one of several cases.
 
-        The cases have the numbers 1, 2, …, or ``labels``. With ``threads`` the function treats all segments, by
-        several threads if there are more sites than that; if it is for one segment ``alone``, it has no loop. With
-        ``vectors`` the sites near ends are whole vectors.
+        The cases have the numbers 1, 2, …, or ``labels``; each is a `RowSegment` or a block of statements. By default,
+        the function processes the segments ``first`` … ``end`` − 1. With ``threads``, it processes all segments, by
+        several threads for lattices of more than ``threads`` sites. If ``alone``, it processes one segment, without a
+        loop. With ``vectors``, the parts near ends consist of whole SIMD vectors.
         """
         several = not alone and not threads
         range_names = ("first", "end") if several else ("unit",) * alone
@@ -98,13 +100,15 @@ class RowDrivers:
         if threads and body:
             head.append(ir.Declare(ir.Type.SIZE, ((ir.fixed("units").symbol, ir.Called("units", (S,))),)))
         if orders:
-            head.append(ir.Comment("the fields in other orders, in which loops that are for one order serve others"))
+            text = "fields in permuted order: a loop written for one order of the fields also runs on these"
+            head.append(ir.Comment(text))
         said = ", for a row segment" * alone + ", for the row segments first ... end - 1" * several
         function = ir.Function(name, doc + said, Role.OTHER, ("s", *parameters, *range_names), (*head, *orders, *body))
         return discard_unread(function)
 
     def _part_of_flow(self, *, switched: bool) -> Iterator[ir.Statement]:
-        """Yield the statement that finds the part of H; ``flow`` becomes the colour that the flow updates."""
+        """Yield the statement that determines the part of H of a flow; it also sets ``flow`` to the colour that the
+        flow updates."""
         arguments = (S, ir.Prefix("&", FLOW))
         if switched:
             yield ir.Declare(ir.Type.FLAG, ((PART.symbol, ir.Called("part_of_flow", arguments)),))
@@ -112,18 +116,19 @@ class RowDrivers:
             yield ir.Call("part_of_flow", arguments)
 
     def first_of_row(self, arrays: ir.Value, number: int | ir.Value) -> ir.Value:
-        """Return the address of the row of a segment in the array with a number."""
+        """Return the address of the row of the segment in array ``number``."""
         index = ir.Constant(number) if isinstance(number, int) else number
         return self.layout.row(ir.Entry(arrays, index))
 
     def copied_ends(self, arrays: ir.Value, number: int | ir.Value, *, near_ends: bool = False) -> ir.Call:
-        """Return the statement that copies the ends of a row to its halo; with many rows, a segment is a row."""
+        """Return the statement that copies the ends of a row to its halo. In lattices of several rows, a segment is a
+        whole row."""
         begin, stop = (BEGIN, STOP) if near_ends else (FROM, TO)
         swept = (begin, stop) if self.layout.single_row else (ir.Constant(0), LENGTH)
         return ir.Call("ends", (self.first_of_row(arrays, number), LENGTH, *swept))
 
     def divided(self, *, vectors: bool = False) -> Iterator[ir.Statement]:
-        """Yield the declarations that divide a segment into sites near ends or seams, and sites away from them."""
+        """Yield the declarations that divide a segment into sites near open ends or seams, and sites away from them."""
         sites = self.layout.lattice.step.sites
         reaches = [bounds(w.key)[-1] for w in self.layout.lattice.weights]
         below, above = max([0, *(-low for low, _ in reaches)]), max([0, *(high for _, high in reaches)])
@@ -137,7 +142,7 @@ class RowDrivers:
         if not self.layout.single_row:
             low = ir.Select(away, low, LENGTH)
         ends = "seams" if sites.seams else "open ends"
-        yield ir.Comment(f"the sites from second on, before third, are away from all {ends}")
+        yield ir.Comment(f"the sites from second to third - 1 are away from all {ends}")
         yield _indices((BEGIN, FROM), (STOP, TO), (LOW, low), (HIGH, high))
         below_low = ir.Select(ir.Binary("<", STOP, LOW), STOP, LOW)
         yield _indices((SECOND, ir.Select(ir.Binary(">", BEGIN, LOW), BEGIN, below_low)))
@@ -147,7 +152,7 @@ class RowDrivers:
 
 @dataclass(frozen=True)
 class _Driver:
-    """One driver, with the options of `RowDrivers.driver`."""
+    """Builder of one driver, with the options of `RowDrivers.driver`."""
 
     drivers: RowDrivers
     threads: int
@@ -155,9 +160,10 @@ class _Driver:
     vectors: bool
 
     def over_segments(self, cases: Sequence[RowSegment | ir.Block], labels: Sequence[int]) -> ir.Block:
-        """Return the loop over row segments, or a switch over such loops.
+        """Return the loop over row segments, or a switch over several such loops.
 
-        With one loop, the ends of a single open row are copied for all fields: only the segments there read the copies.
+        If one loop serves all parts of H and the lattice is one open row, the ends are copied for all fields, since
+        only the segments at the ends read these copies.
         """
         drivers, segments = self.drivers, [case for case in cases if isinstance(case, RowSegment)]
         copies = [[*self._copied_ends(case)] for case in segments]
@@ -180,7 +186,7 @@ class _Driver:
             yield self.drivers.copied_ends(case.arrays, field, near_ends=case.near_ends)
 
     def _segment(self, case: RowSegment) -> ir.Block:
-        """Return the loop over row segments with the statements of one case; none if there are no calls."""
+        """Return the loop over row segments with the statements of one case; () if the case has no calls."""
         if not case.calls:
             return ()
         piece = ((ROW.symbol, ir.Called("piece_of", (S, UNIT))),)
@@ -197,17 +203,17 @@ class _Driver:
 
 
 def at(sites: Sites) -> ir.Value:
-    """Return the argument that stands for a row segment, or for some sites of it."""
+    """Return the argument for a row segment, or for a part of it."""
     return ir.Called("between", (SEGMENT, *sites)) if sites else SEGMENT
 
 
 def divides(calls: ir.Block) -> bool:
-    """Whether calls are for sites near open ends or seams, or for those away from them."""
+    """Whether calls are for parts of a segment, such as the sites near open ends or seams."""
     return not {SECOND.symbol, STOP.symbol}.isdisjoint(names_in(calls))
 
 
 def in_forms(blocks: dict[str, ir.Block]) -> ir.Block:
-    """Return the calls of each form of functions, selected by the flag ``far``; see `phigen.ir.passes.forms`."""
+    """Return a block that selects between the forms of functions by the flag ``far``; see `phigen.ir.passes.forms`."""
     if len(blocks) == 1:
         return next(iter(blocks.values()))
     return (ir.If(FAR, blocks["_far"], blocks["_near"]),)
@@ -219,7 +225,7 @@ def member(name: str, value: ir.Value) -> ir.Assign:
 
 
 def _is_changed(body: ir.Block) -> bool:
-    """Whether statements change the record of a segment, as calls for some of its sites do."""
+    """Whether statements change the record of a segment; calls for parts of the segment do."""
     assigned = (a.target for s in statements(body) for a in (s.assignments if isinstance(s, ir.Together) else [s])
                 if isinstance(a, ir.Assign))  # fmt: skip
     between = any(isinstance(v, ir.Called) and v.name == "between" for v in values(body))

@@ -1,4 +1,4 @@
-"""Traversal of the loop IR: the statements of a function, the values in them, and their replacement."""
+"""Traversal of the loop IR: iteration over statements and values, and their replacement."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from phigen.symbolic.expression import Expression, symbols_of
 
 
 def statements(body: ir.Block) -> Iterator[ir.Statement]:
-    """Yield all statements, each before those inside it."""
+    """Yield all statements, each before the statements in its blocks."""
     for s in body:
         yield s
         for inner in blocks(s):
@@ -20,7 +20,7 @@ def statements(body: ir.Block) -> Iterator[ir.Statement]:
 
 
 def blocks(s: ir.Statement) -> tuple[ir.Block, ...]:
-    """Return the blocks of statements inside a statement."""
+    """Return the blocks inside a statement, such as the body of a loop."""
     match s:
         case ir.Loop(body=body) | ir.Within(body=body):
             return (body,)
@@ -32,7 +32,7 @@ def blocks(s: ir.Statement) -> tuple[ir.Block, ...]:
 
 
 def map_blocks(function: ir.Function, change: Callable[[ir.Block], Iterable[ir.Statement]]) -> ir.Function:
-    """Return the function with every block replaced, inner blocks first."""
+    """Return the function with ``change`` applied to each block, to inner blocks first."""
 
     def visit(body: ir.Block) -> ir.Block:
         return tuple(change(tuple(_with_body(s, visit) for s in body)))
@@ -57,7 +57,7 @@ def _fields(kind: type) -> tuple[str, ...]:
 
 
 def values(node: Any) -> Iterator[Any]:
-    """Yield a node with all statements and values in it, expressions as a whole."""
+    """Yield a node and all statements and values inside it; expressions are not divided."""
     rest = [node]
     while rest:
         one = rest.pop()
@@ -71,7 +71,7 @@ def values(node: Any) -> Iterator[Any]:
 
 
 def names_in(node: Any) -> set[str]:
-    """Return the names and the symbols of expressions that are read anywhere in a node."""
+    """Return all names and symbols that are read in a node."""
     parts = [*values(node)]
     symbols = symbols_of(*(v for v in parts if isinstance(v, Expression)))
     return {*symbols, *(v.symbol for v in parts if isinstance(v, ir.Name))}

@@ -1,6 +1,7 @@
-"""Runs as functions of JAX, with derivatives, under `jit` and `vmap`. Needs jax.
+"""Runs as functions of JAX with derivatives, for use with `jit` and `vmap`. Needs jax.
 
-`propagator` calls a compiled solver. `flow` takes the bracket of a system, and any function of JAX as H.
+`propagator` calls a compiled solver. `flow` integrates in JAX, with the bracket of a system and any function of JAX as
+H.
 """
 
 from phigen.errors import MissingPackageError

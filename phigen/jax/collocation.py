@@ -1,8 +1,9 @@
 """Gauss collocation in JAX: the step of a bracket with any function as H.
 
-The unknowns, the sweeps and the predictor are those of `phigen.gauss`. JAX differentiates the stages of a step as the
-solution of an equation: tangents solve the linearised equation and cotangents its transpose, by separate sweeps.
-Derivatives are therefore those of the step, exact to round-off; the sweeps of the step are not differentiated.
+The unknowns, the sweeps that solve for them, and the predictor are those of `phigen.gauss`. JAX differentiates the
+stages of a step as the solution of an equation: tangents solve the linearised equation, and cotangents its transpose,
+by sweeps of their own. So derivatives are those of the exact solution of the stage equations, to round-off; the sweeps
+of the step are not differentiated.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ from phigen.symbolic.arrays import Arrays
 from phigen.symbolic.expression import Expression, symbol
 from phigen.symbolic.symbols import Symbol
 
-#: Kind of the symbols of the components of ∇H.
+#: Kind of the symbols that stand for the components of ∇H.
 GRADIENT = "gradient"
 
-#: Largest number of sweeps for a step or for its linearisation, the same as in generated code.
+#: Largest number of sweeps of a step or of a linear equation, the same as in generated code.
 MAX_SWEEPS = 100
 
-#: Thresholds of the sweeps of a step and of linear equations, in double precision.
+#: Thresholds for the sweeps of a step and for those of linear equations, in double precision.
 POLICY, LINEAR_POLICY = GaussPolicy(), GaussAdjointPolicy()
 
 #: State of a run between two steps: x, its compensation term, and the increments of the last step in the frame of x.
@@ -40,33 +41,34 @@ Carry = tuple[Any, Any, Any]
 
 
 class _Traced(Arrays):
-    """Evaluation of expressions on arrays of JAX."""
+    """Visitor that evaluates expressions on arrays of JAX."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         super().__init__(values, jnp)
 
     def power(self, base: Any, exponent: Fraction) -> Any:
-        """Return an array to a rational power, by products and roots where possible."""
+        """Return a power of an array with a rational exponent, by products and roots if possible."""
         if exponent.denominator == 1:
             return base ** int(exponent)
         return jnp.sqrt(base) ** exponent.numerator if exponent.denominator == 2 else super().power(base, exponent)
 
 
 def rounding_of(dtype: Any) -> float:
-    """Return the rounding unit of a floating-point type, in rounding units of double precision."""
+    """Return the rounding unit of a floating-point type, relative to that of double precision."""
     return float(jnp.finfo(dtype).eps) / float(np.finfo(np.float64).eps)
 
 
 def tableau_of(dtype: Any, stages: int) -> Tableau:
-    """Return the coefficients of a method; shorter types than double precision use those of single precision."""
+    """Return the coefficients of a method for a floating-point type: for double precision, or else for single
+    precision."""
     return tableau(stages, DOUBLE if rounding_of(dtype) == 1 else SINGLE)
 
 
 @dataclass(frozen=True, eq=False)
 class Collocation:
-    """Step of size ``h`` by a Gauss method with this number of ``stages``.
+    """Step of size ``h`` by the Gauss method with ``stages`` stages.
 
-    ``points`` are the stage equations of a system whose own H is not used; ``slope`` is ∇H as a function of x and
+    ``points`` are the stage equations of a system, whose own H is not used. ``slope`` is ∇H, a function of x and
     further arguments.
     """
 
@@ -95,7 +97,8 @@ class Collocation:
         return None if kernel is None else (kernel.inputs["k"], kernel.outputs[0].values)
 
     def _values(self, x: Any, z: Any, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the values of symbols: coordinates of the start, unknowns (arrays over stages), parameters."""
+        """Return the values of symbols by name: parameters, coordinates ``x`` at the start, and unknowns ``z``, arrays
+        over stages."""
         return {
             **parameters,
             **dict(zip(self.points.system.coordinates, x, strict=True)),
@@ -103,11 +106,14 @@ class Collocation:
         }
 
     def start(self, x: Any) -> Carry:
-        """Return the state of a run at its start, without prediction."""
+        """Return the state of a run at its start, where there is no increment for a prediction."""
         return x, jnp.zeros_like(x), jnp.zeros((len(self.points.unknowns), self.stages), x.dtype)
 
     def moves(self, table: Tableau, x: Any, moves: Any, arguments: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return h b_j times the derivatives of the unknowns at all stages (unknowns, stages), for these increments."""
+        """Return h b_j f_j for the derivatives f_j of the unknowns at stage j, as an array (unknowns, stages).
+
+        ``moves`` are the current increments L_j, of the same shape, which determine the unknowns at the stages.
+        """
         z = moves @ jnp.asarray(table.mixing, x.dtype).T
         values = self._values(x, z, parameters)
         stacked = _stacked(_Traced(values).values(self._places), self.stages, x.dtype)
@@ -139,7 +145,7 @@ class Collocation:
         return following, rounding_error, jax.lax.stop_gradient(self._from_the_end(end, moves, parameters))
 
     def _scale(self, x: Any) -> Any:
-        """Return the scales of the unknowns (unknowns, 1): |x| for coordinates, 1 for group elements."""
+        """Return the scales of the unknowns (unknowns, 1): |x| for coordinates, and 1 for other unknowns."""
         size = jnp.sqrt(jnp.sum(x**2))
         size = jnp.where(size > 0, size, 1)
         coordinate_count = len(self.points.moved)
@@ -147,7 +153,7 @@ class Collocation:
         return jnp.concatenate([jnp.broadcast_to(size, (coordinate_count,)), ones])[:, None]
 
     def _from_the_end(self, end: Any, moves: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return the increments of a step in the frame of its end."""
+        """Return the increments of a step in the frame of its end; ``end`` has the unknowns there."""
         if self._traced_value is None:
             return moves
         symbols, roots = self._traced_value
@@ -157,25 +163,25 @@ class Collocation:
 
 
 def _stacked(values: Sequence[Any], stages: int | None, dtype: Any) -> Any:
-    """Return values, each an array over the stages or one number for all, as the rows of an array."""
+    """Return the values as rows of an array; each is an array over the stages, or one number for all stages."""
     shape = () if stages is None else (stages,)
     return jnp.stack([jnp.broadcast_to(jnp.asarray(v, dtype), shape) for v in values])
 
 
 def _inverse_mixing(table: Tableau, dtype: Any) -> Any:
-    """Return the transpose of μ⁻¹, which converts predicted unknowns at the stages into increments."""
+    """Return the transpose of μ⁻¹, by which predicted unknowns at the stages are converted to increments."""
     return jnp.asarray(np.linalg.inv(np.array(table.mixing)).T, dtype)
 
 
 def _largest(change: Any, scale: Any) -> Any:
-    """Return the largest norm of a change over the stages, relative to the scales."""
+    """Return the largest norm over the stages of a change, relative to the scales of the unknowns."""
     return jnp.sqrt(jnp.max(jnp.sum((change / scale) ** 2, axis=0)))
 
 
 def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float) -> Any:
-    """Return the zero L of F(L) − L, given as ``equation``, by sweeps L ← F(L); NaN if they do not converge.
+    """Return the solution L of F(L) = L by sweeps L ← F(L); NaN if the sweeps do not converge.
 
-    Sweeps that diverge from ``start`` restart once at 0.
+    ``equation`` is the function F(L) − L. If the sweeps diverge from ``start``, they restart once from 0.
     """
     solved_limit, rounding, near_rounding = (unit * v for v in (POLICY.solved, POLICY.rounding, POLICY.nearly_rounding))
     stages, infinity = start.shape[1], jnp.asarray(jnp.inf, start.dtype)
@@ -209,14 +215,15 @@ def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float)
 
 
 def _solved_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
-    """Return the solution of (F′ − 1) L = side, where F′ − 1 is ``linear``; JAX transposes it by the same sweeps."""
+    """Return the solution L of (F′ − 1) L = side, where ``linear`` is F′ − 1. JAX transposes it to sweeps of the same
+    kind."""
     return jax.lax.custom_linear_solve(
         linear, side, lambda f, b: _swept_linear(f, b, unit), lambda f, b: _swept_linear(f, b, unit)
     )
 
 
 def _swept_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
-    """Return the solution of (F′ − 1) L = side by sweeps L ← F′L − side."""
+    """Return the solution L of (F′ − 1) L = side by sweeps L ← F′L − side, where ``linear`` is F′ − 1."""
     solved_limit, rounding = unit * LINEAR_POLICY.adjoint_solved, unit * LINEAR_POLICY.adjoint_rounding
     floor = jnp.finfo(side.dtype).tiny
 

@@ -1,4 +1,4 @@
-"""Flows of a bracket with any function of JAX as H, by steps that are Poisson maps."""
+"""Runs of ẋ = π∇H in JAX, with the bracket of a system and any function of JAX as H; steps are Poisson maps."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from phigen.symbolic.verdict import REFUTED
 if TYPE_CHECKING:
     from phigen.lattice.lattice_system import LatticeSystem
 
-#: Hint where no exact Poisson map is known.
+#: Hint for brackets without a known exact Poisson map.
 TRUNCATION_HINT = 'structure="to truncation" takes every bracket; its steps are no Poisson maps'
 
 
@@ -41,18 +41,22 @@ def flow(
     stride: int | None = None,
     structure: str = "exact",
 ) -> Callable[..., Any]:
-    """Return the run of ẋ = π∇H as ``f(x0, *arguments, **parameters)``, with π of a system and H a function of JAX.
+    """Return the run of ẋ = π∇H as a function ``f(x0, *arguments, **parameters)``.
 
-    ``hamiltonian(x, *arguments)`` returns a number; x is (DIM,), and arguments are arrays or trees of arrays, such as
-    the weights of a network. H and the runs of the system are not used. ``parameters`` are those in π, by name; missing
-    ones have their defaults. f returns the last state, of the shape (…, DIM) of x0, or with a ``stride`` all rows of
-    `Solver.integrate`, (…, rows, DIM). Steps are those of ``scheme: gauss`` of this order: Poisson maps, for any H and
-    step size, if the bracket is constant or that of a Lie algebra that phigen knows. ``structure="to truncation"``
-    accepts every bracket, but the step is then not a Poisson map. All of f is in JAX, in the precision of x0: it runs
-    under `jit` and `vmap`, on every device of XLA, and has derivatives in both modes, which solve the linearised
-    equations of a step. A step that fails because h is too large gives NaN from there on. H should be smooth, as the
-    order depends on its derivatives. Raises `SpecError` for brackets without exact steps, and `CheckError` if π is not
-    a Poisson tensor.
+    π is that of ``system``, whose H and runs are not used. H is ``hamiltonian(x, *arguments)``, a function of JAX that
+    returns a number. x has the shape (DIM,), and ``arguments`` are arrays or trees of arrays, such as the weights of a
+    network. ``parameters`` are parameters of π by name; missing ones have their defaults.
+
+    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, it returns all rows of
+    `Solver.integrate`, (…, rows, DIM). f is written in JAX and has the precision of x0. It can be used with `jit` and
+    `vmap`, on every device of XLA, and has derivatives in both modes, from the linearised equations of a step.
+
+    Steps are those of ``scheme: gauss`` of this order: Poisson maps, for any H and step size, if the bracket is
+    constant or that of a Lie algebra that phigen knows. ``structure="to truncation"`` accepts every bracket, but its
+    steps are no Poisson maps. If a step fails because h is too large, the result is NaN from there on. H should be
+    smooth, since the order depends on its derivatives.
+
+    Raises `SpecError` for brackets without exact steps, and `CheckError` if π is not a Poisson tensor.
     """
     arguments.step_size(h)
     arguments.count(steps, "steps", 0)
@@ -103,7 +107,7 @@ def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None
         if unknown:
             raise TypeError(f"unknown parameter {min(unknown)!r}; those of {bracket.name} are {', '.join(defaults)}")
         values = {name: jnp.asarray(v, x.dtype) for name, v in (defaults | parameters).items()}
-        # Trees with other leaves, such as functions, are not arguments of `jit`.
+        # Trees with leaves other than arrays, such as functions, cannot be arguments of `jit`.
         of_arrays = all(
             isinstance(leaf, jax.Array | np.ndarray | np.number | float) for leaf in jax.tree.leaves(arguments)
         )
@@ -113,7 +117,7 @@ def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None
 
 
 def _real_state(x0: Any, bracket: System) -> Any:
-    """Return x0 as a real array in its own precision, or in the default precision of JAX if x0 has none."""
+    """Return x0 as a real array in its own precision, or in the default precision of JAX for Python numbers."""
     x = jnp.asarray(x0)
     if jnp.iscomplexobj(x):
         raise TypeError("x0 must be real")
@@ -123,7 +127,7 @@ def _real_state(x0: Any, bracket: System) -> Any:
 
 
 def _system_of(source: str | PathLike[str] | Spec | System | LatticeSystem) -> System:
-    """Return the system of a source. Raises `SpecError` if its motion is not defined by π and H alone."""
+    """Return the system of a source. Raises `SpecError` if its motion is not determined by π and H(x) alone."""
     system = load(source) if isinstance(source, str | PathLike) else source
     system = system_from_spec(system) if isinstance(system, Spec) else system
     if not isinstance(system, System):
@@ -138,11 +142,12 @@ def _system_of(source: str | PathLike[str] | Spec | System | LatticeSystem) -> S
 
 
 def _refused(system: System) -> Iterator[tuple[str, str, str]]:
+    """Yield key, message and hint for each part of a system that `flow` does not offer."""
     if system.time:
         message = "the system depends on the time, but H is a function of x without the time"
-        yield "time", message, "remove time, or phigen.jax.propagator"
+        yield "time", message, "remove time, or use phigen.jax.propagator"
     if system.forces:
-        yield "forces", "forces are not offered", "remove forces, or phigen.jax.propagator"
+        yield "forces", "forces are not offered", "remove forces, or use phigen.jax.propagator"
     if system.noise:
         yield "noise", "noise is not offered", "remove noise"
 
@@ -158,7 +163,7 @@ def _realised(system: System, structure: str) -> Realisation:
 
 
 def _expect_proved(system: System, realisation: Realisation, stages: int) -> None:
-    """Raise `CheckError` if π is not a Poisson tensor, or if a proof about the step fails."""
+    """Raise `CheckError` if π is not a Poisson tensor, or if a statement about the step is refuted."""
     statements_of_spec = [s for group in statements.tensor(system).values() for s in group]
     if not any(s.verdict == REFUTED for s in statements_of_spec):
         statements_of_spec += gauss_statements.check(system, system, realisation, tableau(stages))

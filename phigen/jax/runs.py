@@ -1,7 +1,7 @@
-"""Runs of solvers as functions of JAX: with derivatives, under `jit` and `vmap`.
+"""Runs of solvers as functions of JAX with derivatives, for use with `jit` and `vmap`.
 
-The solver runs on the CPU, in double precision, as a callback. Derivatives are those of `Solver.pullback`; second
-derivatives are not offered.
+The solver runs on the CPU in double precision, in a callback. Derivatives are computed by `Solver.pullback`; there are
+no second derivatives.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.propagation import Propagation
 from phigen.runtime.solver import Solver
 
-#: Message of the refusal of forward mode.
+#: Message if forward mode is used for a lattice.
 NO_FORWARD_MODE = (
     "lattices have no derivatives in forward mode (jax.jvp, jax.jacfwd, forward=True); "
     "use jax.grad, jax.vjp or jax.jacrev"
 )
 
-# Identity that is refused where it is compiled or evaluated.
+# Identity whose compilation or evaluation raises the error about forward mode.
 _refused_forward = Primitive("lattices_have_no_forward_mode")
 _refused_forward.def_abstract_eval(lambda value: value)
 
@@ -50,17 +50,19 @@ def propagator(
     forward: bool = False,
     **shared: Any,
 ) -> Callable[..., Any]:
-    """Return the run of a solver as ``f(x0, parameters={})``, which returns the last state, shaped (…, DIM) like
-    ``x0``.
+    """Return the run of a solver as a function ``f(x0, parameters={})`` of arrays.
 
-    With a ``stride``, f returns all rows of `Solver.integrate`, (…, rows, DIM). ``parameters`` are arrays by name, of
-    shapes that broadcast to (…); missing ones have their defaults. Results have the precision of x0, which is single
-    unless ``jax_enable_x64`` is set. Under `vmap` members are those of one ensemble. A failed step raises its exception
-    where the result is used. Derivatives are exact to round-off and need a solver compiled with ``adjoint=True``.
-    `jax.grad` and `jax.vjp` need one reverse pass. `jax.jvp` and `jax.jacfwd`, and all derivatives with ``forward``,
-    use the Jacobian, which needs one reverse pass for each number of the result. For lattices, which have no tangent
-    map here, DIM is (coordinates, *sizes), parameters at sites have site axes, and further arguments, such as
-    ``bonds=``, apply to all runs.
+    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, it returns all rows of
+    `Solver.integrate`, (…, rows, DIM). ``parameters`` are arrays by name, whose shapes broadcast to (…); missing ones
+    have their defaults. Results have the precision of x0, which is single unless ``jax_enable_x64`` is set. `vmap` runs
+    its members as an ensemble. A failed step raises its exception where the result is used.
+
+    Derivatives are exact to round-off, and need a solver compiled with ``adjoint=True``. `jax.grad` and `jax.vjp` take
+    one reverse pass. `jax.jvp` and `jax.jacfwd`, and all derivatives with ``forward``, use the Jacobian, which takes
+    one reverse pass for each number of the result.
+
+    For lattices, DIM stands for (coordinates, *sizes), parameters at sites have the axes of the sites, and further
+    arguments, such as ``bonds=``, apply to all runs. Lattices have no derivatives in forward mode.
     """
     runs = Propagation(solver, h, steps, stride, t0, shared)
     if forward and runs.axes > 1:
@@ -86,7 +88,7 @@ def propagator(
         batch, (x0, parameters), (state_directions, changes) = _Axes(runs, *arguments), arguments, directions
         states = runs.shape(x0.shape)
         if runs.axes > 1:
-            # Also traced for reverse mode, which never evaluates it.
+            # JAX also traces this branch in reverse mode, but does not evaluate it.
             return _refused_forward.bind(jax.lax.full(states, 0, x0.dtype))
 
         def jacobian(x: Any, p: Any) -> Any:
@@ -133,7 +135,7 @@ def propagator(
 
 
 def _real(value: Any, argument: str) -> Any:
-    """Return a real array in its own precision, or in the default precision of JAX if the argument has none."""
+    """Return a real array in its own precision, or in the default precision of JAX for Python numbers."""
     array = jnp.asarray(value)
     if jnp.iscomplexobj(array):
         raise TypeError(f"{argument} must be real")
@@ -143,11 +145,12 @@ def _real(value: Any, argument: str) -> Any:
 def _linear(
     apply: Callable[[Any], Any], transpose: Callable[[Any], Any], arguments: Any, shape: tuple[int, ...]
 ) -> Any:
-    """Return the value of a linear map with known transpose; ``shape`` is that of the result.
+    """Return ``apply(arguments)`` for a linear map with a known transpose; ``shape`` is the shape of the result.
 
-    JAX accepts a transpose only for linear solves, so the map is the trivial solve (u, y) = (v, A v).
+    JAX only accepts transposes of linear solves, so the map A is written as the trivial solve (u, y) = (v, A v).
     """
-    zero = sum(0 * jnp.sum(leaf) for leaf in jax.tree.leaves(arguments))  # linear in v, as JAX requires of solutions
+    # zero, but a linear function of v, as JAX requires of solutions
+    zero = sum(0 * jnp.sum(leaf) for leaf in jax.tree.leaves(arguments))
     arguments, nothing = jax.tree.map(lambda leaf: leaf + zero, arguments), jnp.broadcast_to(zero, shape)
 
     def solve(_: Any, right: Any) -> Any:
@@ -161,7 +164,7 @@ def _linear(
 
 @jax.custom_jvp  # type: ignore[untyped-decorator]
 def _derived_once(arguments: Any) -> Any:
-    """Identity whose differentiation means that a derivative is differentiated; this is refused."""
+    """Identity function that raises an error if it is differentiated, that is, for second derivatives."""
     return arguments
 
 
@@ -171,7 +174,7 @@ def _derived_twice(*_: Any) -> Any:
 
 
 class _Axes:
-    """Numbers of axes of the arguments of a function, which determine the axes that `vmap` adds in front."""
+    """Numbers of axes of the arguments of a function, by which the axes that `vmap` adds in front are recognised."""
 
     def __init__(self, runs: Propagation, x0: Any, parameters: Mapping[str, Any]) -> None:
         self._leading = x0.ndim - runs.axes
@@ -179,7 +182,7 @@ class _Axes:
         self._sites = {name: runs.axes_of(name) for name in parameters}
 
     def aligned(self, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the parameters with axes of length 1 inserted where states have additional axes."""
+        """Return the parameters, with axes of length 1 inserted where states have additional axes."""
         aligned = {}
         for name, value in parameters.items():
             array, axes = np.asarray(value), self._axes[name]

@@ -1,1 +1,1 @@
-"""The lowering to lanes: the parts of a program that are evaluated at several points at once."""
+"""Lowering to SIMD lanes: the parts of a program that are evaluated at several points together."""

@@ -1,9 +1,9 @@
-"""The parts of a program that are computed in lanes: blocks of implicit steps, or SIMD batches of members.
+"""The parts of a program that are computed in SIMD lanes.
 
-A lane is one of `LANES` points at which kernels are evaluated together. An integration with implicit steps solves a
-block of `LANES` steps together, an ensemble solves a group of members. Members with explicit steps form batches
-(packs) of `LANES` members. This stage decides whether lanes are possible and fit on the stack, and which kernels
-they need; targets print them.
+A lane is one of `LANES` points at which kernels are evaluated together. For implicit steps, an integration solves a
+block of `LANES` steps together, and an ensemble solves a group of members. Members with explicit steps form batches
+(packs) of `LANES` members. This stage decides whether lanes are possible and fit on the stack, and which kernels they
+need; targets print these kernels.
 """
 
 from __future__ import annotations
@@ -31,21 +31,24 @@ from phigen.scheme.steps import Explicit, Factorisation, Gauss, Newton, Path, Pa
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import SPECIAL
 
-#: Points at which a kernel for lanes is evaluated at once: the doubles in one vector of AVX-512.
+#: Number of points at which a kernel in lanes is evaluated: the doubles in one vector of AVX-512.
 LANES = 8
 
-#: Largest working arrays of a block, or of a group of members: macOS gives threads stacks of 512 KiB.
+#: Largest size of the working arrays of a block or a group of members, half of the 512 KiB that macOS gives threads as
+#: stack.
 MAX_STACK_BYTES = 256 * 1024
 
-#: Largest number of packs in a group; the runtime has the same number.
+#: Largest number of packs in a group, the same as in the runtime.
 PACKS_PER_GROUP = 4
 
-#: Arrays over stages and unknowns that a batch of members of a Gauss step needs: increments of three steps, unknowns.
+#: Number of arrays over stages and unknowns for a batch of members of a Gauss step: the unknowns, and increments of
+#: three steps.
 MEMBER_BATCHES = 4
 
-#: Most stages of members in batches; most where sweeps of one trajectory iterate momenta only, those of a batch all
-#: unknowns, and functions are called. With eight stages batches of the Kowalevski top took 1.13 times as long as their
-#: members one by one, with six 0.85 times; those of two pendulums 1.15 times with four stages, 0.6 times with two.
+#: Largest number of stages for which members are integrated in batches. The second limit applies if kernels call
+#: functions and sweeps of a single trajectory iterate the momenta only, since sweeps of a batch iterate all unknowns.
+#: Time in batches relative to single members: Kowalevski top 1.13 with eight stages, 0.85 with six; two pendulums 1.15
+#: with four stages, 0.6 with two.
 MAX_BATCHED_STAGES, MAX_BATCHED_STAGES_WITH_FUNCTIONS = 6, 3
 
 _DOUBLE = 8
@@ -53,7 +56,7 @@ _DOUBLE = 8
 
 @dataclass(frozen=True)
 class LaneKernel:
-    """A kernel in lanes: inputs that are ``shared`` have one value for all lanes.
+    """Kernel in lanes; inputs that are ``shared`` have one value for all lanes.
 
     A ``single`` kernel is evaluated at one lane, and its outputs are numbers. A ``sparse`` kernel does not store
     entries that are always zero.
@@ -67,12 +70,12 @@ class LaneKernel:
 
 @dataclass(frozen=True)
 class Blocks:
-    """Implicit steps whose kernels are evaluated in SIMD lanes.
+    """Implicit steps that are solved together, in blocks of steps or groups of members.
 
-    ``calls`` are the functions that the kernels call; the loops are ``vectorised`` if no library function is among
-    them. ``factors`` are the factors of the Newton matrix, stored in place of its inverse where the matrix is sparse.
-    ``path`` has the derivatives of paths, with at most ``slope_terms`` terms. ``room`` is the number of values in
-    each lane that a group of members needs, without the values of its predictors.
+    ``calls`` are the functions that the kernels call. The loops are ``vectorised`` if none of these is a library
+    function. ``factors`` are the factors of a sparse Newton matrix, which replace its inverse. ``path`` has the
+    derivatives of paths, with at most ``slope_terms`` terms. ``room`` is the number of values in each lane that a group
+    of members needs, without the values of predictors.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -84,18 +87,18 @@ class Blocks:
     slope_terms: int = 0
 
     def grouped(self, stored: int) -> bool:
-        """Whether members are integrated in groups; the predictor of a member has this number of ``stored`` values."""
+        """Whether members are integrated in groups, by the number ``stored`` of values in the predictor of a member."""
         return _DOUBLE * LANES * (self.room + stored) <= MAX_STACK_BYTES
 
 
 @dataclass(frozen=True)
 class Packs:
-    """Members with explicit steps, one in each lane.
+    """Members of an ensemble with explicit steps, one in each lane.
 
-    ``kernels`` belong to a step, or to the flows of a splitting. ``small_argument`` are the functions with a
-    small-argument form, a polynomial; beyond its range the full-range form is called. ``transposes`` are the transposed
-    kernels, if cotangents are pulled back in lanes too; the reverse pass takes ``reverse_packs`` batches of members
-    together. If states are ``recomputed``, the transposes compute the state before a flow by the inverse flow.
+    ``kernels`` are those of a step, or of the flows of a splitting. ``small_argument`` are the functions with a form
+    for small arguments, a polynomial, beyond whose range the full-range form is called. ``transposes`` are the
+    transposed kernels if cotangents are pulled back in lanes too; then the reverse pass takes ``reverse_packs`` batches
+    of members together. If states are ``recomputed``, a transpose computes the state before a flow by the inverse flow.
     """
 
     kernels: tuple[Kernel, ...]
@@ -108,10 +111,10 @@ class Packs:
 
 @dataclass(frozen=True)
 class Rows:
-    """Sites of a lattice, side by side in rows; ``small_argument`` as in `Packs`.
+    """Sites of a lattice, which are consecutive in rows; ``small_argument`` is as in `Packs`.
 
-    ``limited`` are functions of flows and stages that have no value where arguments are very large: functions with a
-    small-argument form, and functions with a vector version.
+    ``limited`` are functions in flows and stages that have no value at very large arguments: those with a form for
+    small arguments, and those with a vector version.
     """
 
     calls: frozenset[str]
@@ -119,15 +122,15 @@ class Rows:
     limited: frozenset[str]
 
     def calls_limited(self, kernel: Kernel) -> bool:
-        """Whether a kernel calls a limited function."""
+        """Whether a kernel calls one of the functions in ``limited``."""
         return not operations([kernel]).isdisjoint(self.limited)
 
 
 @dataclass(frozen=True)
 class Traces:
-    """Paths in lanes in the reverse pass of an integration that makes one step at a time; see `Blocks`.
+    """Paths in lanes for the reverse pass of an integration step by step; the other fields are as in `Blocks`.
 
-    If all lanes would need too much of the stack, there are half as many (``narrow``).
+    ``narrow`` says that half the number of lanes is used, since all lanes would need too much stack.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -139,9 +142,10 @@ class Traces:
 
 @dataclass(frozen=True)
 class Stages:
-    """The stages of a Gauss method, one in each lane; ``narrow`` if half of the lanes suffice.
+    """The stages of a Gauss method, one in each lane; ``narrow`` says that half the number of lanes suffices.
 
-    ``batched`` are the kernels for members of an ensemble, one in each lane, if they are integrated in batches.
+    ``batched`` are the kernels for batches of members of an ensemble, one member in each lane; () if members are
+    integrated one by one.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -151,7 +155,7 @@ class Stages:
 
     @property
     def lanes(self) -> int:
-        """The number of values that are computed side by side."""
+        """The number of lanes."""
         return LANES // 2 if self.narrow else LANES
 
 
@@ -161,29 +165,29 @@ Lanes = Blocks | Packs | Rows | Stages | Traces
 def in_lanes(program: Program) -> Lanes | None:
     """Return the parts of a program that are computed in lanes.
 
-    None where the spec excludes lanes, the program has no such parts, or they would need too much of the stack.
+    Returns None if the spec excludes lanes, if the program has no such parts, or if they would need too much stack.
     """
     lowering = LOWERINGS.get(program.step.kind.name)
     return lowering(program, program.step) if lowering else None
 
 
 def _is_lowered(program: Program) -> bool:
-    """Whether steps may be computed in lanes.
+    """Whether several steps or members may be computed together in lanes.
 
-    With noise every step has different coefficients, so predictors from earlier steps fail. Where H depends on the
-    time, members in packs would share coefficients that differ from step to step.
+    With noise, the coefficients differ from step to step, so that predictors from earlier steps fail. If H depends on
+    the time, members in packs would share coefficients although these differ.
     """
     dated = program.time and (program.monitor or not program.step.kind.implicit)
     return program.lanes and program.offers("lanes") and not program.noise and not dated
 
 
 def _of_newton(program: Program, step: Newton) -> Blocks | None:
-    # the predictor of blocks needs recurrences
+    # Predictors of blocks are recurrences.
     return _newton(program, step) if _is_lowered(program) and program.offers("recurrences") else None
 
 
 def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
-    """Return blocks of steps or, if there are none, paths in the reverse pass; the latter in double precision only."""
+    """Return blocks of steps; or if there are none, paths in the reverse pass, which need double precision."""
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
         blocks = _paths(program, step, step.lanes)
@@ -205,7 +209,7 @@ def _of_splitting(program: Program, step: Splitting) -> Packs | None:
     packs = _packs(program, step.flows)
     if packs is None:
         return None
-    segment_bytes = 2 * _DOUBLE * LANES**2 * program.dimension  # of the stored states of one pack
+    segment_bytes = 2 * _DOUBLE * LANES**2 * program.dimension  # the stored states of one pack
     if inverse_transposes := recomputing_transposes(program, step):
         packs = _with_transposes(program, replace(packs, recomputed=True), inverse_transposes, 0)
     else:
@@ -219,10 +223,10 @@ def _of_gauss(program: Program, step: Gauss) -> Stages | None:
 
 
 def _rows(program: Program, step: Sweeps) -> Rows:
-    """Return the lanes of a lattice: sites are in rows in any case.
+    """Return the lanes of a lattice.
 
-    Most vector versions, and the small-argument forms, are for speed. Observables are evaluated rarely and call libm,
-    whose functions take any argument.
+    Most vector versions and small-argument forms are used in the profile fast only. Observables are evaluated rarely
+    and call libm, whose functions accept any argument.
     """
     swept = [sweep.kernel for part in step.parts for sweep in part]
     swept += step.equation.kernels if step.equation else ()
@@ -231,18 +235,18 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     reverse_coefficients = (step.adjoint.prepare, step.adjoint.refresh) if step.adjoint else ()
     of_coefficients = {
         id(kernel) for kernel in (step.prepare, step.refresh, *reverse_coefficients)
-    }  # their loops run over coefficients, not sites
+    }  # The loops of these kernels run over coefficients, not over sites.
     looped = [
         kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
     ]
     if program.profile != "fast":
-        if not (program.extras.tangent or step.adjoint):  # there, derivatives are replaced by differences of sweeps
+        if not (program.extras.tangent or step.adjoint):  # the code uses differences of sweeps in place of derivatives
             varied_names = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
             looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in varied_names]
         return Rows(with_formulas(operations(looped) & set(FULL_RANGE_FUNCTIONS)), (), frozenset())
     called_with_forms = _called_in_forms(step)
     called = operations(swept) & called_with_forms
-    # transposes call the derivatives of these functions, at the same small arguments
+    # Transposes call the derivatives of these functions at the same small arguments.
     called |= {f for f in SMALL_ARGUMENT_FUNCTIONS if f in called_with_forms and f.removesuffix("1") in called}
     small_argument = tuple(f for f in (*SMALL_ARGUMENT_FUNCTIONS, *SPECIAL) if f in called) if program.lanes else ()
     limited = frozenset({*small_argument, *LANE_FUNCTIONS, *LANE_FORMULAS} & called)
@@ -250,9 +254,9 @@ def _rows(program: Program, step: Sweeps) -> Rows:
 
 
 def _called_in_forms(step: Sweeps) -> set[str]:
-    """Return the functions called by kernels whose loops have a small-argument and a full-range form.
+    """Return the functions that are called by kernels with loops in two forms: for small arguments, and full-range.
 
-    Derivatives of a stage along variations, and the transposes of sums over bonds or pairs, have one form.
+    Derivatives of a stage along variations, and transposes of sums over bonds or pairs, have one form only.
     """
     kernels = [sweep.kernel for part in step.parts for sweep in part]
     kernels += [step.equation.relax, step.equation.advance] if step.equation else []
@@ -261,9 +265,9 @@ def _called_in_forms(step: Sweeps) -> set[str]:
 
 
 def _stages(program: Program, step: Gauss) -> Stages:
-    """Return the kernels in lanes of the vector field of a Gauss method at all stages, with their transposes.
+    """Return the kernels of the vector field of a Gauss method at all stages, in lanes, with their transposes.
 
-    Values at the start of the step are shared by all lanes.
+    All lanes share the values at the start of the step.
     """
     kernels = [LaneKernel(step.slope, ("coef", "x"))]
     kernels += [LaneKernel(step.frame, ("coef", "x", "z"))] if step.frame else []
@@ -276,7 +280,10 @@ def _stages(program: Program, step: Gauss) -> Stages:
 
 
 def _batched_stages(program: Program, step: Gauss) -> tuple[LaneKernel, ...]:
-    """Return the kernels of a Gauss step for members in lanes; none if single members are faster, or stack is short."""
+    """Return the kernels of a Gauss step for members in lanes.
+
+    Returns () if single members are faster, or if the arrays would need too much stack.
+    """
     arrays = MEMBER_BATCHES * step.tableau.stages * step.unknowns + 6 * program.dimension
     if _DOUBLE * LANES * arrays > MAX_STACK_BYTES:
         return ()
@@ -346,12 +353,12 @@ def _traces(program: Program, step: Path) -> Traces | None:
 
 
 def _elapsed(program: Program) -> list[LaneKernel]:
-    """Return the kernel of the time that the steps of a block take, if the solver is monitored."""
+    """Return the kernel for the physical time of the steps of a block, if there is a monitor; else []."""
     return [LaneKernel(program.monitor.elapsed)] if program.monitor and program.monitor.elapsed else []
 
 
 def _turns(program: Program) -> list[LaneKernel]:
-    """Return the kernels of the group elements whose products are attitudes."""
+    """Return the kernels of the group elements whose product is the attitude."""
     attitude = program.attitude
     if attitude is None or attitude.turn is None:
         return []
@@ -360,21 +367,21 @@ def _turns(program: Program) -> list[LaneKernel]:
 
 
 def _packs(program: Program, kernels: Sequence[Kernel]) -> Packs | None:
-    """Return packs, if all members have the same coefficients and every function has a vector version."""
+    """Return packs of members; None if members have different coefficients or a function has no vector version."""
     ops = operations(kernels)
     states = 2 * PACKS_PER_GROUP * LANES * 3 * program.dimension
     if program.step.corrected:
-        return None  # members of a pack begin and end their runs at different steps
+        return None  # the members of a pack begin and end their runs at different steps
     if program.held or library_calls(ops) or library_powers(kernels) or _DOUBLE * states > MAX_STACK_BYTES:
         return None
     return Packs(tuple(kernels), with_formulas(ops), ())
 
 
 def _with_transposes(program: Program, packs: Packs, transposes: Sequence[Kernel], stored: int) -> Packs:
-    """Return packs with the transposes, if these can be computed in lanes too.
+    """Return the packs with transposes, if these can be computed in lanes too; else the packs unchanged.
 
-    Their number is the largest whose stored states fit on the stack: ``stored`` bytes for one pack, growing with the
-    square of the number of packs.
+    ``stored`` is the number of bytes of stored states for one pack; it grows with the square of the number of packs.
+    ``reverse_packs`` becomes the largest number for which they fit on the stack.
     """
     transposes = transposes if program.offers("members") else ()
     ops = operations(transposes)
@@ -387,33 +394,34 @@ def _with_transposes(program: Program, packs: Packs, transposes: Sequence[Kernel
 
 
 def _block(program: Program, more: int = 0, once: int = 0) -> int:
-    """Return the bytes of a block on the stack, with ``more`` values in each lane for each stage, and some ``once``."""
+    """Return the bytes of a block on the stack: ``more`` additional values for each stage, and ``once`` for all, in
+    each lane."""
     n = program.dimension
     each = program.step.coefficients + 4 * n + 3 * n * n + more
     return _DOUBLE * LANES * (len(program.fractions) * each + once)
 
 
 def _group(program: Program) -> int:
-    """Return the number of values in each lane that a group of members needs."""
+    """Return the number of values in each lane for a group of members."""
     n = program.dimension
     return len(program.fractions) * program.step.coefficients + 7 * n + 3 * n * n
 
 
 def _without(kernel: Kernel, *names: str) -> Kernel:
-    """Return the kernel without these inputs and outputs."""
+    """Return the kernel without the inputs and outputs of these names."""
     inputs = {name: symbols for name, symbols in kernel.inputs.items() if name not in names}
     return replace(kernel, inputs=inputs, outputs=tuple(o for o in kernel.outputs if o.name not in names))
 
 
 def _without_matrices(kernel: Kernel) -> Kernel:
-    """Return the kernel of a Newton iteration that uses the matrices of the last one."""
+    """Return the kernel of a Newton iteration that reuses the matrices of an earlier iteration."""
     outputs = tuple(o for o in kernel.outputs if "jacobian" not in o.name)
     needed = set(topological([v for o in outputs for v in o.values]))
     named = tuple((name, value) for name, value in kernel.named if value in needed)
     return replace(kernel, name="evaluate", outputs=outputs, named=named)
 
 
-#: The lowerings of kinds of steps; those of other kinds are not computed in lanes.
+#: For each kind of step, the function that finds its parts in lanes; other kinds have none.
 LOWERINGS: Mapping[str, Callable[[Program, Any], Lanes | None]] = {
     "newton": _of_newton,
     "explicit": _of_explicit,

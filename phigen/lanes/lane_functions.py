@@ -1,4 +1,4 @@
-"""Functions of SIMD lanes: those that a loop over lanes can call and still be compiled to vector instructions."""
+"""Functions that a loop over SIMD lanes can call and still be compiled to vector instructions."""
 
 from __future__ import annotations
 
@@ -10,44 +10,45 @@ from phigen.scheme.lowering import expand_powers
 from phigen.symbolic.expression import Expression, topological
 from phigen.symbolic.functions import FUNCTIONS
 
-#: Functions that have a vector version, and functions that are formulas of functions with a vector version.
+#: Functions with a vector version, and functions that are formulas of these, with the formula.
 LANE_FUNCTIONS = tuple(f.name for f in FUNCTIONS.values() if f.lanes == f.name)
 LANE_FORMULAS = {f.name: f.lanes for f in FUNCTIONS.values() if f.lanes not in ("", f.name)}
 
-#: Functions with a small-argument form, a polynomial, as flows need: phigen's own, then those of libraries.
+#: Functions with a small-argument form, a polynomial, for flows: those that phigen defines, then those of libraries.
 SMALL_ARGUMENT_FUNCTIONS = tuple(
     f.name for f in sorted(FUNCTIONS.values(), key=lambda f: (f.written and f.name) or "") if f.near
 )
 
-#: Functions whose vector versions are full-range. exp is not, beyond 700, nor is log at 0.
+#: Functions with a vector version for all arguments. The version of exp has none beyond 700, and that of log none at 0.
 FULL_RANGE_FUNCTIONS = (*SMALL_ARGUMENT_FUNCTIONS, "cos")
 
-#: Exponents that remain after lowering and call no function.
+#: Exponents of powers that remain after lowering and need no function.
 _ARITHMETIC = (Fraction(2), Fraction(-1), Fraction(1, 2))
 
 
 def operations(kernels: Iterable[Kernel]) -> set[str]:
-    """Return the operations of kernels: arithmetic and functions."""
+    """Return the operations in kernels: names of arithmetic operations and functions."""
     return {e.op for e in topological(roots_of(kernels))}
 
 
 def roots_of(kernels: Iterable[Kernel]) -> list[Expression]:
-    """Return the expressions of all outputs."""
+    """Return the expressions of all outputs of kernels."""
     return [e for kernel in kernels for e in kernel.roots]
 
 
 def with_formulas(ops: Set[str]) -> frozenset[str]:
-    """Return the operations, with the vector functions that formulas for them call."""
+    """Return the operations, and the vector functions that their formulas call."""
     called = (f for f in LANE_FUNCTIONS for op in ops & set(LANE_FORMULAS) if f"{{{f}}}" in LANE_FORMULAS[op])
     return frozenset({*ops, *called})
 
 
 def library_calls(ops: Set[str]) -> set[str]:
-    """Return the operations that need a function of the library, called for one lane after the other."""
+    """Return the operations that are functions of the library without a vector version, which are called lane by
+    lane."""
     known = {*LANE_FUNCTIONS, *LANE_FORMULAS}
     return {f.name for f in FUNCTIONS.values() if f.name in ops and f.written and not f.inline} - known
 
 
 def library_powers(kernels: Iterable[Kernel]) -> bool:
-    """Whether some power needs the function of the library."""
+    """Return whether a power needs a function of the library."""
     return any(e.op == "pow" and e.value not in _ARITHMETIC for e in topological(expand_powers(roots_of(kernels))))

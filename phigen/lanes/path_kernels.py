@@ -1,4 +1,4 @@
-"""Paths in lanes: the kernels at one point, and the stack that expansions need."""
+"""Kernels for paths in lanes, as functions at one point, and the stack that expansions need."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ from phigen.scheme.steps import Path, PathAdjoint, PathLanes
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
 
-#: Largest number of terms in the expansion of a path about its middle; the runtime has the same number.
+#: Largest number of Taylor terms of a path about its middle, the same as in the runtime.
 MAX_TERMS = 16
 
-#: Numbers of terms to try in the expansion of the derivatives; the first that fits on the stack is used.
+#: Numbers of Taylor terms of derivatives to try, without and with a reverse pass; the first that fits on the stack is
+#: used.
 SLOPE_TERMS = (12, 8)
 SLOPE_TERMS_BACK = (MAX_TERMS, 12, 8)
 
 
 def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> tuple[int, int]:
-    """Return the values in each lane on the stack: of a model, beyond those of any step, and of an expansion."""
+    """Return the number of values on the stack in each lane: of a linear model, beyond those of any step, and of an
+    expansion."""
     n, path, used = (
         dimension,
         step.recurrences,
@@ -31,19 +33,19 @@ def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> t
 
 
 def kernels(step: Path, lanes: PathLanes, coordinates: Sequence[str]) -> list[Kernel]:
-    """Return the kernels of blocks at one point."""
+    """Return the kernels for blocks of steps."""
     momentum = Kernel("momentum", "p = grad S_h(y)", lanes.curvature.inputs, lanes.curvature.outputs[:1])
     curvature, *further = traced(step, lanes.slopes, lanes.curvature, coordinates)
     return [curvature, momentum, *further, lanes.along_mean, lanes.invert]
 
 
 def back(path: PathAdjoint) -> list[Kernel]:
-    """Return the further kernels of transposed steps, at one point."""
+    """Return the additional kernels for transposed steps."""
     return [path.slope]
 
 
 def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Sequence[str]) -> list[Kernel]:
-    """Return the kernels of expansions at one point: p = ∇S_h with its derivative, first coefficients of all series."""
+    """Return the kernels of expansions: p = ∇S_h with its derivative, and the coefficients of order 0 of all series."""
     path = step.recurrences
     coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
     values = _resolved(path.series, path.fixed, {})
@@ -72,7 +74,7 @@ def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Seque
 
 
 def _symbols(kind: str, values: Sequence[object]) -> tuple[Symbol, ...]:
-    """Return a symbol for each of the values."""
+    """Return symbols of a kind, numbered from 0, one for each value."""
     return tuple(Symbol(kind, i) for i in range(len(values)))
 
 
@@ -83,7 +85,10 @@ def _resolved(
     first: int = 0,
     first_fixed: int = 0,
 ) -> tuple[tuple[Expression, ...], tuple[Expression, ...]]:
-    """Return the first coefficients as expressions in known symbols, without symbols for one another."""
+    """Return the coefficients of order 0 of series, and constant values, as expressions in the ``known`` symbols.
+
+    ``first`` and ``first_fixed`` are the numbers of the first of these series and values.
+    """
     values_by_symbol = dict(known) | {Symbol(FIXED, first_fixed + i): e for i, e in enumerate(fixed)}
     values = []
     for i, q in enumerate(series):

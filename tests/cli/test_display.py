@@ -29,7 +29,7 @@ class Terminal(io.StringIO):
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
-    monkeypatch.setattr(display, "PATIENCE", 0)
+    monkeypatch.setattr(display, "DELAY", 0)
     monkeypatch.setattr(display, "PERIOD", 0.001)
 
 
@@ -58,7 +58,7 @@ def test_a_message_takes_the_place_of_the_line():
 
 
 def test_short_work_shows_nothing(monkeypatch):
-    monkeypatch.setattr(display, "PATIENCE", 1000)
+    monkeypatch.setattr(display, "DELAY", 1000)
     assert shown(Console(), Terminal()) == ""
 
 

@@ -336,7 +336,7 @@ def test_command_refuses_lattices_and_specs_without_runs(tmp_path):
     result = build(tmp_path / "t.yaml", "toda", "--fmu", "-t", "numpy", "-o", tmp_path)
     assert result.exit_code == 1
     assert "t.yaml:2:7: error: an FMU of t needs initial values and a step" in result.output
-    assert "not for lattices" in result.output
+    assert "there are no FMUs yet" in result.output
     assert not list(tmp_path.rglob("*.fmu"))
     assert build(tmp_path / "t.yaml", "--platform", "x86_64-linux").exit_code == 2
     assert build(tmp_path / "t.yaml", "--fmu", "--check").exit_code == 2

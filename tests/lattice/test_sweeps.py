@@ -458,7 +458,7 @@ def test_copies_of_sessions_have_the_compensation_terms(name: str, step: float) 
 @pytest.mark.parametrize("asked", ["scheme: series", "adjoint: true"])
 def test_sums_that_cannot_be_compensated_are_refused(asked: str) -> None:
     text = f"phigen: 1\nname: rounding\n{asked}\nsolver: {{compensated: true}}\n{TEXTS['xxz']}"
-    with pytest.raises(SpecError, match=r"spec.yaml:4.*compensated is for lattices whose H splits, without adjoint"):
+    with pytest.raises(SpecError, match=r"spec.yaml:4.*compensated is only offered for lattices with scheme splitting"):
         compile_spec(specs.loads(text, "spec.yaml"))
 
 

@@ -57,7 +57,7 @@ def test_a_run_that_cannot_fit_ends_with_what_to_do(chain):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_solvers_and_frames_are_refused_where_they_do_not_fit_and_only_there(chain, target, monkeypatch, tmp_path):
-    monkeypatch.setattr(memory, "UNASKED", 0)
+    monkeypatch.setattr(memory, "UNCHECKED_BYTES", 0)
     solver, x = compile(chain, target=target), np.zeros((2, 12))
     monkeypatch.setattr(memory, "available", lambda: 101 * STATE)
     assert len(solver.integrate(x, 0.05, 100)) == 101
@@ -102,7 +102,7 @@ def test_vectors_members_and_ways_back_are_refused_where_they_do_not_fit(
     chain, words, target, refused, allowed, call, monkeypatch
 ):
     solver, x = compile(chain, target=target, tangent=True, adjoint=True), np.zeros((2, 12))
-    monkeypatch.setattr(memory, "UNASKED", 0)
+    monkeypatch.setattr(memory, "UNCHECKED_BYTES", 0)
     monkeypatch.setattr(memory, "available", lambda: allowed * STATE)
     call(solver, x)
     monkeypatch.setattr(memory, "available", lambda: refused * STATE)
@@ -115,7 +115,7 @@ def test_there_is_room_for_one_step_to_go_back_or_it_is_refused(chain, steps, mo
     solver, x = compile(chain, target="c", adjoint=True), np.zeros((2, 12))
     session = solver.backend.start(x, {})
     least = session._c.trail_size(session._address, 1)
-    monkeypatch.setattr(memory, "UNASKED", 0)
+    monkeypatch.setattr(memory, "UNCHECKED_BYTES", 0)
     monkeypatch.setattr(memory, "available", lambda: least)
     solver.pullback(x, 0.05, steps, x)
     monkeypatch.setattr(memory, "available", lambda: least - 1)
@@ -124,7 +124,7 @@ def test_there_is_room_for_one_step_to_go_back_or_it_is_refused(chain, steps, mo
 
 
 def test_chunks_of_a_sweep_that_are_made_at_a_time_fit_together(chain, monkeypatch, tmp_path):
-    monkeypatch.setattr(memory, "UNASKED", 0)
+    monkeypatch.setattr(memory, "UNCHECKED_BYTES", 0)
     monkeypatch.setattr(memory, "available", lambda: 2 * 45 * STATE - 1)
     monkeypatch.setattr(cluster, "connected", lambda scheduler, workers: nullcontext((None, workers)))
     with pytest.raises(LimitError, match="2 chunks of a sweep at a time"):

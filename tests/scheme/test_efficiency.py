@@ -51,7 +51,7 @@ OF_SERIES = ("terms: 3\n", "birealisation: cayley\n", "modified_hamiltonian: 1\n
 def test_options_of_the_series_choose_it(option):
     compilation = compile_text(f"{BODY}{option}scheme: auto\n", None)
     assert compilation.scheme_name == "series"
-    assert compilation.choice == "series, which its options name"
+    assert compilation.choice == "series, since options apply to it only"
 
 
 def test_schemes_that_do_not_apply_are_left_out():

@@ -1,1 +1,1 @@
-"""Passes of the loop IR, each a pure function from functions to functions."""
+"""Passes of the loop IR: pure functions from functions of the IR to functions of the IR."""

@@ -1,4 +1,5 @@
-"""Lowering by rows: loops over a row segment, with pointers to the row in each array and to the neighbouring rows."""
+"""Lowering by rows: functions run over a row segment, with pointers to its row and to the neighbouring rows of each
+array."""
 
 from __future__ import annotations
 
@@ -10,19 +11,24 @@ from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.nodes import Storage
 from phigen.symbolic.symbols import Symbol
 
-#: Index of the site of the loop, of the other site of a bond or pair, and of the bond; the sign of its direction.
+#: Indices of the site of the loop, of the other site of a bond or pair, and of the bond. The sign of the direction of
+#: the bond, and the record of the row segment.
 SITE, OTHER, BOND, SIDE, ROW = (ir.fixed(name) for name in ("i", "j", "k", "side", "row"))
 SOLVER, AT_BONDS = ir.Member(ROW, "s"), ir.Member(ir.Member(ROW, "s"), "at_bonds")
 FROM, TO, LENGTH = ir.Member(ROW, "from"), ir.Member(ROW, "to"), ir.Member(SOLVER, "length")
 
 READ, WRITTEN = ir.Pointer(constant=True, restricted=True), ir.Pointer(constant=False, restricted=True)
-#: The member of a row that holds the arrays of each kind of storage.
+#: Member of the row record with the arrays of each kind of storage.
 _MEMBERS = {Storage.STATE: "x", Storage.VARIATION: "varied", Storage.START: "start", Storage.OUTPUT: "out"}
 
 
 @dataclass(frozen=True)
 class RowLayout:
-    """The rows that functions read, by their offsets from the row of the loop, and the members of ``params``."""
+    """Layout of a lattice in rows.
+
+    ``lines`` are the rows that functions read, by their offsets from the row of the loop. ``members`` maps parameters
+    to their names in ``params``.
+    """
 
     lattice: LatticeLoops
     lines: tuple[tuple[int, ...], ...]
@@ -30,36 +36,38 @@ class RowLayout:
 
     @property
     def single_row(self) -> bool:
-        """Whether the lattice has one axis, and so one row."""
+        """Whether the lattice has one axis, and therefore one row."""
         return len(self.lattice.step.sites.axes) == 1
 
     @property
     def colour_step(self) -> int:
-        """The distance in a row between two successive sites of one colour."""
+        """The distance between successive sites of one colour in a row."""
         sites = self.lattice.step.sites
         return next(k for k in range(1, sites.colours + 1) if k * sites.weights[-1] % sites.colours == 0)
 
     def line(self, offset: Sequence[int]) -> int:
-        """Return the number of the row that a neighbour at an offset lies in."""
+        """Return the number in ``lines`` of the row of a neighbour."""
         return self.lines.index(tuple(offset[:-1])) if any(offset) else 0
 
     def place(self, line: int) -> str:
-        """Return the position of a row relative to the row of the loop, for a comment."""
+        """Return the position of row ``line`` relative to the row of the loop, as text for a comment."""
         axes = zip(self.lattice.step.sites.axes, self.lines[line], strict=False)
         return ", ".join(f"{axis} {'+' if o > 0 else '-'} {abs(o)}" for axis, o in axes if o)
 
     def row(self, arrays: ir.Value, line: int = 0, rows: str = "at") -> ir.Value:
-        """Return the address of a row of an array; the member ``rows`` has the addresses of all rows."""
+        """Return the address of row ``line`` in an array; the member ``rows`` of the segment has the offsets of the
+        rows."""
         return arrays if self.single_row else ir.Binary("+", arrays, ir.entry(ir.Member(ROW, rows), line))
 
 
 @dataclass(frozen=True)
 class Reading:
-    """Access of a function to arrays.
+    """Options of `RowDeclarations`: how a function accesses arrays.
 
-    The ``updated`` fields are written too; ``seeds`` are the arrays of cotangents of each kind. Functions that sum
-    over bonds at each site have the sums in ``local`` variables. The site of the loop is the end ``here`` of a bond
-    or pair. Parameters at bonds are in ``at_bonds``; ``oriented`` ones change their sign when seen from the end b.
+    ``updated`` are the fields that it writes. ``seeds`` are the arrays of cotangents of each kind. With ``local``, the
+    function sums over the bonds of a site in local variables. ``here`` is the end of the bond or pair at the site of
+    the loop. ``at_bonds`` are the parameters at bonds, of which the ``oriented`` ones change their sign when seen from
+    the end b.
     """
 
     updated: frozenset[str] = frozenset()
@@ -72,7 +80,10 @@ class Reading:
 
 @dataclass
 class RowDeclarations:
-    """The declarations that a function needs before its loop, at the site, and at the other end of a bond or pair."""
+    """Declarations of the values that a function reads, sorted by place.
+
+    They belong before the loop over sites, to the site, or to the other end of a bond or pair.
+    """
 
     layout: RowLayout
     reading: Reading = field(default_factory=Reading)
@@ -87,7 +98,8 @@ class RowDeclarations:
     computed: list[ir.Statement] = field(default_factory=list)
 
     def read(self, body: Iterable[ir.Statement]) -> RowDeclarations:
-        """Sort the declarations of some statements by where they belong; those of temporaries are ``computed``."""
+        """Add the declarations in some statements, and return this object; declarations of temporaries go to
+        ``computed``."""
         for s in body:
             match s:
                 case ir.Declare(items=((name, value),)):
@@ -162,7 +174,7 @@ class RowDeclarations:
                     self._at_end(name, pointer, load)
 
     def _at_end(self, name: str, pointer: ir.Value, load: ir.Load) -> None:
-        """Declare a value at the site of the loop, or at the other end of a bond or pair."""
+        """Add the declaration of a value at the site of the loop, or at the other end of a bond or pair."""
         if not load.end:
             self.loaded[name] = ir.Entry(pointer, SITE)
         elif load.end == self.reading.here:
@@ -180,7 +192,7 @@ class RowDeclarations:
             self._once(name, local_name, in_row)
             return
         in_open_rows: ir.Value = ir.Constant(1.0)
-        if not self.layout.single_row:  # read before the loop, which gcc would not vectorise otherwise
+        if not self.layout.single_row:  # Read before the loop; gcc does not vectorise a loop with this access.
             in_open_rows = ir.fixed(f"there{value.number}")
             self.once.append((in_open_rows.symbol, in_row))
         condition = tests[0] if len(tests) == 1 else ir.Binary("and", *tests)
@@ -204,11 +216,11 @@ class RowDeclarations:
         self.starts.setdefault(pointer.symbol, (kind, row))
 
     def pointer(self, base: str, line: int = 0) -> ir.Name:
-        """Return the pointer to a row of an array of the state."""
+        """Return the pointer to row ``line`` of an array of the state, which is declared if it is new."""
         return self.rows.setdefault((base, line), ir.label(f"{base}_row{line or ''}"))
 
     def before(self) -> Iterator[ir.Statement]:
-        """Yield the declarations before the loop."""
+        """Yield the declarations that stand before the loop."""
         for updated in sorted(self.reading.updated):
             self.pointer(updated)
         pointers, neighbour_pointers = dict(self.starts), list[ir.Statement]()
@@ -224,7 +236,7 @@ class RowDeclarations:
         yield from (*self.substituted, *together(self.once), *grouped(pointers), *neighbour_pointers)
 
     def at_site(self) -> list[ir.Statement]:
-        """Return the declarations at the beginning of the loop over sites."""
+        """Return the declarations that stand at the beginning of the loop over sites."""
         return [*together(self.loaded.items()), *self.weights]
 
 
@@ -241,13 +253,13 @@ def over_sites(body: Iterable[ir.Statement], independent: str = "SITE", **fields
 
 
 def together(values: Iterable[tuple[str, ir.Value]]) -> list[ir.Statement]:
-    """Return one declaration of several real constants."""
+    """Return one declaration of all these real constants; [] if there are none."""
     items = tuple(values)
     return [ir.Declare(ir.Type.REAL, items)] if items else []
 
 
 def grouped(pointers: Mapping[str, tuple[ir.Pointer, ir.Value]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of pointers, one for each type."""
+    """Yield the declarations of pointers, one declaration for each type."""
     for kind in dict.fromkeys(kind for kind, _ in pointers.values()):
         yield ir.Declare(
             kind, tuple((name, row) for name, (pointer_kind, row) in pointers.items() if pointer_kind == kind)
@@ -259,7 +271,7 @@ def _member(array: ir.Array) -> ir.Value:
 
 
 def gathered(number: int) -> ir.Value:
-    """Return the array of a sum over bonds or pairs."""
+    """Return the array of sum ``number`` over bonds or pairs."""
     return ir.entry(ir.Member(SOLVER, "gathered"), number)
 
 

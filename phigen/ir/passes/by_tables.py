@@ -1,16 +1,22 @@
-"""Lowering by tables: one array has the fields of all sites, and tables of site numbers give the neighbours.
+"""Lowering by tables: one array has the fields of all sites, and tables with numbers of sites give the neighbours.
 
 Functions receive coefficients or parameters, arrays of reals, and the record ``sites``. The runtime of a target fills
 this record:
 
-- ``count``, the number of sites; ``params``, where parameters at sites and at bonds are arrays; the time ``t``;
-- ``near``, for each offset the neighbours of all sites; ``present``, for each term at open ends 1 or 0 at each site;
-- ``coloured``, ``inside`` and ``beside``, the sites that a sweep updates; ``colours``, the colour of each site;
-- ``sums`` over bonds or pairs, one after another; ``dw``, the increments of noise; values that parameters determine;
-- ``massive``, the end of the sites that have a mass, in sums over pairs.
+- ``count``: the number of sites
+- ``params``: the parameters, those at sites and at bonds as arrays
+- ``t``: the time
+- ``near``: for each offset, the neighbours of all sites
+- ``present``: for each term at open ends, 1 or 0 at each site
+- ``coloured``, ``inside`` and ``beside``: the sites that a sweep updates
+- ``colours``: the colour of each site
+- ``sums``: sums over bonds or pairs, one after another
+- ``dw``: the increments of noise
+- values that parameters determine, by their names
+- ``massive``: in sums over pairs, the number of the site after the last with a mass
 
-It has the functions ``bonds`` and ``begins`` of ``sites``, and ``fill``, ``placed`` and ``joinSums``. The model is
-``templates/js/runtime/sites.mjs``.
+The runtime also has the functions ``bonds`` and ``begins`` of ``sites``, and ``fill``, ``placed`` and ``joinSums``.
+``templates/js/runtime/sites.mjs`` is a model for other runtimes.
 """
 
 from __future__ import annotations
@@ -28,13 +34,13 @@ from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
 
 NUMBER, COLOUR = (ir.fixed(name) for name in ("k", "colour"))
 
-#: The names of the arrays of each kind of storage, and of parameters of functions, where JavaScript has other names.
+#: Names in JavaScript of the arrays of each kind of storage, and of parameters of functions, where they differ.
 _ARRAYS = {ir.Storage.STATE: "x", ir.Storage.VARIATION: "v", ir.Storage.START: "start", ir.Storage.SUM: "sums"}
 _PARAMETERS = {"state": "x", "varied": "v"}
 
 
 def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
-    """Return the function on the level of memory."""
+    """Return a function of a lattice on the level of memory."""
     parameters = tuple(_PARAMETERS.get(p, p) for p in function.parameters)
     if not any(isinstance(s, ir.Store) for s in statements(function.body)):
         return replace(function, parameters=parameters, body=())
@@ -45,7 +51,7 @@ def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 class _Tables:
     """The lowering of one function.
 
-    ``head`` has the declarations before its loops, and ``hoisted`` the names that they declare.
+    ``head`` has the declarations before its loops, and ``hoisted`` the variables that these declare.
     """
 
     function: ir.Function
@@ -55,7 +61,7 @@ class _Tables:
 
     @property
     def params(self) -> ir.Value:
-        """The parameters of the system."""
+        """The record of the parameters of the system."""
         return ir.fixed("params") if "params" in self.function.parameters else ir.Member(SITES, "params")
 
     def lowered(self) -> ir.Function:
@@ -158,7 +164,7 @@ class _Tables:
         return ir.Entry(self._parameter(array.name), site)
 
     def _parameter(self, name: str) -> ir.Name:
-        """Return the array of a parameter at sites or at bonds."""
+        """Return the array of a parameter at sites or bonds."""
         return self._hoisted(Symbol("at", name), ir.Member(self.params, name))
 
     def _hoisted(self, name: Symbol, value: ir.Value, kind: ir.Type = ir.Type.ARRAY) -> ir.Name:
@@ -173,7 +179,7 @@ class _Tables:
         return ir.Name(Symbol("beside", self.lattice.neighbours.index(load.offset)))
 
     def _neighbour(self, load: ir.Load) -> Iterator[ir.Statement]:
-        """Yield the declaration of the number of the neighbour, unless it is declared already."""
+        """Yield the declaration of the number of a neighbour, unless the loop has declared it already."""
         site = self._site(load)
         if isinstance(site, ir.Name) and site not in (SITE, OTHER) and site.symbol not in self.hoisted:
             number = self.lattice.neighbours.index(load.offset)
@@ -187,7 +193,7 @@ def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
 
 
 def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
-    """Yield the calls that set extremes to their initial values; callers set sums to 0."""
+    """Yield the calls that set extremes to their initial values; sums are set to 0 by callers."""
     for s in loop.stores:
         if s.extreme:
             ends = of_array(ir.Constant(0), s.array.number), of_array(ir.Constant(0), s.array.number + 1)

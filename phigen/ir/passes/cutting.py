@@ -1,6 +1,7 @@
-"""Splitting of long straight-line functions, whose compile time is quadratic in their length.
+"""Division of long straight-line functions into parts, since compile time is quadratic in the length of a function.
 
-Each store is moved to the earliest place. A temporary that a later part reads becomes an entry of a workspace array.
+Each store is moved to the earliest possible place. Temporaries that a later part reads become entries of a workspace
+array.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ WORKSPACE = ir.fixed("work")
 
 
 def cut(function: ir.Function, size: int) -> list[ir.Function]:
-    """Return a function of kernels in parts of at most ``size`` statements; none of the parts clears arrays."""
+    """Return the function of a kernel as parts of at most ``size`` statements; the caller clears arrays."""
     statements = [s for s in function.body if is_temporary(s) or isinstance(s, ir.Assign)]
     if len(statements) <= size:
         return [function]
@@ -35,14 +36,14 @@ def cut(function: ir.Function, size: int) -> list[ir.Function]:
 
 
 def workspace(parts: Sequence[ir.Function]) -> int:
-    """Return the size of the workspace of the parts of a function."""
+    """Return the number of workspace entries that the parts of a function need."""
     entries = (s.target for part in parts for s in part.body if isinstance(s, ir.Assign))
     used = [e.index for e in entries if isinstance(e, ir.Entry) and e.array == WORKSPACE]
     return 1 + max((i.value for i in used if isinstance(i, ir.Constant) and isinstance(i.value, int)), default=0)
 
 
 def _stores_early(statements: Sequence[ir.Statement]) -> list[ir.Statement]:
-    """Return the statements with each store right after the last temporary that it reads."""
+    """Return the statements in an order where each store follows the last temporary that it reads."""
     temporaries = [s for s in statements if is_temporary(s)]
     position = {name: k for k, s in enumerate(temporaries) for name in _declared([s])}
     ready: dict[int, list[ir.Statement]] = {}
@@ -57,7 +58,7 @@ def _stores_early(statements: Sequence[ir.Statement]) -> list[ir.Statement]:
 def _part(
     reads: Sequence[ir.Statement], chunk: Sequence[ir.Statement], crossing: dict[str, Symbol]
 ) -> list[ir.Statement]:
-    """Return the statements of a part, with the values that cross parts in the workspace."""
+    """Return the statements of one part; the values in ``crossing`` are entries of the workspace."""
 
     def visit(e: Expression, arguments: list[Expression]) -> Expression:
         if e.op == "symbol":
@@ -86,6 +87,6 @@ def _declared(statements: Sequence[ir.Statement]) -> list[str]:
 
 
 def _symbols(statements: Sequence[ir.Statement]) -> list[str]:
-    """Return the symbols that expressions in the statements read, in the order of evaluation."""
+    """Return the symbols in the expressions of statements, in the order of evaluation."""
     graphs = [v for v in values(tuple(statements)) if isinstance(v, Expression)]
     return [e.value for e in topological(graphs) if e.op == "symbol"]

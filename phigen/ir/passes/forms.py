@@ -1,7 +1,7 @@
-"""Forms of elementary functions: small-argument polynomials with a full-range fallback, and versions for SIMD lanes.
+"""Forms of elementary functions: polynomials for small arguments, full-range functions, and versions for SIMD lanes.
 
-Applied after `phigen.ir.passes.temporaries`: a call of ``sin`` becomes one of ``sin_near`` or ``sin_lane``, which the
-runtime of a target defines. Without a version a call remains one of the library or of the general definition.
+This pass follows `phigen.ir.passes.temporaries`. It replaces calls such as ``sin`` by ``sin_near`` or ``sin_lane``,
+which the runtime of a target defines. Functions without such a version are called as before.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from phigen.lanes.lane_functions import FULL_RANGE_FUNCTIONS, LANE_FORMULAS, LAN
 from phigen.symbolic.expression import Expression, fold, raw, topological
 from phigen.symbolic.special import SPECIAL
 
-#: The ends of the names of functions for small arguments, of those for SIMD lanes, and of functions of a solver that
-#: replace those of the library for any argument.
+#: Suffixes of the names of functions: for small arguments, for SIMD lanes, and for versions of the solver that replace
+#: library functions for all arguments.
 NEAR, LANE, OWN = "_near", "_lane", "_own"
 
-#: Versions of functions in loops over lanes; versions in loops over sites, where functions with a removable singularity
-#: have a small-argument form only; and those of the latter that are defined for all arguments.
+#: SIMD has the versions of functions for loops over lanes. IN_LANES has those for loops over sites, where functions
+#: with a removable singularity only have a small-argument form. FULL_RANGE has those of IN_LANES that are defined for
+#: all arguments.
 SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
 IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
 FULL_RANGE = {f: version for f, version in IN_LANES.items() if f in FULL_RANGE_FUNCTIONS}
@@ -49,10 +50,10 @@ def calling(function: ir.Function, versions: Mapping[str, str]) -> ir.Function:
 def forms_of(
     functions: Iterable[ir.Function], small_argument: Iterable[str], limited: Set[str], versions: Mapping[str, str]
 ) -> dict[str, Mapping[str, str]]:
-    """Return the forms that some functions need together, as suffixes of their names, with the versions to call.
+    """Return the forms that some functions need, as suffix of their names → versions to call in this form.
 
-    ``small_argument`` are the elementary functions that have a small-argument version. Functions that call no
-    ``limited`` ones (undefined at large arguments) need one form, without a suffix.
+    ``small_argument`` are the elementary functions with a small-argument version. ``limited`` are those whose fast
+    versions fail at large arguments. If no ``limited`` function is called, there is one form, with the suffix "".
     """
     graphs = [v for f in functions for v in values(f.body) if isinstance(v, Expression)]
     if {e.op for e in topological(graphs)}.isdisjoint(limited):

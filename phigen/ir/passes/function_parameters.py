@@ -1,4 +1,4 @@
-"""Parameters of functions: their types, and statements that mark the ones that a function does not read."""
+"""Parameters of functions: their types, and statements that mark unread parameters as unused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from phigen.scheme.kernel import Role
 
 
 def discard_unread(function: ir.Function) -> ir.Function:
-    """Return the function with a statement for each parameter that it does not read."""
+    """Return the function with a statement that marks each parameter which it does not read."""
     read = names_in(function.body)
     unread = (ir.Discard(p) for p in function.parameters if ir.fixed(p).symbol not in read)
     return function.with_body(*unread, *function.body)
@@ -19,6 +19,6 @@ def discard_unread(function: ir.Function) -> ir.Function:
 def typed_function(
     name: str, doc: str, parameters: Sequence[str], body: ir.Block, types: Mapping[str, ir.ParameterType]
 ) -> ir.Function:
-    """Return a function whose parameters have those of some ``types`` that have their names."""
+    """Return a function whose parameters have the types of that name in ``types``; unread parameters are marked."""
     listed = tuple((p, types[p]) for p in parameters if p in types)
     return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))

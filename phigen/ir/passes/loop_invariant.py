@@ -1,4 +1,4 @@
-"""Loop-invariant motion: values that are the same at all sites are read once, before the loop."""
+"""Loop-invariant code motion: values that are the same at all sites are declared before the loop."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from phigen.ir import nodes as ir
 from phigen.ir.walk import map_blocks
 
-#: Values that no loop over sites, bonds or pairs changes.
+#: Values that are the same in all iterations of loops over sites, bonds or pairs.
 INVARIANT = ir.Coefficient | ir.SystemParameter | ir.Time
 
 
 def loop_invariant(function: ir.Function) -> ir.Function:
-    """Return the function with the declarations of invariant values before the loops in which they were."""
+    """Return the function with the declarations of invariant values moved out of its loops."""
 
     def moved(body: ir.Block) -> Iterator[ir.Statement]:
         for s in body:

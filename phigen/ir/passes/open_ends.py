@@ -1,6 +1,6 @@
-"""Open ends: a loop in which all terms are present, for sites away from open ends, and the loop for the other sites.
+"""Separate loops for sites away from open ends, where all terms are present, and for the other sites.
 
-Applied on the level of sites, to whole expression graphs, before `phigen.ir.passes.temporaries`.
+The pass applies on the level of sites, to expression graphs, before `phigen.ir.passes.temporaries`.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from phigen.ir import nodes as ir
 from phigen.ir.walk import map_blocks, statements
 from phigen.symbolic.expression import ONE, Expression, substitute
 
-#: The end of the names of loops for sites near open ends.
+#: Suffix of the names of functions for sites near open ends.
 NEAR_ENDS = "_end"
 
 
 def divided_at_ends(function: ir.Function) -> list[ir.Function]:
-    """Return two functions, for sites away from open ends and for all; one function if open ends change nothing."""
+    """Return a function for sites away from open ends and one for all sites; only the latter if they are the same."""
     if not any(map(_weight, statements(function.body))):
         return [function]
-    near = replace(function, name=function.name + NEAR_ENDS, doc="the same beside open ends")
+    near = replace(function, name=function.name + NEAR_ENDS, doc="the same for sites near open ends")
     return [map_blocks(function, _without_weights), near]
 
 
 def _weight(s: ir.Statement) -> str:
-    """Return the symbol of a weight that a statement declares, or nothing."""
+    """Return the name of the weight that a statement declares; "" for other statements."""
     return s.items[0][0] if isinstance(s, ir.Declare) and isinstance(s.items[0][1], ir.Inside) else ""
 
 
 def _without_weights(body: ir.Block) -> Iterator[ir.Statement]:
-    """Yield the statements with 1 for all weights, and without sums that become empty."""
+    """Yield the statements with 1 in place of all weights, and without sums that become unused."""
     ones = dict.fromkeys(filter(None, map(_weight, body)), ONE)
     graphs = (s.value for s in body if isinstance(s, ir.Update))
     values = iter(substitute([e for e in graphs if isinstance(e, Expression)], ones))

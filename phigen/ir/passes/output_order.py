@@ -1,4 +1,5 @@
-"""Order of the statements of a kernel: named values first, then for each output its further values and its stores."""
+"""Order of the statements in the function of a kernel: named values, then for each output its temporaries and
+stores."""
 
 from __future__ import annotations
 
@@ -11,9 +12,11 @@ from phigen.symbolic.expression import Expression
 
 
 def in_output_order(function: ir.Function, named: Sequence[str], *, headings: bool) -> ir.Function:
-    """Return the function in this order; with ``headings`` the values of an output are right before its stores.
+    """Return the function with its statements sorted by output.
 
-    ``named`` are the symbols of values that have a name in the kernel, the momenta.
+    ``named`` are the symbols of values with a name in the kernel, the momenta, which come first. With ``headings``,
+    there is a comment for each output, and its temporaries stand directly before its stores; otherwise all stores come
+    last.
     """
     temporaries = {s.items[0][0]: s for s in function.body if isinstance(s, ir.Declare) and is_temporary(s)}
     stores: dict[str, list[ir.Statement]] = {}
@@ -23,7 +26,7 @@ def in_output_order(function: ir.Function, named: Sequence[str], *, headings: bo
     left = dict(temporaries)
 
     def taken(names: Iterable[str]) -> list[ir.Statement]:
-        """Remove the temporaries that some values need from those that are left, and return them in order."""
+        """Remove the temporaries that these names need from ``left``, and return them in order."""
         needed, rest = set[str](), [*names]
         while rest:
             name = rest.pop()

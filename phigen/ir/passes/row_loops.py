@@ -1,4 +1,4 @@
-"""Lowering by rows of sweeps, stages, observables and sums over bonds or pairs."""
+"""Lowering by rows of sweeps, stages, observables, and sums over bonds or pairs."""
 
 from __future__ import annotations
 
@@ -38,12 +38,15 @@ from phigen.symbolic.symbols import Symbol
 OUT = ir.fixed("out")
 OTHER_SITE = ir.Entry(ir.Member(SOLVER, "other"), BOND)
 ZERO, ONE = ir.Constant(0.0), ir.Constant(1.0)
-#: The distance between two values of one site in arrays that callers receive.
+#: Distance between successive values of a site in arrays of callers.
 SITES: ir.Value = ir.Cast(ir.Member(SOLVER, "sites"))
 
 
 def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, compensated: bool = False) -> ir.Function:
-    """Return a sweep; the colour of a coloured one is in its code, or a member of the row if it is ``passed``."""
+    """Return the function of a sweep by rows.
+
+    The colour of a coloured sweep is a constant in its code, or with ``passed`` a member of the row record.
+    """
     stores = function.loop.stores
     if function.role is Role.SWEEP_TANGENT:
         names = {s.array.number: Symbol("out", s.array.name) for s in sorted(stores, key=lambda s: s.array.name)}
@@ -69,7 +72,7 @@ def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, com
 
 
 def _from(selection: ir.Selection) -> ir.Value:
-    """Return the first site of a segment that a sweep updates."""
+    """Return the first site of a row segment that a sweep updates."""
     if not selection.first:
         return FROM
     return ir.Select(ir.Binary("<", FROM, ir.Constant(selection.first)), ir.Constant(selection.first), FROM)
@@ -83,7 +86,7 @@ def of_colour(
     low: ir.Value = FROM,
     **more: Any,
 ) -> ir.Loop:
-    """Return the loop over the sites of the colour ``swept`` from ``low`` on; over all sites if ``colour`` is None."""
+    """Return the loop over the sites of colour ``swept`` from ``low`` on; over all sites if ``colour`` is None."""
     if colour is None:
         return over_sites(body, low=low, **more)
     first = ir.Called("first", (ROW, swept, low))
@@ -91,19 +94,21 @@ def of_colour(
 
 
 def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Statement]) -> ir.Function:
-    """Return a function with other parameters and statements, which marks the parameters that it does not read."""
+    """Return the function with other parameters and another body; unread parameters are marked as unused."""
     return discard_unread(replace(function, parameters=parameters, body=tuple(body)))
 
 
 def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Function:
-    """Return a kernel of the equation of a stage, which assigns or adds to its outputs."""
+    """Return the function of a kernel of the stage equation by rows, which assigns its outputs, or adds them if
+    ``adds``."""
     return _storing(function, layout, dict(enumerate(outputs)), "out", WRITTEN, adds=adds)
 
 
 def _storing(
     function: ir.Function, layout: RowLayout, names: Mapping[int, str], member: str, kind: ir.Pointer, *, adds: bool
 ) -> ir.Function:
-    """Return a function that stores to the arrays of a ``member`` of the row, by pointers with ``names``."""
+    """Return a function by rows that stores to the arrays of a ``member`` of the row record; ``names`` are their
+    pointers."""
     rows, selection = rows_of(function, layout), function.loop.selection
     head = grouped({name: (kind, layout.row(ir.entry(ir.Member(ROW, member), k))) for k, name in names.items()})
     places = ((ir.Entry(ir.Name(names[s.array.number]), SITE), s.value) for s in function.loop.stores)
@@ -114,10 +119,11 @@ def _storing(
 
 @dataclass(frozen=True)
 class BondLoop:
-    """A function that sums over bonds or pairs, on the level of sites.
+    """A function for sums over bonds or pairs, on the level of sites, with its further ``arguments`` by rows.
 
-    ``oriented`` is as in `Reading`. Callers pass some of these ``arguments``: the parameters ``at_bonds``, the ``sign``
-    of the direction of bonds, and whether the sites of the colour of the sweep lie ``across`` the bonds.
+    ``oriented`` is as in `Reading`. The possible arguments are ``at_bonds``, the parameters at bonds; ``sign``, the
+    sign of the direction of bonds; and ``across``, a flag that the sites of the swept colour are at the other ends of
+    the bonds.
     """
 
     function: ir.Function
@@ -126,12 +132,12 @@ class BondLoop:
 
     @property
     def at_bonds(self) -> ir.Value:
-        """The parameters at bonds."""
+        """The array of parameters at bonds."""
         return ir.fixed("at_bonds") if "at_bonds" in self.arguments else AT_BONDS
 
     @property
     def across(self) -> bool:
-        """Whether callers say which end of a bond has the colour."""
+        """Whether callers pass the flag ``across``."""
         return "across" in self.arguments
 
     @property
@@ -141,9 +147,10 @@ class BondLoop:
 
 
 def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Function:
-    """Return a density, an energy or the vector field, after ``calls`` that sum over bonds.
+    """Return the function of a density, an energy or the vector field by rows; it first calls the functions ``calls``
+    for sums.
 
-    The values of one site are at the distance ``apart``.
+    ``apart`` is the distance between successive values of a site in the output.
     """
     rows, stores = rows_of(function, layout), function.loop.stores
     body = (*rows.at_site(), *rows.computed, *_observed(stores))
@@ -154,7 +161,7 @@ def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], a
 def observable_with_bonds(
     function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop], apart: ir.Value = SITES
 ) -> ir.Function:
-    """Return an observable where each site sums over its own bonds."""
+    """Return the function of an observable by rows that sums over the bonds of each site itself."""
     loop, observed = function.loop, function.loop.stores
     oriented = frozenset[str]().union(*(s.oriented for s in sums))
     outer = [*function.body, *(s for bond_loop in sums for s in bond_loop.function.body)]
@@ -185,12 +192,12 @@ def _at_bond(s: ir.Statement) -> bool:
 
 
 def _apart(stores: Sequence[ir.Store], apart: ir.Value) -> list[ir.Statement]:
-    """Return the declaration of the distance between the values of a site, if there are several."""
+    """Return the declaration of the distance between values of a site, if an observable has several."""
     return [ir.index(ir.fixed("apart"), apart)] * any(s.array.number for s in stores)
 
 
 def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
-    """Yield the stores of values for callers; a share that adds to the first value becomes a term of it."""
+    """Yield the stores of values for callers; values that are to be added become terms of the assigned value."""
     shares, apart = [s.value for s in stores if s.adds], ir.fixed("apart")
     for s in stores:
         if not s.adds:
@@ -202,7 +209,7 @@ def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
 
 
 def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Function:
-    """Return the function that sums over the bonds of each site; unless ``first``, it adds to the sums."""
+    """Return the function by rows that sums over the bonds of each site; unless ``first``, it adds to existing sums."""
     reading = Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds)
     rows, count = rows_of(bond_loop.function, layout, reading), len(bond_loop.function.loop.stores)
     sums = (ir.Entry(gathered(k), SITE) for k in range(count))
@@ -212,7 +219,7 @@ def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Fun
 
 
 def _begun(stores: Sequence[ir.Store]) -> ir.Declare:
-    """Return the declaration of the sums, 0, and of the extremes, infinite, that are over no bonds yet."""
+    """Return the declaration of the sums, with initial value 0, and of the extremes, with initial value ±∞."""
     starts = {s.array.number: _start(s) for s in stores}
     items = tuple((ir.fixed(f"sum{k}").symbol, starts.get(k, ZERO)) for k in range(max(starts, default=0) + 1))
     return ir.Declare(ir.Type.REAL, items, mutable=True)
@@ -223,7 +230,7 @@ def _start(s: ir.Store) -> ir.Value:
 
 
 def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
-    """Return the loop over the bonds of a site."""
+    """Return the loop that sums over the bonds of a site."""
     sign = ir.fixed("sign") if "sign" in bond_loop.arguments else ONE
     updated = (u for s in bond_loop.function.loop.stores for u in updates(s, ir.fixed(f"sum{s.array.number}"), s.value))
     return bonds_of(bond_loop.function.loop, rows, updated, sign, across=bond_loop.across)
@@ -232,10 +239,11 @@ def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
 def bonds_of(
     loop: ir.Loop, rows: RowDeclarations, updated: Iterable[ir.Statement], sign: ir.Value, *, across: bool = False
 ) -> ir.Loop:
-    """Return the loop over the bonds of a site: those that begin there, those that end there, or both.
+    """Return the loop over the bonds of a site: those that begin there, those that end there, or both, by ``loop.end``.
 
-    It skips bonds without a site of the colour; with ``across`` the caller decides by a flag which end has the colour.
-    ``sign`` is that of the direction of bonds, seen from the site where they begin.
+    Bonds whose end ``loop.chosen`` does not have the colour of the sweep are skipped; with ``across``, a flag of the
+    caller decides which end this is. ``sign`` is the sign of the direction of a bond, seen from the site where it
+    begins.
     """
     names = [s.items[0][0] for s in loop.body if isinstance(s, ir.Declare)]
     reads_there = [(name, value) for name, value in rows.other.items() if name in names]
@@ -259,7 +267,7 @@ def bonds_of(
 
 
 def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
-    """Return the function that sums over all other sites, for the sites of a row segment."""
+    """Return the function by rows that sums over all other sites, for the sites of a row segment."""
     rows = rows_of(bond_loop.function, layout)
     sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.function.loop.stores]
     arrays = {g.symbol: (WRITTEN, gathered(k)) for k, g in enumerate(sums)}

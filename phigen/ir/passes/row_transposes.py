@@ -1,7 +1,8 @@
-"""Lowering by rows of transposes, without write conflicts between threads: each site writes only its own elements.
+"""Lowering by rows of transposed functions, without write conflicts between threads: a site writes only its own
+elements.
 
-A site adds to its own cotangents at once. Cotangents of other sites are stored in arrays, one for each value; in a
-second loop each site adds the values that its neighbours have stored for it.
+A site adds to its own cotangents directly. Its contributions to the cotangents of other sites are stored in arrays, one
+for each contribution. In a second loop, each site adds the contributions that its neighbours have stored for it.
 """
 
 from __future__ import annotations
@@ -37,16 +38,18 @@ from phigen.symbolic.symbols import HERE
 BEGIN, END, APART, WHOLE, LANES, LANE, INDEX_TO = (
     ir.fixed(name) for name in ("begin", "end", "apart", "whole", "lanes", "l", "to")
 )
-#: Number of partial sums of a sum over sites, which the runtime adds at the end.
+#: Number of partial sums of a sum over sites (a macro), and the array of the sums; the runtime adds the partial sums.
 BATCH, SUMS = ir.fixed("ADDED"), ir.fixed("sums")
 
-#: Sites in a batch of a sum over pairs: their additions are independent, which hides the latency.
+#: Number of sites in a batch of a sum over pairs. The additions for different sites are independent, which hides their
+#: latency.
 PAIR_BATCH = 32
 
 
 @dataclass(frozen=True)
 class Handed:
-    """A cotangent for the site at an offset: the array that stores it, and the number of the field it belongs to."""
+    """Contribution of a site to the cotangent of field ``base`` at the site at an ``offset``; ``array`` is where it is
+    stored."""
 
     array: int
     base: int
@@ -55,12 +58,12 @@ class Handed:
 
 @dataclass(frozen=True)
 class Transpose:
-    """A transposed function on the level of sites, and the arrays of its cotangents.
+    """A transposed function on the level of sites, with the arrays of cotangents for the lowering.
 
-    The function reads cotangents of the kind ``seed``: those of the fields with the numbers ``fields``, or else the
-    variation of the row. It stores contributions to the cotangents of neighbours in the arrays ``handed``, and those
-    of sums over bonds or pairs in arrays from ``sums_from`` on; ``summed`` is the number of these sums. First it
-    adds the cotangents ``received`` from the loop before it. The fields ``recomputed`` are written too.
+    The function reads cotangents of the kind ``seed``: those of the fields with the numbers ``fields``, or the
+    variations of the row if ``fields`` is empty. It stores contributions for neighbours in the arrays ``handed``. The
+    cotangents of its ``summed`` sums over bonds or pairs are stored in the arrays from number ``sums_from`` on. At
+    first, it adds the contributions ``received`` from a previous loop. The fields ``recomputed`` are written too.
     """
 
     function: ir.Function
@@ -74,7 +77,8 @@ class Transpose:
 
 
 def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.Function:
-    """Return the first loop of a transpose; with ``vectors`` sums over sites stay in registers."""
+    """Return the first loop of a transposed function by rows; with ``vectors``, sums over sites are added in SIMD
+    registers."""
     loop, fields = transpose.function.loop, transpose.fields
     variations = [ir.fixed(f"v_{k}") for k in range(layout.lattice.program.dimension)]
     pointers = [ir.fixed(f"bar_{k}") for k in fields] or variations
@@ -107,7 +111,7 @@ _COTANGENTS = (Storage.COTANGENT, Storage.START_COTANGENT)
 
 
 def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
-    """Return the cotangents for other sites, by their arrays, and the statements that store all values of a site."""
+    """Return the contributions for other sites by array, and the statements that store all results of a site."""
     places = {(h.base, h.offset): h.array for h in transpose.handed}
     handed_values: dict[int, ir.Value] = {}
     stores: list[ir.Statement] = []
@@ -129,7 +133,7 @@ def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.V
 
 
 def handing(name: str, doc: str, handed: Sequence[Handed], layout: RowLayout) -> ir.Function:
-    """Return the second loop: each site adds the cotangents that its neighbours have stored."""
+    """Return the second loop of a transposed function: each site adds the contributions of its neighbours."""
     pointers, added = _added_up("handed", handed, layout)
     head = [_pointer("bar", "bar", k, layout) for k in dict.fromkeys(h.base for h in handed)]
     return ir.Function(name, doc, Role.OTHER, ("row",), (*pointers, *head, over_sites(added)))
@@ -138,7 +142,7 @@ def handing(name: str, doc: str, handed: Sequence[Handed], layout: RowLayout) ->
 def _added_up(
     prefix: str, handed: Sequence[Handed], layout: RowLayout
 ) -> tuple[list[ir.Statement], list[ir.Statement]]:
-    """Return the pointers to the cotangents that neighbours store for a site, and their additions."""
+    """Return the pointers to the contributions that neighbours store for a site, and the statements that add them."""
     sums: dict[int, ir.Value] = {}
     pointers: dict[str, ir.Statement] = {}
     open_rows = prefix == "received" and any(layout.lattice.step.sites.open[:-1])
@@ -160,7 +164,7 @@ def _added_up(
 def in_batches(
     body: ir.Block, shares: Sequence[ir.Reduce], layout: RowLayout, colour: int | None
 ) -> Iterator[ir.Statement]:
-    """Yield the loop over sites; for sums over sites each site of a batch has its own partial sum."""
+    """Yield the loop over sites; in sums over sites, each site of a batch has its own partial sum."""
     swept = ir.Constant(colour)
     if not shares:
         yield of_colour(body, colour, swept, layout, limit="end")
@@ -179,7 +183,7 @@ def in_batches(
 
 
 def in_vectors(body: ir.Block, shares: Sequence[ir.Reduce]) -> Iterator[ir.Statement]:
-    """Yield the loops over vectors of 8 sites, then over the remaining sites; partial sums stay in registers."""
+    """Yield the loops over SIMD vectors of 8 sites and over the remaining sites; partial sums stay in registers."""
     names = [ir.fixed(f"share{k}") for k in range(len(shares))]
     yield ir.vectors(ir.Vector(ir.Constant(8)), *names, value=ir.Listed((ZERO,)))
     rest = ir.Binary("%", ir.Binary("-", INDEX_TO, FROM), ir.Constant(8))
@@ -205,10 +209,10 @@ def _totals(shares: Sequence[ir.Reduce], function: str, *arguments: ir.Value) ->
 
 @dataclass(frozen=True)
 class BondTranspose:
-    """The transpose of a function that sums over bonds or pairs, for sites that are at this ``end``.
+    """The transpose of a function for sums over bonds or pairs, for the sites at the end ``end``.
 
-    The cotangents of the ``count`` sums are in arrays from ``sums_from`` on. Parameters at bonds that are
-    ``oriented`` change their sign when seen from the end b.
+    The cotangents of its ``count`` sums are in the arrays from number ``sums_from`` on. The ``oriented`` parameters at
+    bonds change their sign when seen from the end b.
     """
 
     function: ir.Function
@@ -219,12 +223,12 @@ class BondTranspose:
 
     @property
     def updates(self) -> list[ir.Update]:
-        """The values that are added up."""
+        """The stores and additions in the loop of the function."""
         return [s for s in self.function.loop.body if isinstance(s, ir.Update)]
 
 
 def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
-    """Return the transpose of a function that sums over bonds or pairs."""
+    """Return the transpose of a function for sums over bonds or pairs, by rows."""
     updates, first = transpose.updates, transpose.sums_from
     arrays = [ir.fixed(f"handed_{first + k}") for k in range(transpose.count)]
     reading = Reading(seeds={HERE: arrays}, here=transpose.end, oriented=transpose.oriented)
@@ -246,9 +250,10 @@ def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
 
 
 def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
-    """Return the loop over sites, and in it over their bonds.
+    """Return the loop over sites with an inner loop over the bonds of each site.
 
-    Contributions to a sum over all sites are first summed at each site, so that few additions depend on one another.
+    Contributions to a sum over all sites are first added up at each site, which makes the chain of dependent additions
+    shorter.
     """
     updates = transpose.updates
     at_bonds = {k: s.array for k, s in enumerate(updates) if isinstance(s, ir.Store) and s.end == "bond"}
@@ -268,10 +273,10 @@ def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
 
 
 def _over_pairs(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
-    """Return the loop over batches of sites, and in it over all other sites.
+    """Return the loop over batches of sites with an inner loop over all other sites.
 
-    Batches are whole vectors of 8, for which rows have room. For each pair all summands are computed before one is
-    added, since gcc would not vectorise the loop otherwise.
+    Batches are whole SIMD vectors of 8, for which rows have room. For each pair, all terms are computed before one is
+    added, since gcc does not vectorise the loop otherwise.
     """
     updates = transpose.updates
     first, left, count, batch = ir.fixed("first"), ir.fixed("left"), ir.fixed("count"), ir.Constant(PAIR_BATCH)
@@ -294,7 +299,7 @@ def _over_pairs(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
         ir.vectors(ir.Vector(batch), *partial_sums),
         _lanes(count, tuple(ir.Assign(place, ZERO) for place in places)),
         others,
-        _lanes(left, tuple(stores), note="beyond are numbers, but no sites"),
+        _lanes(left, tuple(stores), note="the remaining entries belong to no site"),
     )
     return ir.Loop("plain", body, "first", FROM, TO, limit="to", step=batch)
 
@@ -304,7 +309,7 @@ def _lanes(count: ir.Value, body: ir.Block, *, independent: str = "", note: str 
 
 
 def _into(s: ir.Update, k: int, site: ir.Value, value: ir.Value) -> ir.Assign:
-    """Return the statement that adds a sum over bonds or pairs to a cotangent, or stores it as a sum at a site."""
+    """Return the statement that adds the sum of a site over bonds or pairs to a cotangent, or stores it at the site."""
     if isinstance(s, ir.Reduce):
         return ir.Assign(ir.fixed(f"share{k}"), value, adds=True)
     if s.array.storage is Storage.SUM:
@@ -317,7 +322,8 @@ def _zero(name: str) -> ir.Declare:
 
 
 def _pointer(prefix: str, member: str, k: int, layout: RowLayout | None, kind: ir.Pointer = WRITTEN) -> ir.Declare:
-    """Return the declaration of the pointer to an array of a member of the row; with a layout, to its row there."""
+    """Return the declaration of the pointer to array ``k`` in a member of the row record; with a layout, to its row
+    there."""
     array = ir.entry(ir.Member(ROW, member), k)
     return ir.Declare(kind, ((ir.fixed(f"{prefix}_{k}").symbol, layout.row(array) if layout else array),))
 

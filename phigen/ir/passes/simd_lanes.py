@@ -1,6 +1,6 @@
-"""SIMD lanes: a straight-line function evaluated at several points at once, or at one of these points.
+"""SIMD lanes: straight-line functions that are evaluated at several points together.
 
-Each array gets an inner index over the lanes, unless all lanes share it.
+Each array gets an inner index over the lanes, except for arrays that all lanes share.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ LANE, DISTINCT_COEF, LANES = ir.fixed("lane"), ir.fixed("distinct_coef"), ir.fix
 def in_lanes(
     function: ir.Function, shared: Set[str], alike: Set[str] = frozenset(), *, single: bool = False
 ) -> ir.Function:
-    """Return the function as a loop over all lanes; a ``single`` one is evaluated at the lane that callers pass.
+    """Return the function as a loop over all lanes; with ``single``, for one lane, whose number callers pass.
 
-    Arrays that are ``shared`` have one value for all lanes; those ``alike`` have one if ``distinct_coef`` is 0, an
-    argument of the function.
+    The arrays ``shared`` have one value for all lanes. The arrays ``alike`` have one value if the parameter
+    ``distinct_coef`` of the function is 0.
     """
 
     def at_lane(value: ir.Value) -> ir.Value:

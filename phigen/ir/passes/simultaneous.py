@@ -1,4 +1,4 @@
-"""Simultaneous updates: all increments of a sweep are computed before any field is updated."""
+"""Simultaneous updates: all increments of a sweep at a site are computed before any field is updated."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from phigen.ir.walk import map_blocks
 
 
 def simultaneous(function: ir.Function) -> ir.Function:
-    """Return a sweep with a name for each increment, if there are several; other functions unchanged."""
+    """Return a sweep with a variable for each of its increments; functions with one increment are unchanged."""
     if not function.role.is_sweep:
         return function
 

@@ -1,4 +1,4 @@
-"""Statements that add values up, also with compensation, or find the largest or smallest; NaN propagates."""
+"""Statements for sums, compensated sums, and the largest or smallest of several values, in which NaN propagates."""
 
 from __future__ import annotations
 
@@ -6,18 +6,17 @@ from collections.abc import Iterator
 
 from phigen.ir import nodes as ir
 
-#: The comparison by which a value replaces the present extreme.
+#: Operator by which a value is compared with the current extreme.
 _COMPARISONS = {"max": ">", "min": "<"}
 
 
 def limit(extreme: str, infinity: str) -> ir.Name:
-    """Return the initial value of an extreme, which every other value replaces; ``infinity`` is its name in the
-    language."""
+    """Return the initial value of an extreme, ∞ or −∞; ``infinity`` is the name of ∞ in the language."""
     return ir.fixed(infinity if extreme == "min" else f"-{infinity}")
 
 
 def updates(s: ir.Store, place: ir.Value, value: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statements that take a value into the sum, or the extreme, at a place, or that assign it."""
+    """Yield the statements by which a store updates a place: sum, extreme, or assignment."""
     if not s.extreme:
         yield ir.Assign(place, value, s.adds)
         return
@@ -29,7 +28,8 @@ def updates(s: ir.Store, place: ir.Value, value: ir.Value) -> Iterator[ir.Statem
 
 
 def compensated_sum(k: int, field: ir.Value, compensation: ir.Value, increment: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statements of compensated sum number k; the rounding error goes into the compensation term."""
+    """Yield the statements of compensated sum ``k``: the field gets the increment, and the compensation term the
+    rounding error."""
     add, total = ir.fixed(f"add{k}"), ir.fixed(f"sum{k}")
     items = ((add.symbol, ir.Accumulated(compensation, increment)), (total.symbol, ir.Binary("+", field, add)))
     yield ir.Declare(ir.Type.REAL, items)

@@ -1,6 +1,6 @@
-"""Temporaries: expression graphs become statements.
+"""Temporaries: expression graphs are divided into statements.
 
-Powers become products, shared or long values get names, and declarations that nothing reads disappear.
+Integer powers become products, shared or long values get variables, and declarations that nothing reads are removed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from phigen.symbolic.expression import Expression
 
 
 def temporaries(function: ir.Function) -> ir.Function:
-    """Return the function with named temporaries and without unread declarations."""
+    """Return the function with variables for shared and long values, and without unread declarations."""
     function = map_blocks(function, _named)
     read = names_in(tuple(s.value for s in statements(function.body) if isinstance(s, ir.Update)))
 

@@ -1,4 +1,4 @@
-"""Lowering to whole arrays: each statement works on all sites, all bonds or all pairs, without loops."""
+"""Lowering to whole arrays: each statement works on the arrays of all sites, bonds or pairs, without loops."""
 
 from __future__ import annotations
 
@@ -15,38 +15,38 @@ from phigen.symbolic.symbols import HERE
 X, V, SITES, NP, BAR, COLOUR, BOND, SUMS, MOVED, OUT, AXIS = (
     ir.fixed(n) for n in ("x", "v", "sites", "np", "bar", "colour", "bond", "sums", "moved", "out", ":, None")
 )
-#: The arrays of each kind of storage.
+#: Names of the arrays of each kind of storage.
 _ARRAYS = {Storage.STATE: "x", Storage.VARIATION: "v", Storage.START: "start", Storage.SUM: "gathered"}
 _ARRAYS |= {Storage.COTANGENT: "bar", Storage.START_COTANGENT: "start_bar"}
 
-#: Values that are printed where they are used, without a name.
+#: Values without a variable, which are printed where they are used.
 _IN_PLACE = ir.Coefficient | ir.Time | ir.Inside | ir.HasColour | ir.OnSeam
 _READ_IN_PLACE = (Storage.START, Storage.SUM, Storage.SEED)
 
-#: The further parameters of transposed functions: cotangents, and where they are added.
+#: Further parameters of transposed functions: cotangents, and the results to which derivatives are added.
 _TRANSPOSED = ("bar", "sites", "coef_bar", "parameters_bar")
 
 
 def sums_name(kernel: str) -> str:
-    """Return the name of the function that sums over all bonds or pairs, from the kernel of one of their ends."""
+    """Return the name of the function for all sums over bonds or pairs, by the name of its kernel for one end."""
     base = kernel.removesuffix("_a").removesuffix("_b")
     plain = base.removeprefix("bond_").removeprefix("pair_")
     return {"energy": "energies"}.get(plain, plain)
 
 
 def transposed_sums_name(kernel: str) -> str:
-    """Return the name of the transpose of a summing function, from the kernel of one of the two functions."""
+    """Return the name of the transpose of a function for sums, by the name of its kernel for one end."""
     return kernel.removesuffix("_a").removesuffix("_b") + "_back"
 
 
 @dataclass(frozen=True)
 class WholeArrays:
-    """The lowering of the functions of one lattice, after the pass `phigen.ir.passes.temporaries`."""
+    """The lowering of the functions of a lattice, which follows the pass `phigen.ir.passes.temporaries`."""
 
     lattice: LatticeLoops
 
     def sweep(self, function: ir.Function) -> ir.Function:
-        """Return a sweep as a function from a state, or from its variation, to the next."""
+        """Return a sweep as a function from a state, or for a tangent sweep from a variation, to the next one."""
         loop, array = function.loop, V if function.role is Role.SWEEP_TANGENT else X
         body = [*_unless_beside(loop, array), *self._sums(function), *self._reads(function), *_copied(MOVED, array)]
         for s in loop.stores:
@@ -58,7 +58,7 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(MOVED)))
 
     def stage(self, function: ir.Function) -> ir.Function:
-        """Return a kernel of the equation of a stage as a function of y, named x, and of x, named start."""
+        """Return a kernel of the stage equation as a function of its unknown y (the parameter x) and of its start."""
         shape = ir.Member(SITES, "sizes")
         values = (ir.Called("broadcast_to", (s.value, shape), NP) for s in function.loop.stores)
         result = ir.Return(ir.Called("array", (ir.Listed(tuple(values)),), NP))
@@ -78,7 +78,7 @@ class WholeArrays:
         return replace(function, parameters=("parameters", "x", *varied, "sites"), body=(*body, ir.Return(OUT)))
 
     def sums(self, functions: Sequence[ir.Function]) -> ir.Function:
-        """Return one function for the sums over bonds or pairs of several functions, such as those for both ends."""
+        """Return one function for the sums of several functions, such as those for the two ends of bonds."""
         body: list[ir.Statement] = []
         for function in functions:
             loop = function.loop
@@ -94,7 +94,8 @@ class WholeArrays:
     # ---- transposes
 
     def transposed_sweep(self, function: ir.Function, updated: Sequence[int]) -> ir.Function:
-        """Return a function from the cotangent after a sweep to the cotangent before, at the state before it."""
+        """Return a function from the cotangent after a sweep to the cotangent before, at the state ``x`` before the
+        sweep."""
         loop = function.loop
         seeds = (_chosen(loop.selection, ir.entry(BAR, k), ir.Constant(0.0)) for k in updated)
         body = [*_unless_beside(loop, BAR), ir.real(ir.fixed("change_bar"), ir.Listed(tuple(seeds)))]
@@ -105,7 +106,11 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(BAR)))
 
     def transposed_stage(self, function: ir.Function, seed: str) -> ir.Function:
-        """Return a function from a cotangent to the cotangents of y, named x, and of the start of a stage."""
+        """Return the transpose of a kernel of the stage equation.
+
+        It is a function of the cotangent ``seed`` that returns the cotangents of the unknown y and of the start of a
+        stage.
+        """
         zeros, both = ir.Called("zeros_like", (X,), NP), (BAR, ir.fixed("start_bar"))
         body = [
             *self._sums(function),
@@ -118,7 +123,7 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(ir.Several(both))))
 
     def transposed_sums(self, functions: Sequence[ir.Function], name: str) -> ir.Function:
-        """Return the function that maps cotangents of sums over bonds or pairs to those of their arguments."""
+        """Return the function from cotangents of sums over bonds or pairs to the cotangents of the state."""
         end = "here" if self.lattice.step.others.graph else AXIS.text
         body: list[ir.Statement] = []
         for function in functions:
@@ -129,7 +134,7 @@ class WholeArrays:
         return replace(functions[0], name=name, parameters=parameters, body=(*body, ir.Return(BAR)))
 
     def _transposed_sums(self, function: ir.Function, source: ir.Value) -> Iterator[ir.Statement]:
-        """Yield the call that maps cotangents of sums over bonds or pairs to those of their arguments."""
+        """Yield the call of the transpose of the function for sums that ``function`` reads."""
         for s in function.body:
             if isinstance(s, ir.GatherSums):
                 stores = [c for c in function.loop.stores if c.array.storage is Storage.SUM_COTANGENT]
@@ -140,7 +145,7 @@ class WholeArrays:
                 yield ir.Assign(BAR, ir.Called(called, (source, X, ir.Listed(tuple(listed)), *rest)))
 
     def _added_cotangents(self, loop: ir.Loop) -> Iterator[ir.Statement]:
-        """Yield the statements that add cotangents at the places that the values were read from."""
+        """Yield the statements that add cotangents at the sites from which the values were read."""
         for s in loop.body:
             match s:
                 case ir.Reduce(source, number, name, value):
@@ -157,7 +162,7 @@ class WholeArrays:
                     yield ir.Assign(into, self._returned(loop, s, value), adds=True)
 
     def _returned(self, loop: ir.Loop, s: ir.Store, value: ir.Value) -> ir.Value:
-        """Return a cotangent at the sites that the value was read from."""
+        """Return a cotangent, shifted or summed to the sites from which its value was read."""
         if s.end and loop.kind == "bonds":
             return ir.Called("summed", (value, ir.fixed("here" if s.end == "a" else "there")), SITES)
         if s.end:
@@ -168,7 +173,7 @@ class WholeArrays:
         return value
 
     def _everywhere(self, loop: ir.Loop, value: ir.Value) -> ir.Value:
-        """Return a value as an array over all sites, bonds or pairs; it may be a single number."""
+        """Return a value, which may be a single number, as an array over all sites, bonds or pairs."""
         match loop.kind:
             case "bonds":
                 return ir.Called("broadcast_to", (value, ir.Member(ir.fixed("here"), "shape")), NP)
@@ -202,7 +207,7 @@ class WholeArrays:
             yield ir.Unpack(("here", "there", "bond"), ir.Called("bonds", which, SITES))
 
     def _summed(self, s: ir.Store, selection: ir.Selection) -> ir.Value:
-        """Return the sum, or the extreme, of a value of bonds or pairs at each site."""
+        """Return the sum, or the extreme, at each site of a value of bonds or pairs."""
         graph = self.lattice.step.others.graph
         if s.extreme:
             choose = ir.fixed({"max": "np.maximum", "min": "np.minimum"}[s.extreme])
@@ -217,7 +222,7 @@ class WholeArrays:
         return ir.Called("_over_others", (s.value, SITES))
 
     def _reads(self, function: ir.Function) -> Iterator[ir.Statement]:
-        """Yield the declarations of a function, those in its loop last."""
+        """Yield the declarations of a function, then those in its loop."""
         for s in (*function.body, *function.loop.body):
             match s:
                 case ir.Declare(items=((name, value),)):
@@ -254,7 +259,7 @@ class WholeArrays:
         return value
 
     def _load(self, array: ir.Array, offset: Sequence[int], end: str) -> ir.Value:
-        """Return an array at the sites that a function reads."""
+        """Return an array at the offset, or at the end of bonds or pairs, at which a function reads it."""
         fields, increments = self.lattice.program.coordinates, self.lattice.step.sites.increments
         storage, number = ir.fixed(_ARRAYS.get(array.storage, array.name)), ir.Constant(array.number)
         whole: ir.Value = ir.Entry(storage, number)
@@ -272,7 +277,7 @@ class WholeArrays:
 
 
 def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
-    """Yield the functions; one that equals an earlier one but for its colour or window calls the earlier one."""
+    """Yield the functions; those that only differ from an earlier one by colour or window call the earlier one."""
     first: dict[ir.Block, ir.Function] = {}
     for function in functions:
         known = first.setdefault(function.body, function)
@@ -285,7 +290,7 @@ def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
 
 
 def _split(stores: Sequence[ir.Store]) -> tuple[list[ir.Store], list[ir.Store]]:
-    """Return the stores that assign, and those that add."""
+    """Return the stores that assign, and the stores that add."""
     return [s for s in stores if not s.adds], [s for s in stores if s.adds]
 
 
@@ -298,14 +303,15 @@ def _copied(name: ir.Name, value: ir.Value) -> Iterator[ir.Statement]:
 
 
 def _unless_beside(loop: ir.Loop, unchanged: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statement that skips a sweep on boundary seams where the colours fit the sizes."""
+    """Yield the statement that skips a sweep over boundary seams if there are none, because the sizes fit the
+    colours."""
     if loop.selection.window is not None:
         beside = ir.Called("any", (), ir.Member(SITES, "beside"))
         yield ir.If(ir.Prefix("not", beside), (ir.Return(unchanged),))
 
 
 def _chosen(selection: ir.Selection, new: ir.Value, old: ir.Value) -> ir.Value:
-    """Return the new value at the sites of a selection, the old one elsewhere."""
+    """Return a value that is ``new`` at the sites of a selection and ``old`` elsewhere."""
     if selection.window is not None:
         return ir.Select(ir.Member(SITES, "beside"), new, old)
     if selection.first:
@@ -317,7 +323,7 @@ def _chosen(selection: ir.Selection, new: ir.Value, old: ir.Value) -> ir.Value:
 
 
 def _argument(selection: ir.Selection) -> tuple[str, ...]:
-    """Return the parameter that selects the sites that a sweep updates, with its default."""
+    """Return the parameter that selects the sites of a sweep, with its default; () if the sweep updates all sites."""
     if selection.window is not None:
         return (f"window={selection.window}",)
     return () if selection.colour is None else (f"colour={selection.colour}",)

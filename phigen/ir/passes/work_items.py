@@ -1,4 +1,4 @@
-"""Lowering to work items of a device: each computes the values of one site, of fields that are in one array."""
+"""Lowering to work items of a device: each work item computes the values of one site; one array has all fields."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from phigen.ir.passes.sites import COUNT, OTHER, SITE, of_array, over_pairs
 from phigen.ir.passes.sums import compensated_sum, limit, updates
 from phigen.symbolic.symbols import Symbol
 
-#: Index of the bond among those of a site.
+#: Index of a bond among the bonds of a site.
 BOND = ir.fixed("b")
 
-#: The first arguments of all kernels, before the arrays.
+#: First parameters of all kernels; the arrays follow.
 ARGUMENTS = ("items", "count", "sites", "coefficients", "first")
 
-#: Arrays of a kernel by their names, in the order of its arguments: see the comment above the kernels in
+#: Array parameters of kernels by name, in their order; see the comment above the kernels in
 #: ``templates/c/device_lattice.h.jinja``.
 _ARRAYS = ("neighbours", "weights", "on_seams", "at_sites", "dw", "x", "start", "varied", "out")
 _OF_GRAPHS = ("starts", "others", "at_bonds", "colours", "colour")
 _OF_SUMS = ("sums", "adds")
 
-#: Names used by kernels; fields and parameters with these names are renamed.
+#: Names that kernels use; fields and parameters of the spec with these names are renamed.
 KERNEL_NAMES = (*ARGUMENTS, *_ARRAYS, *_OF_GRAPHS, *_OF_SUMS, "coef", "i", "j", "b", "k")
 
-#: The arrays of outputs, and others, by their kinds.
+#: Names of the arrays in which results are stored, by kind of storage.
 _STORED = {ir.Storage.OUTPUT: "out", ir.Storage.OBSERVABLE: "out", ir.Storage.SUM: "sums"}
 _STORED |= {ir.Storage.START: "start", ir.Storage.VARIATION: "varied", ir.Storage.STATE: "x"}
 
 
 def kernel_arrays(lattice: LatticeLoops) -> tuple[str, ...]:
-    """Return the arrays that are arguments of all kernels of a lattice, in order."""
+    """Return the names of the array parameters of all kernels of a lattice, in order."""
     step = lattice.step
     absent = {
         "on_seams": not lattice.seams,
@@ -59,13 +59,14 @@ def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 
 @dataclass
 class _WorkItems:
-    """The lowering of one function; ``declared`` are the neighbours that already have a name."""
+    """The lowering of one function; ``declared`` are the neighbours that have a variable already."""
 
     lattice: LatticeLoops
     declared: set[int] = field(default_factory=set)
 
     def loop(self, loop: ir.Loop) -> Iterator[ir.Statement]:
-        """Yield the statements of the site of the work item for a loop; one over bonds or pairs stays a loop."""
+        """Yield the statements of a work item for a loop: those of its site, or a loop over the bonds or pairs of its
+        site."""
         if loop.kind == "sites":
             yield from (new for s in loop.body for new in self.lowered(s))
             return
@@ -81,7 +82,7 @@ class _WorkItems:
         yield from (ir.Assign(self._element(s.array, SITE), total) for s, total in zip(stores, totals, strict=True))
 
     def lowered(self, s: ir.Statement) -> Iterator[ir.Statement]:
-        """Lower a statement on sites to statements on memory."""
+        """Yield a statement on the level of sites as statements on the level of memory."""
         match s:
             case ir.Store(array, value, adds):
                 yield from self._stored(array, value, adds=adds)

@@ -1,4 +1,4 @@
-"""Zeros among the outputs of a kernel: arrays with many of them are cleared first, or no zeros are stored."""
+"""Zeros among the outputs of a kernel: arrays with many zeros are cleared first, or zeros are not stored at all."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from collections import Counter
 from phigen.ir import nodes as ir
 from phigen.symbolic.expression import Expression
 
-#: Number of entries of an array that are always zero, from which on the array is cleared in one statement.
+#: Least number of zeros in an array that is cleared by one statement.
 MANY_ZEROS = 6
 
 
 def zeros_first(function: ir.Function) -> ir.Function:
-    """Return the function with arrays of many zeros cleared before their first store, and without stores of these."""
+    """Return the function in which arrays with many zeros are cleared before their first store, without stores of their
+    zeros."""
     zeros = Counter(stored_array(s) for s in function.body if _is_zero(s))
     sizes = Counter(stored_array(s) for s in function.body)
     cleared = {array for array, count in zeros.items() if count >= MANY_ZEROS}
@@ -33,7 +34,7 @@ def without_zeros(function: ir.Function) -> ir.Function:
 
 
 def stored_array(s: ir.Statement) -> str:
-    """Return the name of the array that a statement stores to or clears, or nothing."""
+    """Return the name of the array that a statement stores to or clears; "" for other statements."""
     place = s.target if isinstance(s, ir.Assign) else s if isinstance(s, ir.Clear) else None
     array = place.array if isinstance(place, ir.Entry | ir.Clear) else None
     return array.text if isinstance(array, ir.Name) else ""

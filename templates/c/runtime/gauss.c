@@ -110,7 +110,7 @@ static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads
     double(*last)[PHI_WIDTH] = past->increments[past->latest], (*older)[PHI_WIDTH] = past->increments[1 - past->latest];
     if (predictor + 1 < PHI_PREDICTORS)
         for (int r = 0; r < PHI_READS; ++r) phi_mix_twice(phi_prediction[predictor], last[PHI_READ(r)], older[PHI_READ(r)], reads[r]);
-    else /* the last one reads the last step only */
+    else /* the last predictor reads one step only */
         for (int r = 0; r < PHI_READS; ++r) phi_mix(phi_prediction[predictor], last[PHI_READ(r)], reads[r]);
 }
 

@@ -13,13 +13,13 @@ static inline void phi_set_factors(double h, phi_lanes factors[PHI_FACTORS])
     for (int i = 0; i < PHI_WIDTH; ++i) factors[2][i] = h;
 }
 
-/* What the next sweep reads, by these increments. */
+/* Compute the values that the next sweep reads, from the increments. */
 static inline void phi_read(phi_lanes *now, phi_lanes *reads)
 {
     for (int r = 0; r < PHI_READS; ++r) phi_mix(phi_doubled, now[phi_reads[r]], reads[r]);
 }
 
-/* The increments of all unknowns, by those of the iterated ones and what the last sweep read. */
+/* Compute the increments of all unknowns, from those of the iterated ones and the values that the last sweep read. */
 static void phi_complete_stages(const phi_solver *s, double point[PHI_POINT], phi_lanes *factors, phi_lanes *now, phi_lanes *reads,
     phi_lanes *increments)
 {
