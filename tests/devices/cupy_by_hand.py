@@ -1,7 +1,9 @@
 """The part of CuPy that phigen calls, without a card: kernels of CUDA text, compiled by g++, run on the processor.
 
 Argument checks are those of CuPy 14: `set` and `get` need arrays of the same type and shape, and kernels take arrays of
-the device, scalars of NumPy, and structs (arrays of size one) by value. NVRTC compiles the text too.
+the device, scalars of NumPy, and structs (arrays of size one) by value. Beyond CuPy, the number of arguments and their
+sizes are compared with the kernel, and arrays must be those of the current device. As on a card, copies to the device
+and kernels are executed in their order, but not before a `get` waits for them. NVRTC compiles the text too.
 """
 
 import ctypes
@@ -10,6 +12,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import nvrtc
@@ -31,6 +34,14 @@ LAUNCH = """
 #include <utility>
 template <class... A, std::size_t... K>
 static void with(void (*kernel)(A...), void **passed, std::index_sequence<K...>) { kernel(*(A *)passed[K]...); }
+template <class... A> static int misfit(void (*)(A...), int count, const unsigned long *sizes)
+{
+    const unsigned long expected[] = { sizeof(A)... };
+    if (count != sizeof...(A)) return -1;
+    for (int k = 0; k < count; ++k)
+        if (sizes[k] != expected[k]) return k + 1;
+    return 0;
+}
 template <class... A> static void launch(void (*kernel)(A...), unsigned grid, unsigned block, void **passed)
 {
     blockDim.x = block;
@@ -58,39 +69,54 @@ class CompileException(Exception):  # noqa: N818  (its name in CuPy)
 
 
 class Device:
-    """A context of a device."""
+    """A context of a device; ``current`` are the numbers of the devices that were entered."""
+
+    current = (0,)
 
     def __init__(self, device=None):
         self.id = device
 
     def __enter__(self):
+        Device.current = (*Device.current, self.id)
         return self
 
     def __exit__(self, *args):
-        pass
+        Device.current = Device.current[:-1]
+
+
+#: Work that was passed to the devices and is not done: functions without arguments.
+_STREAM = []
+
+
+def _finish():
+    while _STREAM:
+        _STREAM.pop(0)()
 
 
 class ndarray:  # noqa: N801  (its name in CuPy)
     """Bytes of the device; they must be copied explicitly."""
 
-    def __init__(self, host):
-        self.host, self.dtype, self.shape = host, host.dtype, host.shape
+    def __init__(self, host, device):
+        self.host, self.dtype, self.shape, self.device = host, host.dtype, host.shape, device
 
     def __getitem__(self, part):
-        return ndarray(self.host[part])
+        return ndarray(self.host[part], self.device)
 
     def set(self, arr, stream=None):
         self._expect(arr)
-        self.host[...] = arr
+        staged = arr.copy()
+        _STREAM.append(lambda: self.host.__setitem__(..., staged))
 
     def get(self, stream=None, order="C", out=None, blocking=True):
         self._expect(out)
         if not out.flags.c_contiguous:
             raise RuntimeError("`out` cannot be specified when copying to non-contiguous ndarray")
+        _finish()
         out[...] = self.host
         return out
 
     def _expect(self, arr):
+        assert self.device == Device.current[-1], "an array of another device"
         if not isinstance(arr, np.ndarray) or arr.dtype != self.dtype:
             raise TypeError(f"{arr!r} cannot be copied")
         if arr.shape != self.shape:
@@ -100,21 +126,28 @@ class ndarray:  # noqa: N801  (its name in CuPy)
 def empty(shape, dtype=float, order="C"):
     host = np.empty(shape, dtype)
     host.view(np.uint8)[...] = 0xAA  # no kernel may rely on zeros
-    return ndarray(host)
+    return ndarray(host, Device.current[-1])
 
 
 class RawKernel:
-    """A kernel of a module."""
+    """A kernel of a module; ``launched`` are the numbers of the devices of launches."""
 
-    def __init__(self, function, group):
-        self._function, self.max_threads_per_block, self.local_size_bytes = function, group, 0
+    launched: ClassVar = []
+
+    def __init__(self, function, misfit, group):
+        self._function, self._misfit = function, misfit
+        self.max_threads_per_block, self.local_size_bytes = group, 0
 
     def __call__(self, grid, block, args, *, shared_mem=0):
         assert all(type(size) is int and size > 0 for size in (*grid, *block))
         assert block[0] <= self.max_threads_per_block, "CUDA_ERROR_INVALID_VALUE"
+        assert all(a.device == Device.current[-1] for a in args if isinstance(a, ndarray)), "an array of another device"
+        RawKernel.launched.append(Device.current[-1])
         held = [_passed(a) for a in args]
+        sizes = (ctypes.c_ulong * len(held))(*(h.nbytes for h in held))
+        assert self._misfit(len(held), sizes) == 0, f"arguments of {[h.nbytes for h in held]} bytes"
         pointers = (ctypes.c_void_p * len(held))(*(h.ctypes.data for h in held))
-        self._function(*grid, *block, pointers)
+        _STREAM.append(lambda: (self._function(*grid, *block, pointers), args, held)[0])
 
 
 def _passed(argument):
@@ -145,7 +178,9 @@ class RawModule:
         assert "--fmad=false" in self.options
         kernels = re.findall(r"^\w+_KERNEL void (\w+)\(", self.code, re.MULTILINE)
         calls = [
-            f'extern "C" void launch_{k}(unsigned g, unsigned b, void **p) {{ launch({k}, g, b, p); }}' for k in kernels
+            f'extern "C" void launch_{k}(unsigned g, unsigned b, void **p) {{ launch({k}, g, b, p); }}\n'
+            f'extern "C" int misfit_{k}(int n, const unsigned long *s) {{ return misfit({k}, n, s); }}'
+            for k in kernels
         ]
         text = "\n".join([WORDS, self.code, LAUNCH, *calls])
         with tempfile.TemporaryDirectory() as folder:
@@ -162,11 +197,12 @@ class RawModule:
     def get_function(self, name):
         (group,) = {int(size) for size in re.findall(r"^#define \w+_GROUP (\d+)", self.code, re.MULTILINE)}
         group = next((int(o.split("=")[1]) for o in self.options if "_GROUP=" in o), group)
-        return RawKernel(getattr(self._library, f"launch_{name}"), group)
+        return RawKernel(getattr(self._library, f"launch_{name}"), getattr(self._library, f"misfit_{name}"), group)
 
 
-def module():
-    """Return the module that takes the place of the package cupy."""
+def module(cards=1):
+    """Return the module that takes the place of the package cupy, on a machine with some cards."""
+    _STREAM.clear()
     cupy = ModuleType("cupy")
     properties = {
         "name": b"Emulated card",
@@ -176,7 +212,7 @@ def module():
     }
     cupy.cuda = SimpleNamespace(
         runtime=SimpleNamespace(
-            getDeviceCount=lambda: 1,
+            getDeviceCount=lambda: cards,
             getDeviceProperties=lambda device: properties,
             CUDARuntimeError=CUDARuntimeError,
         ),

@@ -66,7 +66,10 @@ def test_faults_of_a_card_are_reported_and_lose_no_members(cupy, monkeypatch):
     device, c = both(compile_text(BODY))
     x0 = np.random.default_rng(2).standard_normal((100, 3)) + 1
     expected, call = c.ensemble(x0, 0.1, 5), cupy_by_hand.RawKernel.__call__
-    failing, launches = [cupy_by_hand.CUDADriverError("CUDA_ERROR_LAUNCH_OUT_OF_RESOURCES: too many")], []
+    failing = [
+        cupy_by_hand.CUDADriverError(f"CUDA_ERROR_{word}") for word in ("OUT_OF_MEMORY", "LAUNCH_OUT_OF_RESOURCES")
+    ]
+    launches = []
 
     def launch(kernel, grid, block, args, **others):
         launches.append(grid)
@@ -76,20 +79,60 @@ def test_faults_of_a_card_are_reported_and_lose_no_members(cupy, monkeypatch):
 
     monkeypatch.setattr(cupy_by_hand.RawKernel, "__call__", launch)
     np.testing.assert_array_equal(device.ensemble(x0, 0.1, 5), expected)
-    assert len(launches) == 4  # the coefficients, all members, and two halves
+    assert launches == [(1,)] * 7  # the coefficients, all members, half of them, and four quarters
     launches.clear()
     failing += [cupy_by_hand.CUDADriverError("CUDA_ERROR_ILLEGAL_ADDRESS: an illegal memory access")]
-    with pytest.raises(DeviceError, match=r"Emulated card: the device was lost.*ILLEGAL_ADDRESS"):
+    with pytest.raises(
+        DeviceError, match=r"(?s)Emulated card: the device was lost.*ILLEGAL_ADDRESS.*start Python again"
+    ):
         device.ensemble(x0, 0.1, 5)
     full = cupy_by_hand.OutOfMemoryError("Out of memory allocating 4,194,304 bytes")
     monkeypatch.setattr(cupy, "empty", lambda *a, **k: (_ for _ in ()).throw(full))
-    with pytest.raises(DeviceError, match=r"too little memory for 1 members: Out of memory"):
+    with pytest.raises(DeviceError, match=r"Emulated card has too little memory for one member: Out of memory"):
         device.ensemble(x0, 0.1, 5)
 
 
 def test_text_that_nvrtc_refuses_is_an_error_with_its_messages(cupy):
     with pytest.raises(DeviceError, match=r"Emulated card: NVRTC refuses the generated code\n.*error"):
         cuda.device().compiled("nonsense", {})
+
+
+@pytest.mark.slow
+def test_a_second_card_has_arrays_and_kernels_of_its_own(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cupy", cupy_by_hand.module(cards=2))
+    monkeypatch.setattr(cuda, "_OPENED", {})
+    compilation = compilation_of(compile_text(BODY), profile="small")
+    x0 = np.random.default_rng(2).standard_normal((10, 3)) + 1
+    expected = phigen.compile(compilation, "c", profile="small").ensemble(x0, 0.1, 5)
+    for index in (1, 0):
+        solver = phigen.compile(compilation, "cuda", profile="small", device=index)
+        cupy_by_hand.RawKernel.launched.clear()
+        np.testing.assert_array_equal(solver.ensemble(x0, 0.1, 5), expected)
+        assert cupy_by_hand.RawKernel.launched == [index] * 2  # the coefficients, and the members
+    with pytest.raises(
+        TypeError, match="device is '1', but must be a number; the devices of CUDA are 0: Emulated card"
+    ):
+        phigen.compile(compilation, "cuda", profile="small", device="1")
+
+
+def test_without_nvrtc_the_error_says_what_to_install(cupy, monkeypatch):
+    """CuPy finds the library when it compiles for the first time."""
+
+    def absent(module):
+        raise RuntimeError('Failure finding "libnvrtc.so.12"')
+
+    monkeypatch.setattr(cupy_by_hand.RawModule, "compile", absent)
+    with pytest.raises(
+        MissingPackageError, match=r"(?s)Emulated card: NVRTC.*libnvrtc.so.12.*pip install 'phigen\[cuda\]'"
+    ):
+        cuda.device().compiled("", {})
+
+    def unloadable(module):
+        raise cupy_by_hand.CUDADriverError("CUDA_ERROR_NO_BINARY_FOR_GPU")
+
+    monkeypatch.setattr(cupy_by_hand.RawModule, "compile", unloadable)
+    with pytest.raises(DeviceError, match="driver failed: CUDA_ERROR_NO_BINARY_FOR_GPU"):
+        cuda.device().compiled("", {})
 
 
 def test_a_machine_without_a_card_or_driver_is_told_what_to_install(cupy, monkeypatch):

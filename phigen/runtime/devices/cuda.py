@@ -9,13 +9,16 @@ from typing import Any, TypeVar
 import numpy as np
 
 from phigen.errors import DeviceError, MissingPackageError
-from phigen.runtime.devices.device import Opened, OutOfMemoryError, choose
+from phigen.runtime.devices.device import LOST, Opened, OutOfMemoryError, choose
 from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
 
 #: No fused multiply-adds: results have the same bits as those of C.
 _OPTIONS = ("--fmad=false",)
+
+#: Words in errors of drivers for arrays, or launches, that need too much memory or too many registers.
+_MEMORY = ("OUT_OF_MEMORY", "OUT_OF_RESOURCES", "MemoryAllocation")
 
 
 class CUDADevice:
@@ -37,13 +40,19 @@ class CUDADevice:
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
         options = (*_OPTIONS, *(f"-D{name}={value}" for name, value in defined.items()))
-        with self._cupy.cuda.Device(self._index):
+
+        def compile_module() -> Any:
             module = self._cupy.RawModule(code=text, options=options)
-            try:
-                module.compile()
-            except self._cupy.cuda.compiler.CompileException as error:
-                raise DeviceError(f"{self.name}: NVRTC refuses the generated code\n{error}") from error
+            module.compile()
             return module
+
+        try:
+            return self._checked_call(compile_module)
+        except self._cupy.cuda.compiler.CompileException as error:
+            raise DeviceError(f"{self.name}: NVRTC refuses the generated code\n{error}") from error
+        except (RuntimeError, OSError) as error:  # of CuPy's search for the library of NVRTC
+            message = f"NVRTC, the compiler of CUDA, cannot be loaded: {error}\n  hint: pip install 'phigen[cuda]'"
+            raise MissingPackageError(f"{self.name}: {message}") from error
 
     def kernel(self, program: Any, name: str) -> Any:
         """See `phigen.runtime.devices.device.Device`."""
@@ -89,9 +98,9 @@ class CUDADevice:
         except cuda.memory.OutOfMemoryError as error:
             raise OutOfMemoryError(str(error)) from error
         except (cuda.driver.CUDADriverError, cuda.runtime.CUDARuntimeError) as error:
-            if "OUT_OF_RESOURCES" in str(error) or "MemoryAllocation" in str(error):
+            if any(word in str(error) for word in _MEMORY):
                 raise OutOfMemoryError(str(error)) from error
-            raise DeviceError(f"{self.name}: the device was lost, or its driver failed: {error}") from error
+            raise DeviceError(f"{self.name}: {LOST}: {error}") from error
 
 
 _OPENED: Opened = {}

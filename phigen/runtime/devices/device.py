@@ -11,6 +11,9 @@ from phigen.errors import DeviceError
 #: Environment variable that chooses a device, by its number or by a part of its name.
 CHOICE = "PHIGEN_DEVICE"
 
+#: First words of errors after which a device does nothing more in this process.
+LOST = "the device was lost, or its driver failed"
+
 
 class OutOfMemoryError(Exception):
     """A device has too little memory for an array, or for a kernel."""
@@ -78,6 +81,8 @@ def choose(names: Sequence[str], target: str, index: int | None) -> int:
 
     Raises `DeviceError` if there is no such device.
     """
+    if index is not None and not hasattr(index, "__index__"):
+        raise TypeError(f"device is {index!r}, but must be a number; the devices of {target} are {_listed(names)}")
     if index is not None and not 0 <= index < len(names):
         raise DeviceError(f"device is {index}, but {target} has the devices {_listed(names)}")
     requested_device = os.environ.get(CHOICE, "")

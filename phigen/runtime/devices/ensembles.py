@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from phigen import registry
 from phigen.errors import DeviceError, PhigenWarning
 from phigen.runtime.backend import Backend
-from phigen.runtime.devices.device import Device, OutOfMemoryError
+from phigen.runtime.devices.device import CHOICE, Device, OutOfMemoryError
 from phigen.runtime.devices.launching import Kernels
 from phigen.runtime.devices.opening import device_of
 from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface, status_name
@@ -102,24 +102,22 @@ class DeviceSolver:
                 members_done = part.stop
             except OutOfMemoryError as error:
                 if batch == 1:
-                    raise self._failure(
-                        f"too little memory for {batch} members: {error}", final, frames, members_done
-                    ) from None
+                    message = f"{self.device.name} has too little memory for one member: {error}"
+                    hint = f"close programs that use it, or set {CHOICE} to another device"
+                    larger = "take a larger stride, " if members.stride else ""
+                    raise self._failure(message, larger + hint, final, frames, members_done) from None
                 batch //= 2
             except DeviceError as error:
-                raise self._failure(str(error), final, frames, members_done) from error
+                hint = f"start Python again; set {CHOICE} to another device if this one fails again"
+                raise self._failure(str(error), hint, final, frames, members_done) from error
         failures = {int(m): status_name(int(status[m])) for m in np.flatnonzero(status)}
         if frames is not None and members.steps % members.stride:
             frames[-1] = np.where(status[:, np.newaxis] == 0, final, np.nan)
         return members.checked(final if frames is None else frames, failures)
 
-    def _failure(self, message: str, final: Floats, frames: Floats | None, members_done: int) -> DeviceError:
-        hint = (
-            f"members from {members_done} on were not integrated; use fewer members, or a larger stride"
-            if members_done or frames is not None
-            else "take fewer members"
-        )
-        failed = DeviceError(f"{self.interface.name}: {message}\n  hint: {hint}")
+    def _failure(self, message: str, hint: str, final: Floats, frames: Floats | None, members_done: int) -> DeviceError:
+        rest = f"; members from {members_done} on were not integrated" if members_done else ""
+        failed = DeviceError(f"{self.interface.name}: {message}{rest}\n  hint: {hint}")
         failed.trajectory = final if frames is None else frames
         return failed
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from phigen.errors import DeviceError, MissingPackageError
-from phigen.runtime.devices.device import Opened, OutOfMemoryError, choose
+from phigen.runtime.devices.device import LOST, Opened, OutOfMemoryError, choose
 from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
@@ -18,7 +18,6 @@ Result = TypeVar("Result")
 _OPTIONS = ["-w"]
 
 _MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY", "INVALID_BUFFER_SIZE")
-_LOST = "the device was lost, or its driver failed"
 
 
 class OpenCLDevice:
@@ -93,7 +92,7 @@ class OpenCLDevice:
         except self._cl.Error as error:
             if isinstance(error, self._cl.MemoryError) or any(word in str(error) for word in _MEMORY):
                 raise OutOfMemoryError(str(error)) from error
-            raise DeviceError(f"{self.name}: {_LOST}: {error}") from error
+            raise DeviceError(f"{self.name}: {LOST}: {error}") from error
 
 
 _OPENED: Opened = {}
