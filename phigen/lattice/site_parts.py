@@ -148,7 +148,7 @@ class SiteMotion:
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
     """Return the seam along an axis.
 
-    A term reads sites up to ``reach`` apart, and moves sites up to ``moved`` from the site where it begins. The
+    A term reads sites up to ``reach`` apart, and moves sites up to ``separation`` from the site where it begins. The
     equations of motion read no sites farther away, unless brackets depend on sites that they do not couple.
     """
     if period == 1:

@@ -1,4 +1,4 @@
-"""Statements on attitudes: a step conserves the momentum in the other frame, and rotates with the velocity ∇H.
+"""Statements on attitudes: a step conserves a momentum, and rotates with the velocity ∇H.
 
 If x is the momentum in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, and the momentum in space is constant. If x is the
 momentum in space, g₁ = τ g₀, and the momentum in the body is constant. The product of τ and a rotation that fixes x
@@ -133,8 +133,9 @@ def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: E
 
 
 def path_statement(system: System, group: Group) -> Statement:
-    """Return the statement that momenta in the other frame are constant along ṁ = π(m)p with ġ = g·p or p·g.
+    """Return the statement that a momentum is constant along ṁ = π(m)p with ġ = g·p or p·g.
 
+    This is the momentum in space if m is the momentum in the body, and that in the body if m is the momentum in space.
     α and β are the ends of such a path.
     """
     m, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
@@ -300,8 +301,9 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
 def element_statements(
     group: Group, group_element: Vector, p: Vector, start: Vector, end: Vector, *, cayley: bool, positive: Sequence[str]
 ) -> Iterator[Statement]:
-    """Yield the statements that ``group_element`` is the element of p and conserves the momentum in the other frame.
+    """Yield the statements that ``group_element`` is the element of p and conserves a momentum.
 
+    This is the momentum in space if x is the momentum in the body, and that in the body if x is the momentum in space.
     With ``cayley`` the element is written without φ(s/4). ``start`` and ``end`` are the states before and after a
     step. The attitude before the step is any quaternion.
     """

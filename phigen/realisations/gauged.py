@@ -7,8 +7,8 @@ In y_i = ∫ dx_i/g_i(x_i) the tensor is A and the covector g_i(x_i)p_i. With u_
 The flow is elementary, and written without cancellation, for these g:
 
 - ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w and w² = b²/4 − ac;
-with tan if w² is negative; if parameters decide the sign, T = t/(1 − sφ(s)), s = −4w²t², φ as in
-`phigen.symbolic.special`
+  with tan if w² is negative; if parameters decide the sign, T = t/(1 − sφ(s)), s = −4w²t², φ as in
+  `phigen.symbolic.special`
 - bx + c: x + g(x)(e^{bt} − 1)/b, which is the log-canonical realisation for c = 0
 - c e^{kx}: x − log(1 − kt g(x))/k
 - c x^r: x(1 + (1 − r)t g(x)/x)^{1/(1−r)}

@@ -31,7 +31,7 @@ class BiRealisation:
     - ``exact``: false for a truncation, whose steps are Poisson maps only up to the order
     - ``degree``: for a truncation, the degree in p up to which α and β are correct; brackets are up to one degree less
     - ``path``: whether the solver follows the path ṁ = π(m)p (Karasev's construction); then ``alpha`` and ``beta`` are
-    truncated formal series, from which the S_i are computed, and are never evaluated
+      truncated formal series, from which the S_i are computed, and are never evaluated
     - ``inner``: for a pull-back, the system in the other coordinates and its bi-realisation, on which proofs are made
     - ``explanation``: the name and the reason of the choice, for the user; ``reference``: the source of the formulas
     """

@@ -347,7 +347,10 @@ class CLatticeSession:
 
 
 class CLattice:
-    """Back end over the shared library compiled from generated files (name → text). See `phigen.runtime.lattice`."""
+    """Back end over the shared library compiled from generated files (name → text).
+
+    It implements `phigen.runtime.lattice.LatticeBackend`.
+    """
 
     target = "c"
 
@@ -398,7 +401,6 @@ class CLattice:
 
     @property
     def has_pullback(self) -> bool:
-        """See `phigen.runtime.lattice.LatticeBackend`."""
         return hasattr(self._c, "pullback")
 
     def pullback(
@@ -411,7 +413,6 @@ class CLattice:
         parameters: Mapping[str, Any],
         t0: float = 0.0,
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
-        """See `phigen.runtime.lattice.LatticeBackend`."""
         if not self.has_pullback:
             raise MissingExtraError("pullback")
         zero = dict.fromkeys(self.interface.parameters, 0.0)

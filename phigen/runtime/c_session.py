@@ -30,8 +30,10 @@ class Cotangents(NamedTuple):
 
 
 class CSession:
-    """A C struct NAME_solver. It contains no pointers, so a copy of its bytes is a copy of the session. See
-    `Session`."""
+    """A session in a C struct NAME_solver: a `phigen.runtime.session.Session`.
+
+    The struct contains no pointers, so a copy of its bytes is a copy of the session.
+    """
 
     def __init__(
         self, functions: Any, struct: Bytes, dimension: int, element: int = 0, real: Real = np.float64
@@ -42,24 +44,19 @@ class CSession:
 
     @property
     def steps(self) -> int:
-        """See `Session`."""
         return int(self._c.solver_steps_done(self.address))
 
     def state(self) -> Floats:
-        """See `Session`."""
         return self._x.astype(np.float64)
 
     @property
     def rounding(self) -> float:
-        """See `Session`."""
         return float(np.finfo(self._real).eps)
 
     def time(self) -> float:
-        """See `Session`."""
         return float(self._c.solver_time(self.address)) if hasattr(self._c, "solver_time") else math.nan
 
     def advance(self, h: float, steps: int) -> None:
-        """See `Session`."""
         while steps > 0:
             chunk = min(steps, _STEPS_PER_CALL)
             status = self._c.integrate(self.address, h, chunk)
@@ -68,14 +65,12 @@ class CSession:
             steps -= chunk
 
     def advance_along(self, h: float, increments: Floats) -> None:
-        """See `Session`."""
         rows = np.ascontiguousarray(increments, dtype=self._real)
         status = self._c.integrate_along(self.address, h, len(rows), rows.ctypes.data)
         if status:
             raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
 
     def advance_tangent(self, h: float) -> Floats:
-        """See `Session`."""
         if not hasattr(self._c, "step_tangent"):
             raise MissingExtraError("step_tangent")
         tangent = np.empty((len(self._x), len(self._x)), dtype=self._real)
@@ -100,7 +95,6 @@ class CSession:
         return rows
 
     def interpolated(self, fractions: Sequence[float]) -> Floats | None:
-        """See `Session`."""
         if not hasattr(self._c, "interpolate"):
             return None
         at = np.asarray(fractions, dtype=self._real)
@@ -112,32 +106,26 @@ class CSession:
         return states
 
     def branch(self) -> CSession:
-        """See `Session`."""
         return CSession(self._c, aligned_copy(self._struct), len(self._x), self._element, self._real)
 
     def element(self) -> Floats:
-        """See `Session`."""
         element = np.empty(self._element, dtype=self._real)
         if self._element:
             self._c.attitude(self.address, element.ctypes.data)
         return element.astype(np.float64, copy=False)
 
     def placed(self, x: Floats) -> CSession:
-        """See `Session`."""
         copy = self.branch()
         copy._x[:] = x
         return copy
 
     def place(self, x: Floats) -> None:
-        """See `Session`."""
         self._move("set_state", x)
 
     def kick(self, change: Floats) -> None:
-        """See `Session`."""
         self._move("kick", change)
 
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
-        """See `Session`."""
         if parameters and not hasattr(self._c, "set_parameters"):
             raise TypeError("the solver was compiled without set_parameters: the spec has without: [parameters]")
         with np.errstate(over="ignore"):
@@ -156,7 +144,6 @@ class CSession:
             raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
 
     def saved(self) -> bytes:
-        """See `Session`."""
         return self._struct.tobytes()
 
 

@@ -36,8 +36,8 @@ from phigen.runtime.members import Members, one_by_one, shared_out
 class CSolver:
     """Back end over the shared library compiled from generated C files (name → text).
 
-    It has no state of a trajectory, so several threads may use it. The library is taken from the cache or compiled.
-    Raises `ToolchainError`.
+    It implements `phigen.runtime.backend.Backend`. It has no state of a trajectory, so several threads may use it. The
+    library is taken from the cache or compiled. Raises `ToolchainError`.
     """
 
     target = "c"
@@ -52,12 +52,10 @@ class CSolver:
         return CSolver, (self._files, self.interface, self._gauge)
 
     def with_gauge(self, gauge: Floats) -> CSolver:
-        """See `phigen.runtime.backend.Backend`."""
         return CSolver(self._files, self.interface, np.ascontiguousarray(gauge, dtype=self._real))
 
     @property
     def identity(self) -> str:
-        """See `phigen.runtime.backend.Backend`."""
         return cache.key_of(self._library)
 
     def start(
@@ -68,7 +66,6 @@ class CSolver:
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> CSession:
-        """See `phigen.runtime.backend.Backend`."""
         interface = self.interface
         session = CSession(self._c, aligned(self._c.solver_size()), interface.dimension, interface.element, self._real)
         packed, start = self._packed(parameters), self._own(x0)
@@ -97,7 +94,6 @@ class CSolver:
         return CSession(self._c, struct, interface.dimension, interface.element, self._real)
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self._c, "ensemble"):
             raise TypeError(f"{self.interface.name} was compiled without ensembles: the spec has without: [ensemble]")
         if not len(members) and members.alike:
@@ -245,11 +241,9 @@ class CSolver:
 
     @property
     def has_pullback(self) -> bool:
-        """See `phigen.runtime.backend.Backend`."""
         return hasattr(self._c, "pullback")
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
-        """See `phigen.runtime.backend.Backend`."""
         if not self.has_pullback:
             raise MissingExtraError("pullback")
         count, together = len(members), self._can_batch_pullback(members)
@@ -368,32 +362,26 @@ class CSolver:
         return rows, cotangents.state, cotangents.parameters[: len(parameters)]
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         packed, x = self._packed(parameters), self._own(x)
         rows = zip(*_times(t), _addresses(x), strict=True)
         return np.array([self._c.hamiltonian(packed.ctypes.data, *row) for row in rows], dtype=np.float64)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         result = np.empty((len(x), len(self.interface.casimirs)), self._real)
         return self._fill(self._c.casimirs, x, result, parameters) if self.interface.casimirs else result
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         return self._fill(self._c.vector_field, x, np.empty(x.shape, self._real), parameters, t)
 
     def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         result = np.empty((len(x), len(self.interface.observables)), self._real)
         return self._fill(self._c.observables, x, result, parameters, t) if self.interface.observables else result
 
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         result = np.empty((len(x), len(self.interface.noise), x.shape[1]), self._real)
         return self._fill(self._c.noise_fields, x, result, parameters, t)
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         packed, x = self._packed(parameters), self._own(x)
         return np.array([self._c.monitor(packed.ctypes.data, row) for row in _addresses(x)], dtype=np.float64)
 

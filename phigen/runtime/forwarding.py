@@ -23,17 +23,13 @@ class Forwarding(Generic[Inner]):
 
     @property
     def rounding(self) -> float:
-        """See `Followed`."""
         return self.session.rounding
 
     def state(self) -> Floats:
-        """See `Followed`."""
         return self.session.state()
 
     def time(self) -> float:
-        """See `Followed`."""
         return self.session.time()
 
     def element(self) -> Floats:
-        """See `Followed`."""
         return self.session.element()

@@ -67,7 +67,6 @@ class LatticeCourse:
 
     @property
     def rounding(self) -> float:
-        """See `Followed`."""
         return float(np.finfo(np.float32 if self.solver.interface.single else np.float64).eps)
 
     def state(self) -> Floats:

@@ -45,7 +45,6 @@ class FrameRows:
         return len(self.energy)
 
     def see(self, sites: LatticeSession) -> None:
-        """See `Sink`."""
         self.frames.put(len(self), sites.state())
         self.record(sites)
 
@@ -55,7 +54,6 @@ class FrameRows:
         self.observed.append(sites.observables())
 
     def begin(self, earlier_run: Past) -> None:
-        """See `Sink`."""
         assert earlier_run.x is not None
         for k, state in enumerate(earlier_run.x):
             self.frames.put(k, state)
@@ -64,7 +62,6 @@ class FrameRows:
         self.observed = list(np.column_stack([np.empty((len(earlier_run.t), 0)), *columns]))
 
     def saved(self) -> dict[str, Any]:
-        """See `Sink`."""
         self.frames.flush()
         arrays = {"energy": np.array(self.energy), "observed": np.array(self.observed)}
         if self.frames.path is None:
@@ -72,7 +69,6 @@ class FrameRows:
         return {**arrays, "frame": self.frames.frame(len(self) - 1)}
 
     def restore(self, arrays: Mapping[str, Any]) -> None:
-        """See `Sink`."""
         self.energy, self.observed = arrays["energy"].tolist(), list(arrays["observed"])
         self.frames.restore(arrays.get("frames"), len(self))
         if self.frames.path and not np.array_equal(self.frames.frame(len(self) - 1), arrays["frame"], equal_nan=True):

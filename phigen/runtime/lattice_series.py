@@ -115,19 +115,15 @@ class NumberRows:
         return {name: values[:, k] for k, name in enumerate(self.names)}
 
     def see(self, sites: LatticeSession) -> None:
-        """See `Sink`."""
         self.rows.append(_recorded_columns(sites, self.about, self.names))
 
     def begin(self, earlier_run: Past) -> None:
-        """See `Sink`."""
         self.rows = np.column_stack([earlier_run.columns[name] for name in self.names]).tolist()
 
     def saved(self) -> dict[str, Any]:
-        """See `Sink`."""
         return {"rows": np.array(self.rows).reshape(len(self.rows), len(self.names))}
 
     def restore(self, arrays: Mapping[str, Any]) -> None:
-        """See `Sink`."""
         self.rows = arrays["rows"].tolist()
 
 

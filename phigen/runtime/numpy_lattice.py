@@ -189,7 +189,7 @@ class NumpyLatticeSession:
 
 
 class NumpyLattice:
-    """Back end over the text of a generated NumPy module."""
+    """Back end over the text of a generated NumPy module: a `phigen.runtime.lattice.LatticeBackend`."""
 
     target = "numpy"
 
@@ -218,7 +218,6 @@ class NumpyLattice:
 
     @property
     def has_pullback(self) -> bool:
-        """See `phigen.runtime.lattice.LatticeBackend`."""
         return hasattr(self._module, "pullback")
 
     def pullback(
@@ -231,7 +230,6 @@ class NumpyLattice:
         parameters: Mapping[str, Any],
         t0: float = 0.0,
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
-        """See `phigen.runtime.lattice.LatticeBackend`."""
         if not self.has_pullback:
             raise MissingExtraError("pullback")
         stored_states = min(steps, 2 * math.isqrt(steps)) + 2 * len(bars)

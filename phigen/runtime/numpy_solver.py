@@ -67,7 +67,7 @@ def _memory_name(stage: int, part: int) -> str:
 
 
 class NumpySession:
-    """A session that holds the variables of the module's ``integrate``. See `phigen.runtime.session.Session`."""
+    """A session with the variables of the module's ``integrate``: a `phigen.runtime.session.Session`."""
 
     def __init__(
         self,
@@ -93,30 +93,24 @@ class NumpySession:
         self._turned: AttitudeState | None = None
 
     def state(self) -> Floats:
-        """See `Session`."""
         return np.array(self._x[0])
 
     @property
     def rounding(self) -> float:
-        """See `Session`."""
         return float(np.finfo(float).eps)
 
     def time(self) -> float:
-        """See `Session`."""
         return float((self._passed[0] + self._passed[1])[0]) if hasattr(self._module, "_time_of") else np.nan
 
     def placed(self, x: Floats) -> NumpySession:
-        """See `Session`."""
         copy = self.branch()
         copy._x = x[np.newaxis].copy()
         return copy
 
     def place(self, x: Floats) -> None:
-        """See `Session`."""
         self._stand(x[np.newaxis].copy(), np.zeros((1, len(x))))
 
     def kick(self, change: Floats) -> None:
-        """See `Session`."""
         self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
 
     def _stand(self, x: Floats, carry: Floats) -> None:
@@ -142,7 +136,6 @@ class NumpySession:
             self.turn_from(element)
 
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
-        """See `Session`."""
         values = self._module._values(dict(parameters))
         monitored = hasattr(self._module, "_refused")
         if not self._module._admissible(values) or (monitored and len(self._module._refused(values, self._x))):
@@ -160,7 +153,6 @@ class NumpySession:
         return self._module._values(dict(self._parameters))
 
     def element(self) -> Floats:
-        """See `Session`."""
         if self._turned is None:
             return np.empty(0)
         attitude = self._turned
@@ -176,7 +168,6 @@ class NumpySession:
         self._turned = AttitudeState(initial, self._now(), identity, np.zeros_like(identity), rate)
 
     def advance(self, h: float, steps: int) -> None:
-        """See `Session`."""
         self._prepare(h)
         with np.errstate(all="ignore"):
             if hasattr(self._module, "_followed") and steps:
@@ -218,14 +209,12 @@ class NumpySession:
         self._x, self._carry = x, carry
 
     def advance_along(self, h: float, increments: Floats) -> None:
-        """See `Session`."""
         self._prepare(h)
         with np.errstate(all="ignore"):
             for row in increments:
                 self._commit(*self._attempted_step(row))
 
     def advance_tangent(self, h: float) -> Floats:
-        """See `Session`."""
         if not hasattr(self._module, "_tangent_stage"):
             raise MissingExtraError("step_tangent")
         self._prepare(h)
@@ -244,7 +233,6 @@ class NumpySession:
         return tangent
 
     def interpolated(self, fractions: Sequence[float]) -> Floats | None:
-        """See `Session`."""
         if not hasattr(self._module, "_interpolated") or not self._memory or self._memory[0][1].ndim != 3:
             return None
         with np.errstate(all="ignore"):
@@ -254,7 +242,6 @@ class NumpySession:
         return states
 
     def branch(self) -> NumpySession:
-        """See `Session`."""
         state = self._x, self._carry, self._gauge, self._t, self._draws
         twin = NumpySession(self._module, self._parameters, *state)
         twin._counted, twin._passed = self._counted, self._passed
@@ -263,7 +250,6 @@ class NumpySession:
         return twin
 
     def saved(self) -> bytes:
-        """See `Session`."""
         buffer = io.BytesIO()
         gauge = np.empty(0) if self._gauge is None else self._gauge
         memory = {_memory_name(k, j): part for k, pair in enumerate(self._memory) for j, part in enumerate(pair)}
@@ -358,8 +344,10 @@ class NumpySession:
 
 
 class NumpySolver:
-    """Back end over a generated module, loaded from its text. It needs no compiler, and makes the steps of all
-    members of an ensemble together."""
+    """Back end over a generated module, loaded from its text: a `phigen.runtime.backend.Backend`.
+
+    It needs no compiler, and makes the steps of all members of an ensemble together.
+    """
 
     target = "numpy"
 
@@ -372,12 +360,10 @@ class NumpySolver:
         return NumpySolver, (self._source, self.interface, self._gauge)
 
     def with_gauge(self, gauge: Floats) -> NumpySolver:
-        """See `phigen.runtime.backend.Backend`."""
         return NumpySolver(self._source, self.interface, gauge)
 
     @property
     def identity(self) -> str:
-        """See `phigen.runtime.backend.Backend`."""
         return str(self.module.__file__)
 
     def start(
@@ -388,7 +374,6 @@ class NumpySolver:
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> NumpySession:
-        """See `phigen.runtime.backend.Backend`."""
         x = x0[np.newaxis].copy()
         self._expect_admissible(x, parameters)
         gauge = self._gauge
@@ -400,7 +385,6 @@ class NumpySolver:
         return session
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> NumpySession:
-        """See `phigen.runtime.backend.Backend`."""
         return NumpySession.from_bytes(self.module, parameters, saved)
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
@@ -409,11 +393,9 @@ class NumpySolver:
 
     @property
     def has_pullback(self) -> bool:
-        """See `phigen.runtime.backend.Backend`."""
         return hasattr(self.module, "pullback")
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
-        """See `phigen.runtime.backend.Backend`."""
         if not self.has_pullback:
             raise MissingExtraError("pullback")
         x0, parameters = members.x0, members.parameters
@@ -446,33 +428,27 @@ class NumpySolver:
         return np.broadcast_to(gauges, (len(x0), len(self.module.GAUGE)))
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         time_arguments = () if t is None else (t,)
         return np.asarray(self.module.hamiltonian(x, *time_arguments, **parameters), dtype=np.float64)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         return np.asarray(self.module.casimirs(x, **parameters), dtype=np.float64)
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         time_arguments = () if t is None else (t,)
         return np.asarray(self.module.vector_field(x, *time_arguments, **parameters), dtype=np.float64)
 
     def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         if not self.interface.observables:
             return np.empty((len(x), 0))
         time_arguments = () if t is None else (t,)
         return np.asarray(self.module.observables(x, *time_arguments, **parameters), dtype=np.float64)
 
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         time_arguments = () if t is None else (t,)
         return np.asarray(self.module.noise_fields(x, *time_arguments, **parameters), dtype=np.float64)
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         rates: Floats = self.module._monitor(self.module._values(parameters), x)[:, 0]
         return rates
 

@@ -81,7 +81,7 @@ def write(path: str | Path, columns: Sequence[Column], rows: Floats, scalars: Ma
 
 
 class CsvTable:
-    """Comma-separated values; every float reads back as the same float."""
+    """A `TableFile` of comma-separated values; every float reads back as the same float."""
 
     def __init__(self, path: Path, columns: Sequence[Column], size: int | None) -> None:
         self._path, self._file = path, _opened(path, size)
@@ -89,12 +89,10 @@ class CsvTable:
             self._file.write((",".join(name for c in columns for name in c.names) + "\n").encode())
 
     def append(self, rows: Floats) -> None:
-        """See `TableFile`."""
         with naming(self._path):
             self._file.write("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()).encode())
 
     def flush(self) -> int:
-        """See `TableFile`."""
         with naming(self._path):
             return _flushed(self._file)
 
@@ -107,29 +105,25 @@ class CsvTable:
         """See `TableFile`; a ``.csv`` has no further files."""
 
     def discard(self) -> None:
-        """See `TableFile`."""
         _discarded(self._file, self._path)
 
 
 class NpzTable:
-    """Arrays of NumPy, one for each of the columns."""
+    """A `TableFile` of NumPy arrays, one for each of the columns."""
 
     def __init__(self, path: Path, columns: Sequence[Column], size: int | None) -> None:
         self._path, self._part, self._columns = path, path.with_name(path.name + ".part"), columns
         self._file = _opened(self._part, size)
 
     def append(self, rows: Floats) -> None:
-        """See `TableFile`."""
         with naming(self._part):
             self._file.write(np.ascontiguousarray(rows, dtype="<f8").tobytes())
 
     def flush(self) -> int:
-        """See `TableFile`."""
         with naming(self._part):
             return _flushed(self._file)
 
     def close(self, scalars: Mapping[str, Any]) -> None:
-        """See `TableFile`."""
         with naming(self._part):
             self._file.close()
         width = sum(len(c.names) for c in self._columns)
@@ -147,11 +141,9 @@ class NpzTable:
                     np.lib.format.write_array(member, np.asarray(value), allow_pickle=False)
 
     def clean(self) -> None:
-        """See `TableFile`."""
         self._part.unlink(missing_ok=True)
 
     def discard(self) -> None:
-        """See `TableFile`."""
         _discarded(self._file, self._part)
 
     def _store(self, archive: zipfile.ZipFile, column: Column, rows: Floats, first: int) -> None:

@@ -1,14 +1,14 @@
-"""The Hamilton–Jacobi series S_t = Σ t^i S_i, plain normalisation.
+"""The Hamilton–Jacobi series S_t = Σ t^i S_i, without factorials.
 
 S_t solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 0, hence S_1 = H and
 
     (i+1) S_{i+1}(x) = coefficient of t^i in H(α(x, ∇(S_1 t + … + S_i t^i))).
 
-The S_i of the paper (section 4, step 1) carry a further factor i!. In a symmetric bi-realisation,
-β(x, p) = α(x, −p), every S_i of even index vanishes; that is used, and `residual` proves it on demand.
+The S_i of the paper (section 4, step 1) have an additional factor i!. In a symmetric bi-realisation, β(x, p) = α(x,
+−p), every S_i of even index vanishes. The recursion uses this, and `residual` proves it on demand.
 
-For H(τ, x) adjoin the time τ and its conjugate e, {τ, e} = 1, in the midpoint realisation, and take H + e. Its
-generating function is t e + S_t(τ, x), where S_t does not contain e:
+For H(τ, x), the time τ and its conjugate e, {τ, e} = 1, are added in the midpoint realisation, and H is replaced by H +
+e. The generating function is t e + S_t(τ, x), where S_t does not contain e:
 
     ∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t,    S_0 = 0,
 
@@ -34,10 +34,11 @@ from phigen.symbolic.symbols import momentum
 from phigen.symbolic.taylor import ExpressionRing, Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 
-#: Most monomials of a gradient ∇S_i: with the Hessian it takes 4.3 to 10 operations for each, measured.
+#: Largest number of monomials of a gradient ∇S_i. With the Hessian, 4.3 to 10 operations were measured for each
+#: monomial.
 MOST_SLOPES = limits.OPERATIONS // 4
 
-#: Index i from which the sizes of S_1 … S_i predict those of later terms: they grow like a power of i.
+#: Index i from which the sizes of S_1 … S_i predict those of later terms, which grow like a power of i.
 FORESEEN = 7
 
 
@@ -50,16 +51,16 @@ class PolynomialSeries:
 
 
 def composed(hamiltonian: Expression, coordinates: Sequence[str], alpha: Sequence[Expression]) -> Expression:
-    """H(α(x, p)) as an expression in the coordinates and the momenta."""
+    """Return H(α(x, p)) as an expression in the coordinates and the momenta."""
     return substitute([hamiltonian], dict(zip(coordinates, alpha, strict=True)))[0]
 
 
 def series_tower(
     target: Expression, coordinates: Sequence[str], parameters: Sequence[str], times: Sequence[str] = ()
 ) -> Tower:
-    """The smallest tower that holds the series of H∘α, built from the nodes of H∘α at p = 0.
+    """Return the smallest tower that contains the series of H∘α, from the nodes of H∘α at p = 0.
 
-    ``times`` is the symbol of the time, if there is one; it is among the ``parameters``.
+    ``times`` has the symbol of the time, if H depends on it; this symbol is also among the ``parameters``.
     """
     at_zero = substitute(closure([target]), {momentum(c): ZERO for c in coordinates})
     return Tower([*coordinates, *parameters], at_zero, [*coordinates, *times])
@@ -75,9 +76,9 @@ def polynomial_series(
     symmetric: bool,
     times: Sequence[str] = (),
 ) -> PolynomialSeries:
-    """S_1 … S_terms in a tower (exact rational arithmetic, parameters symbolic); ``times`` as for `series_tower`.
+    """Return S_1 … S_terms in a tower (exact rational arithmetic, symbolic parameters).
 
-    Raises `OverflowError` if a term has more than `limits.SERIES_TERMS` monomials.
+    ``times`` is as for `series_tower`. Raises `OverflowError` if a term has more than `limits.SERIES_TERMS` monomials.
     """
     recursion = _polynomial_recursion(hamiltonian, alpha, coordinates, parameters, symmetric, times)
     return PolynomialSeries(recursion.ring, recursion.first(terms))
@@ -91,15 +92,16 @@ def graph_series(
     *,
     symmetric: bool,
 ) -> tuple[Expression, ...]:
-    """S_1 … S_terms as one shared expression graph, never expanded."""
+    """Return S_1 … S_terms as one shared expression graph, which is never expanded."""
     return _graph_recursion(hamiltonian, alpha, coordinates, symmetric).first(terms)
 
 
 class HamiltonJacobi:
-    """S_1, S_2, … of one Hamiltonian in one bi-realisation, each computed once, when it is first needed.
+    """S_1, S_2, … of one Hamiltonian in one bi-realisation, each computed once, on first use.
 
-    ``alpha`` gives the source map to the degree in p needed for S_1 … S_most: see `reach`. ``static`` are the
-    parameters and the other symbols of the tower, ``times`` the symbol of the time, if there is one.
+    ``alpha`` returns the map α up to the degree in p that S_1 … S_n need, for a number n of terms; see `reach`.
+    ``static`` are the parameters and the other symbols of the tower, ``times`` the symbol of the time, if H depends on
+    it.
     """
 
     def __init__(
@@ -119,16 +121,16 @@ class HamiltonJacobi:
 
     @cached_property
     def alpha(self) -> tuple[Expression, ...]:
-        """The source map that the terms are computed from."""
+        """The map α from which the terms are computed."""
         return tuple(self._source(self._most))
 
     def polynomial(self, terms: int) -> PolynomialSeries:
-        """S_1 … S_terms in a tower. Raises `OverflowError` as `polynomial_series`."""
+        """Return S_1 … S_terms in a tower. Raises `OverflowError` as `polynomial_series` does."""
         self.reach(terms)
         return PolynomialSeries(self._polynomials.ring, self._polynomials.first(terms))
 
     def written(self, terms: int) -> PolynomialSeries:
-        """S_1 … S_terms in a tower, up to the last one before the first that is too large."""
+        """Return S_1, S_2, … up to S_terms in a tower, but only those before the first term that is too large."""
         with suppress(OverflowError):
             return self.polynomial(terms)
         with suppress(OverflowError):
@@ -136,13 +138,15 @@ class HamiltonJacobi:
         return PolynomialSeries(series_tower(ZERO, self.coordinates, self.static, self.times), ())
 
     def graph(self, terms: int) -> tuple[Expression, ...]:
-        """S_1 … S_terms as one shared expression graph, never expanded."""
+        """Return S_1 … S_terms as one shared expression graph, which is never expanded."""
         self.reach(terms)
         return self._graphs.first(terms)
 
     def reach(self, terms: int) -> None:
-        """Announce the number of terms, before the first is computed: if α is a series in p, the computation starts
-        again."""
+        """Announce the number of terms before the first is computed.
+
+        If α is a series in p of too low degree, the computation starts again.
+        """
         if terms <= self._most:
             return
         self._most = terms
@@ -185,9 +189,9 @@ def _graph_recursion(
 
 
 class _Recursion:
-    """The recursion in a ring, one term after the other: ``target`` is H(α(x, p)).
+    """The recursion in a ring, term by term: ``target`` is H(α(x, p)).
 
-    ``slope`` gives the derivatives of a term along some symbols.
+    ``slope`` returns the derivatives of a term with respect to some symbols.
     """
 
     def __init__(
@@ -207,10 +211,13 @@ class _Recursion:
         self._zero = ring.constant(0)
         self._found: list[Any] = []
         self._overflow: OverflowError | None = None
-        self._sizes: dict[int, int] = {}  # i → monomials of ∇S_i
+        self._sizes: dict[int, int] = {}  # i → number of monomials of ∇S_i
 
     def first(self, terms: int) -> tuple[Any, ...]:
-        """S_1 … S_terms. An `OverflowError` is final: later requests beyond the last computed term raise it again."""
+        """Return S_1 … S_terms.
+
+        An `OverflowError` is final: later requests for terms beyond the last computed one raise it again.
+        """
         while len(self._found) < terms:
             if self._overflow:
                 raise self._overflow
@@ -228,7 +235,7 @@ class _Recursion:
         return tuple(self._found)
 
     def _expect_small(self, terms: int) -> None:
-        """Raise `OverflowError` if the sizes so far predict that ∇S_terms will be too large to evaluate."""
+        """Raise `OverflowError` if the sizes so far predict that ∇S_terms is too large to evaluate."""
         *_, previous, latest = [0, 0, *self._sizes]
         if latest < FORESEEN or previous == 0:
             return
@@ -256,7 +263,7 @@ class _Recursion:
 
 
 def beginning(ring: Any, times: Sequence[str], i: int) -> dict[str, Any]:
-    """The coefficient of t^i in τ − t/2, the time at the beginning of a step of size t, for the symbol of τ."""
+    """Return the coefficient of t^i in τ − t/2, the time at the beginning of a step of size t, by the symbol of τ."""
     values = {0: ring.variable, 1: lambda _: ring.constant(Fraction(-1, 2))}
     return {t: values.get(i, lambda _: ring.constant(0))(t) for t in times}
 
@@ -268,9 +275,10 @@ def residual(
     coordinates: Sequence[str],
     times: Sequence[str] = (),
 ) -> list[Poly]:
-    """Coefficients of t^0 … t^(k−1) in ∂_t S_t − H(α(x, ∇S_t)): all 0 if S_1 … S_k solve the equation.
+    """Return the coefficients of t^0 … t^(k−1) in ∂_t S_t − H(α(x, ∇S_t)).
 
-    With a time τ, in ∂_t S_t − H(τ − t/2, α(x, ∇S_t)) − ½ ∂_τ S_t.
+    All are 0 if S_1 … S_k solve the equation. With a time τ, they are those of ∂_t S_t − H(τ − t/2, α(x, ∇S_t)) − ½ ∂_τ
+    S_t.
     """
     target = composed(hamiltonian, coordinates, alpha)
     tower, momenta = series.tower, [momentum(c) for c in coordinates]

@@ -1,15 +1,15 @@
 """Backward error analysis: the modified Hamiltonian, whose exact flow is the step.
 
-The map of step h is the time-h flow of a formal series H̃_h = H_0 + h H_1 + h² H_2 + …, H_0 = H. It is found from this:
-the full Hamilton–Jacobi transform of H̃_h at time h is the truncated S_h = h S_1 + … + h^k S_k of the method. With the
-time written σh, the transform S(σ) = Σ h^r s_r(σ) of H̃_h solves
+The map of step h is the time-h flow of a formal series H̃_h = H_0 + h H_1 + h² H_2 + …, H_0 = H. The H_j follow from a
+condition: the full Hamilton–Jacobi transform of H̃_h at time h is the truncated S_h = h S_1 + … + h^k S_k of the
+method. With the time written σh, the transform S(σ) = Σ h^r s_r(σ) of H̃_h solves
 
     ∂_σ s_r = coefficient of h^(r−1) in H̃_h(α(x, ∇S(σ))) = H_{r−1} + known terms,    s_r(0) = 0,
 
-and s_r(1) is S_r for r ≤ k and 0 beyond: one linear equation for each H_{r−1}. The first correction is −h^k S_{k+1}.
-In a symmetric bi-realisation H̃_h is even in h. Where H depends on a time τ, so does H̃_h: it is taken at τ − σh/2 on
-the right, to which ½ ∂_τ s_(r−1) is added, as in `phigen.series.hamilton_jacobi`. See section 6 of E. Hairer,
-C. Lubich, G. Wanner, Geometric Numerical Integration, chapter IX, for generating functions on canonical structures.
+and s_r(1) is S_r for r ≤ k and 0 for r > k: one linear equation for each H_{r−1}. The first correction is −h^k S_{k+1}.
+In a symmetric bi-realisation H̃_h is even in h. If H depends on a time τ, so does H̃_h: on the right it is evaluated at
+τ − σh/2, and ½ ∂_τ s_(r−1) is added, as in `phigen.series.hamilton_jacobi`. See section 6 of E. Hairer, C. Lubich, G.
+Wanner, Geometric Numerical Integration, chapter IX, for generating functions on canonical structures.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from phigen.symbolic.symbols import Symbol, momentum
 from phigen.symbolic.taylor import Taylor
 from phigen.symbolic.tower import Poly, Tower
 
-#: The fraction σ of the step, as a symbol.
+#: Symbol of the fraction σ of the step.
 FRACTION = Symbol("sigma")
 
-#: Corrections with more monomials than this are not computed further.
+#: Largest number of monomials of a correction; larger ones are not computed.
 MOST_TERMS = 5_000
 
 
@@ -51,7 +51,7 @@ def modified_series(
     symmetric: bool,
     times: Sequence[str] = (),
 ) -> ModifiedSeries:
-    """H_0 … H_power of the method that takes S_1 … S_terms; α must be right up to degree ``power`` in p.
+    """Return H_0 … H_power of the method with S_1 … S_terms; α must be correct up to degree ``power`` in p.
 
     Raises `OverflowError` if a correction has more than `MOST_TERMS` monomials.
     """
@@ -66,7 +66,7 @@ def modified_series(
 
 
 class _ModifiedRecursion:
-    """The state of the recursion: H_0 … H_{r−1}, and the slopes of s_1 … s_r along the coordinates."""
+    """The state of the recursion: H_0 … H_{r−1}, and the derivatives of s_1 … s_r with respect to the coordinates."""
 
     def __init__(
         self,
@@ -85,7 +85,10 @@ class _ModifiedRecursion:
         self.fraction = self.tower.names.index(FRACTION)
 
     def advance(self, r: int, *, vanishing: bool) -> None:
-        """Compute the terms H_{r−1} of the modified Hamiltonian and s_r of its generating function."""
+        """Compute H_{r−1} of the modified Hamiltonian and s_r of its generating function.
+
+        ``vanishing`` says that H_{r−1} is 0 by symmetry.
+        """
         if vanishing:
             self._keep(self.tower.zero, self.tower.zero)
             return
@@ -111,7 +114,7 @@ class _ModifiedRecursion:
         self.composed.append((target, Taylor([target], self.tower, [*self.momenta, *self.times])))
 
     def _level(self, j: int, level: int) -> Poly:
-        """The coefficient of h^level in H_j(α(x, ∇S(σ)))."""
+        """Return the coefficient of h^level in H_j(α(x, ∇S(σ)))."""
         pair = self.composed[j]
         if pair is None:
             return self.tower.zero
@@ -122,7 +125,7 @@ class _ModifiedRecursion:
         return taylor.coefficients(target)[level]
 
     def _beginning(self, k: int) -> dict[str, Poly]:
-        """The coefficient of h^k in τ − σh/2, for the symbol of τ."""
+        """Return the coefficient of h^k in τ − σh/2, by the symbol of τ."""
         shift = self.tower.variable(FRACTION) * self.tower.constant(Fraction(-1, 2))
         return {t: self.tower.variable(t) if k == 0 else shift if k == 1 else self.tower.zero for t in self.times}
 
@@ -135,7 +138,7 @@ class _ModifiedRecursion:
         return self.tower.context.from_dict(integrated)
 
     def _at_one(self, element: Poly) -> Poly:
-        """The element at σ = 1."""
+        """Return the element at σ = 1."""
         collected: dict[Any, Any] = {}
         for m, c in element.to_dict().items():
             key = (*m[: self.fraction], 0, *m[self.fraction + 1 :])

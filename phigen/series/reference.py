@@ -1,18 +1,19 @@
-"""The Hamilton–Jacobi series derived a second time, by sympy alone: a page to be read beside docs/mathematics.md.
+"""The Hamilton–Jacobi series derived a second time, by sympy alone: a page to be read together with
+docs/mathematics.md.
 
-S_t(x) = t S_1 + t² S_2 + … solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 0. By Taylor's formula, twice,
+S_t(x) = t S_1 + t² S_2 + … solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 0. Taylor's formula, applied twice, yields
 
     p(t) = ∇S_t(x)          = Σ_j t^j ∇S_j(x),
     Δ(t) = α(x, p(t)) − x   = Σ_μ a_μ(x) p(t)^μ,    a_μ = ∂_p^μ α(x, 0)/μ!,
     ∂_t S_t = H(x + Δ(t))   = Σ_ν H_ν(x) Δ(t)^ν,    H_ν = ∂_x^ν H(x)/ν!,
 
-with multi-indices μ ≠ 0 and ν. The coefficients of t^i are (i + 1) S_{i+1} on the left, and on the right a
-polynomial in a_μ, H_ν and ∇S_1 … ∇S_i with |μ|, |ν| ≤ i, since p(t) and Δ(t) begin with t.
+with multi-indices μ ≠ 0 and ν. The coefficients of t^i are (i + 1) S_{i+1} on the left, and on the right a polynomial
+in a_μ, H_ν and ∇S_1 … ∇S_i with |μ|, |ν| ≤ i, since p(t) and Δ(t) begin with t.
 
-Where H depends on a time τ, ∂_t S_t(τ, x) = H(τ − t/2, x + Δ(t)) + ½ ∂_τ S_t: the time is one more variable of Taylor's
+If H depends on a time τ, ∂_t S_t(τ, x) = H(τ − t/2, x + Δ(t)) + ½ ∂_τ S_t: the time is one more variable of Taylor's
 formula, with Δ_τ(t) = −t/2.
 
-The compiler knows none of this: it shares neither the ring, nor derivatives, nor the arithmetic of series.
+This derivation shares no code with the compiler: neither the ring, nor derivatives, nor the arithmetic of series.
 """
 
 from __future__ import annotations
@@ -31,15 +32,15 @@ Index = tuple[int, ...]
 #: The coefficients of Taylor's formula.
 Coefficients = Mapping[Index, Any]
 
-#: The a_μ of α_1 … α_n with 0 < |μ| ≤ a degree.
+#: Function that returns the a_μ of α_1 … α_n with 0 < |μ| ≤ a degree.
 Source = Callable[[int], Sequence[Coefficients]]
 
 
 def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], times: Sequence[Any] = ()) -> Iterator[Any]:
-    """S_1, S_2, … without end, as sympy expressions in x and the parameters.
+    """Yield S_1, S_2, … without end, as sympy expressions in x and the parameters.
 
-    ``hamiltonian`` is H, ``source`` gives the a_μ: see `closed_form` and `phigen.series.reference_paths`. ``times`` is
-    the time, if H depends on it.
+    ``hamiltonian`` is H. ``source`` returns the a_μ, as those of `closed_form` and `phigen.series.reference_paths`.
+    ``times`` contains the time, if H depends on it.
     """
     terms: list[Any] = []
     while True:
@@ -49,7 +50,7 @@ def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], time
 
 
 def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
-    """The a_μ of expressions in x and p which are regular at p = 0 as they are written."""
+    """Return the a_μ of expressions in x and p that are regular at p = 0 as they are written."""
 
     @cache
     def source(degree: int) -> list[dict[Index, Any]]:
@@ -59,7 +60,7 @@ def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
 
 
 def _at_origin(f: Any, p: Sequence[Any], degree: int) -> dict[Index, Any]:
-    """∂_p^μ f/μ! at p = 0; of a polynomial in p, its coefficients."""
+    """Return ∂_p^μ f/μ! at p = 0; for a polynomial in p, these are its coefficients."""
     functions = Functions([f, *p])
     if not any(g.has(*p) for g in functions if g not in p):
         return {m: functions.expression(c) for m, c in functions.split(functions.element(f), p).items()}
@@ -67,7 +68,7 @@ def _at_origin(f: Any, p: Sequence[Any], degree: int) -> dict[Index, Any]:
 
 
 def taylor(f: Any, variables: Sequence[Any], degree: int) -> dict[Index, Any]:
-    """∂^μ f/μ! for |μ| ≤ degree, zeros left out."""
+    """Return ∂^μ f/μ! for |μ| ≤ degree, by μ; zeros are left out."""
     n = len(variables)
     level: dict[Index, Any] = {(0,) * n: f}
     result = dict(level)
@@ -92,7 +93,10 @@ def _coefficient(
     x: Sequence[Any],
     times: Sequence[Any],
 ) -> Any:
-    """[t^i] Σ_ν H_ν Δ(t)^ν + ½ ∂_τ S_t, with Δ(t) = Σ_μ a_μ p(t)^μ, p(t) = Σ_j t^j ∇S_j, and Δ_τ(t) = −t/2."""
+    """Return the coefficient of t^i in Σ_ν H_ν Δ(t)^ν + ½ ∂_τ S_t.
+
+    Here Δ(t) = Σ_μ a_μ p(t)^μ, p(t) = Σ_j t^j ∇S_j, and Δ_τ(t) = −t/2.
+    """
     slopes = [[derivative(s, c) for s in terms] for c in x]
     operands = [*energy.values(), *(a for d in source for a in d.values()), *(g for row in slopes for g in row)]
     rates = [derivative(s, t) / 2 for t in times for s in terms[-1:]]
@@ -106,12 +110,12 @@ def _coefficient(
     coefficient = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
     zero = functions.seems_zero(coefficient) and functions.vanishes(
         coefficient
-    )  # of even index in a symmetric bi-realisation
+    )  # terms of even index vanish in a symmetric bi-realisation
     return sympy.Integer(0) if zero else functions.expression(coefficient)
 
 
 class Series:
-    """Power series u_1, …, u_n that begin with t; ``coefficient(k, j)`` is [t^j] u_k."""
+    """Power series u_1, …, u_n that begin with t; ``coefficient(k, j)`` is the coefficient of t^j in u_k."""
 
     def __init__(self, functions: Functions, coefficient: Callable[[int, int], Any]) -> None:
         self._functions = functions
@@ -124,7 +128,7 @@ class Series:
         return self._functions.total(element(c) * self._power(mu, j) for mu, c in coefficients.items() if sum(mu) <= j)
 
     def _product(self, mu: Index, j: int) -> Any:
-        """[t^j] u(t)^μ: the sum over the share of t^j that one factor has."""
+        """Return the coefficient of t^j in u(t)^μ: a sum over the power of t that one factor contributes."""
         if not any(mu):
             return self._functions.ring(int(j == 0))
         k = next(k for k, e in enumerate(mu) if e)

@@ -25,7 +25,7 @@ def defects(
     p: Sequence[Any],
     d: int,
 ) -> Iterator[tuple[str, Any]]:
-    """The parts that do not reduce to 0, each with its name; ``poisson`` is the matrix π(x).
+    """Yield the parts that do not reduce to 0, each with its name; ``poisson`` is the matrix π(x).
 
     ``alpha`` and ``beta`` are the a_μ and b_μ with 0 < |μ| ≤ d.
     """
@@ -45,7 +45,7 @@ def defects(
 
 
 class _Parts:
-    """The maps by degree in p, with their slopes, as elements of one ring."""
+    """The maps α and β by degree in p, with their derivatives, as elements of one ring."""
 
     def __init__(
         self, maps: Sequence[Coefficients], parameters: Sequence[Any], x: Sequence[Any], p: Sequence[Any]
@@ -59,11 +59,11 @@ class _Parts:
         self._known: dict[tuple[int, int, int | None], Any] = {}
 
     def deviation(self, first: int) -> Series:
-        """α − x or β − x, a series in the degree in p."""
+        """Return α − x or β − α as a series in the degree in p; ``first`` is the index of the first component."""
         return Series(self.functions, lambda k, m: self._part(first + k, m))
 
     def bracket(self, f: int, g: int, degree: int) -> Any:
-        """Part of degree ``degree`` in p of {f, g} = Σ_c ∂f/∂x_c ∂g/∂p_c − ∂f/∂p_c ∂g/∂x_c."""
+        """Return the part of degree ``degree`` in p of {f, g} = Σ_c ∂f/∂x_c ∂g/∂p_c − ∂f/∂p_c ∂g/∂x_c."""
         splits = [(k, degree + 1 - k) for k in range(degree + 2)]
         terms = (
             self._part(f, k, c) * self._covector_slope(g, m, c) - self._covector_slope(f, k, c) * self._part(g, m, c)
@@ -73,7 +73,7 @@ class _Parts:
         return self.functions.total(terms)
 
     def _part(self, f: int, degree: int, c: int | None = None) -> Any:
-        """The part of a map, or of its derivative along x_c, of a degree in p."""
+        """Return the part of a given degree in p of a map, or of its derivative with respect to x_c."""
         key = (f, degree, c)
         if key not in self._known:
             series_of_component = self._maps[f] if c is None else self._slopes[f][c]
@@ -87,5 +87,5 @@ class _Parts:
         return prod(powers, start=self.functions.ring(1))
 
     def _covector_slope(self, f: int, degree: int, c: int) -> Any:
-        """∂f/∂p_c of the part of a degree."""
+        """Return ∂f/∂p_c of the part of a given degree of a map."""
         return self._part(f, degree).diff(self.functions.element(self._p[c]))

@@ -1,7 +1,7 @@
 """Polynomials in functions, by sympy: the arithmetic of the second derivation, and its proofs that an expression is 0.
 
-A *function* is a factor of monomials: x, a parameter, exp(x), sin(x), π, and of powers 1/b, b^{1/q} and b^{cx}. Powers
-whose exponent is a sum make products, and so do tan u = sin u/cos u, tanh u = sinh u/cosh u and |u| = u sign u.
+A *function* is a factor of monomials: x, a parameter, exp(x), sin(x), π, and the powers 1/b, b^{1/q} and b^{cx}. Powers
+whose exponent is a sum become products, as do tan u = sin u/cos u, tanh u = sinh u/cosh u and |u| = u sign u.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import mpmath
 import sympy
 from sympy.polys.rings import ring
 
-#: A polynomial with more terms than this ends the derivation: the next product would take minutes.
+#: Largest number of terms of a polynomial; above it the derivation ends, since the next product would take minutes.
 MOST_TERMS = 200_000
 
 _DIGITS = 50
@@ -28,11 +28,11 @@ _QUOTIENTS = {
 
 
 class Sign(sympy.Function):  # type: ignore[misc]
-    """The sign of u, with derivative 0 wherever it exists; sympy's own has a Dirac delta as derivative."""
+    """The sign of u, whose derivative is 0. The derivative of sympy's own function has a Dirac delta."""
 
     @classmethod
     def eval(cls, u: Any) -> Any:
-        """Odd, and known for numbers."""
+        """Simplify: sign(−u) = −sign(u), and the sign of a number is a number."""
         if u.is_number:
             return sympy.sign(u)
         return -cls(-u) if u.could_extract_minus_sign() else None
@@ -65,7 +65,7 @@ class Functions:
         return iter(self._generators)
 
     def element(self, e: Any) -> Any:
-        """The expression as a polynomial in the functions."""
+        """Return an expression as a polynomial in the functions."""
         if e not in self._known:
             self._known[e] = self._element(e)
         return self._known[e]
@@ -80,11 +80,11 @@ class Functions:
         return prod((self.element(f) ** n for f, n in _factors(e)), start=self.ring.one)
 
     def expression(self, element: Any) -> Any:
-        """The polynomial as an expression, in which sympy cancels x · (1/x)."""
+        """Return a polynomial as an expression, in which sympy cancels x · (1/x)."""
         return element.as_expr().xreplace(self._written)
 
     def total(self, elements: Iterable[Any]) -> Any:
-        """The sum of elements. Raises `OverflowError` if it has more than `MOST_TERMS` terms."""
+        """Return the sum of elements. Raises `OverflowError` if it has more than `MOST_TERMS` terms."""
         result: dict[Any, Any] = {}
         for element in elements:
             for monomial, c in element.items():
@@ -94,7 +94,7 @@ class Functions:
         return self.ring.from_dict({monomial: c for monomial, c in result.items() if c})
 
     def split(self, element: Any, variables: Sequence[Any]) -> dict[tuple[int, ...], Any]:
-        """The coefficients of the monomials in some of the functions, by their exponents."""
+        """Return the coefficients of the monomials in some of the functions, by their exponents."""
         positions = [self.ring.gens.index(self._generators[f]) for f in variables]
         parts: dict[tuple[int, ...], dict[Any, Any]] = {}
         for m, c in element.items():
@@ -103,7 +103,10 @@ class Functions:
         return {mu: self.ring.from_dict(part) for mu, part in parts.items()}
 
     def vanishes(self, element: Any) -> bool:
-        """True proves that the element is 0 where it is defined; False, only that the relations do not make it 0."""
+        """Return whether the element is proved to be 0 where it is defined.
+
+        False says only that the relations between the functions do not reduce it to 0.
+        """
         for f in reversed(self._generators):  # a relation refers to earlier generators only
             relation = _relation(f)
             if relation is None:
@@ -113,7 +116,7 @@ class Functions:
             if set(parts) <= {0}:
                 continue
             generator, g = self._generators[f], self.element(value)
-            if power < 0:  # f g = 1, so a multiple has no f
+            if power < 0:  # f g = 1, so a multiple of g has no f
                 top = max(parts)
                 element = self.total(c * g ** (top - e) for e, c in parts.items())
             else:  # f^power = g
@@ -121,7 +124,7 @@ class Functions:
         return bool(element == 0)
 
     def seems_zero(self, element: Any) -> bool:
-        """Whether the element is 0 at one point: cheap, and a hint only."""
+        """Whether the element is 0 at one point: a fast test that proves nothing."""
         symbols = sorted(set().union(*(f.free_symbols for f in self._generators)), key=str)
         point = [sympy.Rational(7 + 3 * k, 5 + 2 * k) for k in range(len(symbols))]
         with mpmath.workdps(_DIGITS):
@@ -142,7 +145,7 @@ def _monomial(values: Sequence[Any], exponents: Sequence[int]) -> Any:
 
 @lru_cache(maxsize=4096)
 def expanded(e: Any) -> Any:
-    """The expression as a sum of products of functions."""
+    """Return an expression as a sum of products of functions."""
     if e.is_Atom:
         return e
     functions = Functions([e])
@@ -164,7 +167,7 @@ def _list_functions(expressions: Iterable[Any], functions: dict[Any, None]) -> N
 
 
 def _relation(f: Any) -> tuple[int, Any] | None:
-    """(q, g) if f^q = g with q > 1, (−1, g) if f g = 1."""
+    """Return the relation of a function f: (q, g) if f^q = g with q > 1, (−1, g) if f g = 1, None if it has none."""
     if isinstance(f, sympy.sin):
         return 2, 1 - sympy.cos(*f.args) ** 2
     if isinstance(f, sympy.cosh):
@@ -178,7 +181,7 @@ def _relation(f: Any) -> tuple[int, Any] | None:
 
 
 def _factors(e: Any) -> list[tuple[Any, int]]:
-    """Factors of e, as pairs of an expression and its power; a function is its own only factor."""
+    """Return the factors of an expression, as pairs of an expression and its power; a function is its only factor."""
     if e.is_Mul:
         return [(a, 1) for a in e.args]
     if isinstance(e, sympy.Abs | sympy.sign):
@@ -195,7 +198,7 @@ def _factors(e: Any) -> list[tuple[Any, int]]:
 
 
 def _powers(base: Any, exponent: Any) -> list[tuple[Any, int]]:
-    """The factors of base^exponent, where bases of functions have coprime coefficients."""
+    """Return the factors of base^exponent; the bases of functions have coprime coefficients."""
     c, m = exponent.as_coeff_Mul(rational=True)
     if m != 1:
         return [(base ** (sympy.sign(c) * m / c.q), abs(int(c.p)))]

@@ -3,9 +3,9 @@
 For 0 ≤ s ≤ 1 and constant p, let x be the mean of the path, and m(s) = x + m_1(s) + m_2(s) + …, m_k of degree k in p:
 
     dm_k/ds = part of degree k of π(m)p = Σ_ν π_ν(x)p (m_1 + … + m_{k−1})^ν,    π_ν = ∂^ν π(x)/ν!,
-    ∫₀¹ m_k ds = 0,
+    ∫₀¹ m_k ds = 0.
 
-which give m_1 = (s − ½) πp, and so on. Then α = m(0) and β = m(1). There is nothing to invert.
+The solution begins with m_1 = (s − ½) πp. Then α = m(0) and β = m(1). No map has to be inverted.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from phigen.series.reference_functions import Functions
 
 
 def paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], s: Any) -> Iterator[list[Any]]:
-    """m_1(s), m_2(s), … without end, each n expressions in x, p and s; ``poisson`` is the matrix π(x)."""
+    """Yield m_1(s), m_2(s), … without end, each as n expressions in x, p and s; ``poisson`` is the matrix π(x)."""
     path_terms: list[list[Any]] = []
     while True:
         path_terms.append(_part(poisson, path_terms, x, p, s))
@@ -28,7 +28,7 @@ def paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], s: Any) -> Iterator[
 
 
 def _part(poisson: Any, lower_terms: Sequence[Sequence[Any]], x: Sequence[Any], p: Sequence[Any], s: Any) -> list[Any]:
-    """m_k from those before it."""
+    """Return m_k from m_1 … m_{k−1}."""
     degree, n = len(lower_terms), len(x)
     tensor = [[taylor(poisson[a, b], x, degree) for b in range(n)] for a in range(n)]
     operands = [c for row in tensor for entry in row for c in entry.values()]
@@ -38,14 +38,14 @@ def _part(poisson: Any, lower_terms: Sequence[Sequence[Any]], x: Sequence[Any], 
 
 
 def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Sequence[Any], degree: int) -> Any:
-    """One component of π(m)p in degree k, of π(m) in degree k − 1."""
+    """Return the part of degree k of one component of π(m)p, with π(m) in degree k − 1."""
     return functions.total(
         deviation.combined(entry, degree) * functions.element(pb) for entry, pb in zip(row, p, strict=True)
     )
 
 
 def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
-    """The integral over s whose mean from 0 to 1 is 0."""
+    """Return the integral over s whose mean from 0 to 1 is 0."""
     time, rational = functions.element(s), sympy.QQ
     return functions.expression(
         functions.total(
@@ -56,7 +56,7 @@ def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
 
 
 def source_of_paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], time: int = 0) -> Source:
-    """The a_μ of α = m(0), or those of β = m(1)."""
+    """Return the a_μ of α = m(0), or those of β = m(1), as a `Source`; ``time`` is 0 or 1."""
     s = sympy.Dummy("s")
     following = paths(poisson, x, p, s)
     parts: list[list[Any]] = []

@@ -1,6 +1,6 @@
 """Spec files: from YAML to `Spec` with source positions, and all errors of users in a spec.
 
-`load` and `loads` read a spec, `schema` describes the format for editors, `starter` writes a first one.
+`load` and `loads` read a spec, `schema` describes the format for editors, `starter` returns a first spec.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 __all__ = ["load", "loads", "schema", "starter"]
 
-# The work is imported inside the functions: other modules import phigen.spec.model, and that shall be cheap.
-# No module here is named as a function of this one: importing it would replace the function.
+# Modules are imported inside the functions, so that importing phigen.spec.model is fast. No module may have the name of
+# a function here: its import would replace the function.
 
 
 def load(path: str | PathLike[str]) -> Spec:
-    """The spec in a file.
+    """Return the spec in a file.
 
-    Raises `SpecError` with all errors found, in the order of the file, or `LimitError` if a limit is exceeded.
+    Raises `SpecError` with all errors, in the order of the file, or `LimitError` if a limit is exceeded.
     """
     from phigen import resources
     from phigen.errors import Diagnostic, SpecError
@@ -44,21 +44,21 @@ def load(path: str | PathLike[str]) -> Spec:
 
 
 def loads(text: str, file: str = "<string>") -> Spec:
-    """The spec in a text; ``file`` is its name in messages. Raises as `load` does."""
+    """Return the spec in a text; ``file`` is its name in messages. Raises as `load` does."""
     from phigen.spec.validate import validate
 
     return validate(text.encode("utf-8", "surrogatepass"), file)
 
 
 def schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of spec files, for editors."""
+    """Return the JSON Schema (draft 2020-12) of spec files, for editors."""
     from phigen.spec.json_schema import schema as build
 
     return build()
 
 
 def starter(name: str, *, lattice: bool = False) -> str:
-    """A commented spec to start from. Raises `SpecError` if the name is not one for a spec."""
+    """Return a commented spec to start from. Raises `SpecError` if the name is not allowed for a spec."""
     from phigen.spec.first_spec import starter as build
 
     return build(name, lattice=lattice)

@@ -9,14 +9,15 @@ from typing import Any
 from phigen.symbolic.expression import Expression, fold
 from phigen.symbolic.numeric import Numbers, evaluate_precisely
 
-#: Digits of the evaluation: enough to round correctly after the cancellations of an honest formula.
+#: Number of digits of the evaluation: sufficient for correct rounding after the cancellations of usual formulas.
 DIGITS = 77
 
 
 def nearest_double(expression: Expression) -> Fraction | None:
-    """The double nearest to an expression without symbols, or ``None`` if it is not a finite real number.
+    """Return the double nearest to an expression without symbols, or None if it is not a finite real number.
 
-    Doubles go first and stop at the first overflow: ``exp(exp(exp(100)))`` to 77 digits would never end.
+    The expression is first evaluated in doubles; the evaluation stops at the first overflow. With 77 digits,
+    ``exp(exp(exp(100)))`` would never end.
     """
     floats = Numbers({}, float, math, math.pow)
     try:

@@ -1,6 +1,6 @@
 """Coordinates, time, parameters and definitions: the names of a spec, and the expressions that use them."""
 
-# `return reader.error(…)` reports and returns None, the value of what has an error.
+# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ RENAME = "choose another name"
 
 @dataclass
 class Declarations:
-    """The declared names, and parsing with them.
+    """The declared names of a spec, and methods that parse expressions with these names.
 
-    ``incomplete`` says that some names could not be read: then unknown names are not reported, since they may be
-    among these.
+    ``incomplete`` says that some names could not be read. Unknown names are then not reported, since they may be among
+    these.
     """
 
     reader: Reader
@@ -41,13 +41,14 @@ class Declarations:
     parameters: dict[str, Parameter] = field(default_factory=dict)
     definitions: dict[str, Expression] = field(default_factory=dict)
     varying: set[str] = field(default_factory=set)  # definitions that depend on coordinates
-    time: str = ""  # the name of the time, if there is one
-    dated: set[str] = field(default_factory=set)  # definitions that depend on it
+    time: str = ""  # the name of the time; "" if the spec has none
+    dated: set[str] = field(default_factory=set)  # definitions that depend on the time
     noisy: bool = False
     incomplete: bool = False
     nodes: dict[str, Scalar] = field(default_factory=dict)  # where each name is declared
     within: tuple[Any, ...] = ("poisson",)  # the path of keys to the Poisson structure that is being read
-    refused: dict[str, tuple[str, str]] = field(default_factory=dict)  # names that are not allowed there: message, hint
+    # names that are not allowed in this structure: message and hint
+    refused: dict[str, tuple[str, str]] = field(default_factory=dict)
     lattice: Lattice | None = None
     indexed: bool = True  # whether the expression being read may name neighbours
 
@@ -55,17 +56,17 @@ class Declarations:
 
     @property
     def relation(self) -> str:
-        """Relation between sites; empty for an ordinary spec."""
+        """Relation between sites; "" for an ordinary spec."""
         return self.lattice.relation if self.lattice else ""
 
     @property
     def neighbours(self) -> Neighbours:
-        """The symbols of what has a value at every site."""
+        """The symbols of all quantities with a value at every site."""
         at_sites = (n for n, p in self.parameters.items() if p.at == "sites")
         return Neighbours((*self.coordinates, *at_sites), self.lattice.axes if self.lattice else ())
 
     def _at_bonds(self, names: Mapping[str, Expression]) -> dict[str, tuple[str, str]]:
-        """Names that have a value at bonds only."""
+        """Return the names that have a value at bonds only, with a message and a hint for their use at sites."""
         bond_parameters = {n for n, p in self.parameters.items() if p.at == "bonds"}
         bond_names = (
             {n for n, e in names.items() if bond_parameters.intersection(symbols_of(e))} if bond_parameters else set()
@@ -73,7 +74,7 @@ class Declarations:
         return {n: (f"{n!r} has a value at every bond, not at sites", "use it in bonds:") for n in bond_names}
 
     def _counters(self) -> dict[str, tuple[str, str]]:
-        """The names of indices and sizes, which are no part of a density."""
+        """Return the names of indices and sizes, which are not allowed in a density, with messages and hints."""
         reason = "this expression must be the same for all sites"
         hint = "a parameter at: sites has a value for each site"
         index_names = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
@@ -83,7 +84,7 @@ class Declarations:
         }
 
     def indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
-        """Names that may have an index: those that depend on the site."""
+        """Return the names that may have an index: those that depend on the site."""
         if self.lattice is None or not self.indexed:
             return None
         neighbours = self.neighbours
@@ -97,7 +98,10 @@ class Declarations:
         return Indices(neighbours, varying, {**same, **at_bonds}, ends)
 
     def bond_scope(self, *, dated: bool = False) -> AllowedNames:
-        """For brackets along bonds and, ``dated``, densities of bonds and pairs: sites are the ends a and b."""
+        """Return the names for brackets along bonds, whose sites are the ends a and b.
+
+        If ``dated``, the time is included, for densities of bonds and pairs.
+        """
         scope = self.dated_scope() if dated else self.scope()
         names = scope.names
         indices = self.indices(names, ENDS)
@@ -110,13 +114,13 @@ class Declarations:
         return AllowedNames(common_names, refused, open=self.incomplete, indices=indices)
 
     def site_numbers(self) -> AllowedNames:
-        """For values at sites: the indices, counted from 0, and the sizes."""
+        """Return the names for values at sites: the indices, counted from 0, and the sizes."""
         indices = self.lattice.indices if self.lattice and self.relation != "graph" else ()
         names = {n: symbol(n) for i in indices for n in (i, f"N_{i}")}
         return AllowedNames(names, self.numbers().refused)
 
     def neighbour(self, node: Scalar, ends: tuple[str, ...] = ()) -> tuple[str, Offset] | None:
-        """The coordinate that a key names, and its offset."""
+        """Return the coordinate that a key names, and its offset; None after an error, which is reported."""
         if "[" not in node.text:
             index = self.coordinate(node)
             return None if index is None else (self.coordinates[index], self.neighbours.origin)
@@ -137,7 +141,7 @@ class Declarations:
     # --- scopes
 
     def scope(self, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Return everything declared except the time: for functions on phase space, and for densities of sites."""
+        """Return everything declared except the time, for functions on phase space and for densities of sites."""
         names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)}
         names |= {n: e for n, e in self.definitions.items() if n not in self.dated} | dict(extra or {})
         bonds = self._at_bonds(names)
@@ -146,7 +150,7 @@ class Declarations:
         return AllowedNames(allowed_names, refused, open=self.incomplete, indices=self.indices(allowed_names))
 
     def dated_scope(self) -> AllowedNames:
-        """Everything declared: for functions on phase space that may depend on the time."""
+        """Return everything declared, for functions on phase space that may depend on the time."""
         scope = self.scope()
         dated = {n: self.definitions[n] for n in self.dated} | ({self.time: symbol(self.time)} if self.time else {})
         bonds = self._at_bonds(dated)
@@ -156,14 +160,16 @@ class Declarations:
         return replace(scope, names=names, refused=refused, indices=self.indices(names))
 
     def _timeless(self) -> dict[str, tuple[str, str]]:
-        """The refusal of the time where nothing may depend on it."""
+        """Return the message and hint that refuse the time where an expression must not depend on it."""
         hint = "only the Hamiltonian, invariants, sections and exact solutions may"
         refused = {n: (f"this must not depend on the time, as {n!r} does", hint) for n in sorted(self.dated)}
         return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
 
     def constants(self, value_name: str, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Return parameters and definitions of parameters only; ``value_name`` names the value in messages about other
-        names."""
+        """Return parameters and definitions of parameters only.
+
+        ``value_name`` names the value in messages about other names.
+        """
         names = {n: symbol(n) for n in self.parameters}
         names |= {n: e for n, e in self.definitions.items() if n not in self.varying | self.dated}
         bonds = self._at_bonds(names)
@@ -176,7 +182,7 @@ class Declarations:
         return AllowedNames(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
     def dated_constants(self, value_name: str) -> AllowedNames:
-        """Return parameters, definitions of parameters and the time, and the time itself; see `constants`."""
+        """Return parameters, the time, and definitions that depend on these only; see `constants`."""
         scope = self.constants(value_name)
         dated = {n: self.definitions[n] for n in self.dated - self.varying}
         dated |= {self.time: symbol(self.time)} if self.time else {}
@@ -184,13 +190,16 @@ class Declarations:
         return replace(scope, names={**scope.names, **dated}, refused=refused)
 
     def numbers(self) -> AllowedNames:
-        """No declared name at all: for defaults and initial values."""
+        """Return no declared name, for defaults and initial values."""
         declared = (*self.coordinates, *self.parameters, *self.definitions, *filter(None, [self.time]))
         hint = "formulas of values may contain indices and sizes, such as i and N_i" if self.lattice else ""
         return AllowedNames({}, {n: (f"expected a number; {n!r} is not constant", hint) for n in declared})
 
     def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
-        """Declarations for an inner structure with other coordinates; errors on outer names begin with ``message``."""
+        """Return the declarations for an inner structure with other coordinates.
+
+        Messages about names of the outer structure begin with ``message``.
+        """
         excluded = [c for c in self.coordinates if c not in coordinates]
         gone = {n for n, e in self.definitions.items() if any(s in excluded for s in symbols_of(e))}
         return replace(
@@ -204,7 +213,7 @@ class Declarations:
     # --- values
 
     def formula(self, node: Scalar | None, scope: AllowedNames) -> Expression | None:
-        """The expression in a scalar, or ``None`` after reporting its errors at their columns."""
+        """Return the expression in a scalar; None after its errors, which are reported at their columns."""
         if node is None:
             return None
 
@@ -219,7 +228,7 @@ class Declarations:
         return parse(node.text, scope, report)
 
     def number(self, node: Scalar | None, scope: AllowedNames = NOTHING) -> Fraction | None:
-        """The value of a constant expression."""
+        """Return the value of a constant expression; None after errors, which are reported."""
         expression = self.formula(node, scope)
         if node is None or expression is None:
             return None
@@ -229,7 +238,7 @@ class Declarations:
         return value
 
     def coordinate(self, node: Scalar) -> int | None:
-        """The index of a coordinate that is named."""
+        """Return the index of the coordinate that a scalar names; None after an error, which is reported."""
         if node.text in self.coordinates:
             return self.coordinates.index(node.text)
         if not self.incomplete:
@@ -245,7 +254,7 @@ class Declarations:
         return (TIMED_ARGUMENTS if self.time else ARGUMENTS) | (NOISY_ARGUMENTS if self.noisy else frozenset())
 
     def declare(self, node: Scalar, kind: str) -> bool:
-        """Whether expressions may use the name; an error is reported if it is not free."""
+        """Return whether expressions may use the name. If the name is not free, an error is reported."""
         name, first = node.text, self.nodes.get(node.text)
         if name in SPEC_FUNCTIONS:
             self.reader.error(node, f"the {kind} {name!r} has the name of a function", RENAME)
@@ -254,11 +263,13 @@ class Declarations:
             self.reader.error(node, f"the name {name!r} is declared twice; the first is in {first_place}")
         elif kind == "parameter" and name in self.arguments:
             self.reader.error(node, f"a parameter cannot be called {name!r}", argument_hint(name))
-            self.nodes[name] = node  # so that its uses are no errors too
+            # the name is declared all the same, so that its uses are not reported as errors too
+            self.nodes[name] = node
             return True
         elif self.lattice and name in (*self.lattice.indices, *(f"N_{i}" for i in self.lattice.indices)):
             self.reader.error(node, f"the {kind} {name!r} has the name of an index or size of the lattice", RENAME)
-        elif self.lattice and self.lattice.graph and name in (self.lattice.graph, "bonds"):  # an argument of solvers
+        # "bonds" is an argument of solvers
+        elif self.lattice and self.lattice.graph and name in (self.lattice.graph, "bonds"):
             self.reader.error(node, f"the {kind} {name!r} has the name of the bonds of the lattice", RENAME)
         else:
             self.nodes[name] = node
@@ -304,7 +315,7 @@ def _lattice(raw: Raw | None, reader: Reader) -> Lattice | None:
         )
         reader.problems.add(message, reader.locations["lattice", "boundary"], "a single word holds for all axes")
     graph = raw.get("graph")
-    if not (axes or graph or "pairs" in raw):  # what was wrong is reported
+    if not (axes or graph or "pairs" in raw):  # the reason was reported before
         return Lattice(("i",), ("periodic",))
     return Lattice(axes, tuple(b or "periodic" for b in boundary), graph.text if graph else "", "pairs" in raw)
 
@@ -341,7 +352,7 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
         if number is not None and bounded.refuses(number):
             message = f"is {bounded.bound} by declaration, but its value is {options['value'].text}"
             declared.reader.error(options["value"], f"the parameter {name!r} {message}")
-        # A value with an error is reported; the name stays declared, so that its uses are not reported too.
+        # A wrong value was reported. The name is declared all the same, so that its uses are not reported too.
         value = Fraction(1) if number is None else number
         description, unit = options.get("description", ""), options.get("unit", "")
         is_small = options.get("small", False)
@@ -351,7 +362,7 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
 
 
 def _expect_place(name: str, domain: str, declared: Declarations) -> None:
-    """Report a parameter with values at sites or bonds where the spec has none."""
+    """Report a parameter with values at sites or bonds if the spec has no sites or bonds."""
     relations = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(domain)
     if relations and declared.relation not in relations:
         needs = "a lattice with a graph" if domain == "bonds" and declared.relation else "specs with lattice:"
@@ -363,7 +374,7 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
     sources = {name: node for name, (key, node) in entries.items() if declared.declare(key, "definition")}
     uses = {name: names_in(node.text) if node else [] for name, node in sources.items()}
     coordinates = set(declared.coordinates)
-    # Placeholders: only the members of a cycle, which is an error, see one.
+    # Placeholders: only the members of a cycle, which is an error, can refer to one.
     scope = declared.dated_scope()
     names = {**scope.names, **{name: symbol(name) for name in sources}}
     for name in _in_order(uses, entries, declared.reader):
@@ -373,20 +384,20 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
             declared.dated.add(name)
         definition_scope = replace(scope, names=names, indices=declared.indices(names))
         expression = declared.formula(sources[name], definition_scope)
-        # After an error the name stays declared, so that its uses are not reported too.
+        # After an error the name is declared all the same, so that its uses are not reported too.
         declared.definitions[name] = names[name] = symbol(name) if expression is None else expression
 
 
 def _in_order(
     uses: Mapping[str, list[str]], keys: Mapping[str, tuple[Scalar, Node | None]], reader: Reader
 ) -> list[str]:
-    """Return the definitions, each after the ones it uses; cycles are reported and broken."""
+    """Return the definitions, each after those that it uses. Cycles are reported and broken."""
     graph = {name: [u for u in used_names if u in uses] for name, used_names in uses.items()}
     while True:
         try:
             return list(TopologicalSorter(graph).static_order())
         except CycleError as error:
-            members: list[str] = error.args[1][:-1][::-1]  # each uses the next
+            members: list[str] = error.args[1][:-1][::-1]  # each member uses the next one
             start = members.index(min(members, key=list(graph).index))
             cycle = [*members[start:], *members[:start], members[start]]
             reader.error(keys[cycle[0]][0], f"definitions in a cycle: {shown(' → '.join(cycle), 200)[1:-1]}")

@@ -1,4 +1,4 @@
-"""The format of a spec file, as one table; the validator and the JSON Schema are both made from it."""
+"""The format of a spec file, as one table from which the validator and the JSON Schema are made."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ MATRIX = ListOf(ListOf(FORMULA, least=1), least=1)
 BASIS = ShapedText(r"E[1-9][0-9]*", "the name of a basis element", "basis elements are E1, E2, …")
 
 RANDOM = MapOf(NAME, CONSTANT, least=1)
-#: A number, a formula of the indices or a file; a list; {random: …, seed: …, scale: …, mean: …}.
+#: A number, a formula of the indices, or a file; a list; or a mapping {random: …, seed: …, scale: …, mean: …}.
 VALUES = Either({Scalar: CONSTANT, Sequence: ListOf(CONSTANT, least=1), Mapping: RANDOM})
 PARAMETER = Record(
     "a parameter",
@@ -117,7 +117,8 @@ _FORMS: dict[str, tuple[Kind, str]] = {
 
 
 def _structure(subject: str, nested: int, *further_keys: RecordKey) -> Record:
-    """A Poisson structure in one of its forms; products and pull-backs hold others, ``nested`` levels deep."""
+    """Return the kind of a Poisson structure in one of its forms; products and pull-backs may be ``nested`` this
+    deep."""
     forms = [RecordKey(form, *described) for form, described in _FORMS.items()]
     if nested:
         names = ListOf(NAME, least=1)
@@ -375,7 +376,7 @@ RUN = Record(
     elsewhere=_BESIDE_RUNS,
 )
 
-#: Values that a sweep may store; observables are checked later.
+#: Words that a sweep may store; whether their observables exist is checked later.
 KEPT_WORD = ShapedText(
     r"\w+|\w+ *\( *\w+ *\)",
     "a result of a sweep",

@@ -98,9 +98,9 @@ runs:
 
 
 def starter(name: str, *, lattice: bool = False) -> str:
-    """The starter spec of that name, for one system or for a lattice.
+    """Return the starter spec with this name, for one system or for a lattice.
 
-    Raises `SpecError` if the name is not one for a spec.
+    Raises `SpecError` if the name is not allowed for a spec.
     """
     text = (_LATTICE if lattice else _TEMPLATE).format(name=name)
     loads(text, f"{name}.yaml")

@@ -48,22 +48,22 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol
 
 CONSTANTS = {"pi": PI, "E": EULER}
-#: Names of functions in other languages, and those in specs.
+#: Names of functions in other languages, with their names in specs.
 OTHER_FUNCTIONS = {"ln": "log", "fabs": "abs", "arcsin": "asin", "arccos": "acos", "arctan": "atan", "arctan2": "atan2"}
 
 
 class Report(Protocol):
-    """Receives an error at a character of the expression's text."""
+    """Function that receives an error at a character of the expression's text."""
 
     def __call__(self, message: str, index: int, hint: str = "", *, limit: bool = False) -> None: ...
 
 
 @dataclass(frozen=True)
 class AllowedNames:
-    """The names an expression may use.
+    """The names that an expression may use.
 
-    ``refused`` holds names that exist but not here, each with the message that says why and a hint.
-    With ``open``, any other name is taken for declared. ``indices`` says what may have an index, if anything may.
+    ``refused`` has names that exist but are not allowed here, each with a message and a hint. If ``open``, every other
+    name counts as declared. ``indices`` describes the names that may have an index, None if there are none.
     ``piecewise`` allows functions without a derivative (`phigen.spec.names.PIECEWISE_FUNCTIONS`).
     """
 
@@ -74,7 +74,7 @@ class AllowedNames:
     piecewise: bool = False
 
     def lookup(self, name: str) -> Expression | None:
-        """Expression that a name stands for; declared names win over constants."""
+        """Return the expression that a name stands for, or None. Declared names take precedence over constants."""
         if name in self.names:
             return self.names[name]
         if name in self.refused:
@@ -82,7 +82,7 @@ class AllowedNames:
         return CONSTANTS.get(name) or (symbol(name) if self.open and name not in SPEC_FUNCTIONS else None)
 
     def unknown(self, name: str) -> tuple[str, str]:
-        """Return message and hint for a name that `lookup` does not find."""
+        """Return the message and the hint for a name that `lookup` does not know."""
         if name in self.refused:
             return self.refused[name]
         if name.lower() in ("nan", "inf", "infinity"):
@@ -117,13 +117,13 @@ _CHARACTER_HINTS = {
     ":": "expressions are not Python",
 }
 
-#: Corrections for wrong operator characters: reading continues with these, so that all errors are reported.
+#: Replacements for wrong operator characters: reading continues with these, so that all errors are reported.
 _MEANT = {"^": "**", "−": "-", "–": "-", "·": "*", "×": "*"}
 
 
 @dataclass(frozen=True)
 class Token:
-    """A lexical element: ``kind`` is number, name, operator or end."""
+    """A lexical element; ``kind`` is number, name, operator or end."""
 
     kind: str
     text: str
@@ -135,7 +135,10 @@ class _AbandonedError(Exception):
 
 
 def tokens(source: str, report: Report) -> list[Token] | None:
-    """The tokens of an expression, the last of kind ``end``, or ``None`` after reporting what cannot be read."""
+    """Return the tokens of an expression, the last one of the kind ``end``.
+
+    None if some text cannot be read, which is reported.
+    """
     if len(source) > limits.EXPRESSION_LENGTH:
         message = f"the expression has {len(source)} characters, more than the limit of {limits.EXPRESSION_LENGTH}"
         report(message, 0, "name parts of it under definitions", limit=True)
@@ -161,15 +164,15 @@ def tokens(source: str, report: Report) -> list[Token] | None:
 
 
 def names_in(source: str) -> list[str]:
-    """The names an expression mentions, in order, without reporting errors."""
+    """Return the names in an expression, in order. Errors are not reported."""
     token_list = tokens(source, lambda message, index, hint="", *, limit=False: None)
     return [t.text for t in token_list or [] if t.kind == "name"]
 
 
 def parse(source: str, scope: AllowedNames, report: Report) -> Expression | None:
-    """The expression that a text stands for; ``None`` after errors, which went to ``report``.
+    """Return the expression that a text stands for; None after errors, which are passed to ``report``.
 
-    A syntax error ends the reading; unknown names and undefined values are all reported.
+    Reading ends at a syntax error. Unknown names and undefined values are all reported.
     """
     failed = False
 
@@ -189,7 +192,7 @@ def parse(source: str, scope: AllowedNames, report: Report) -> Expression | None
 
 
 class Parser:
-    """Reads tokens to an expression, by a method for each rule of the grammar."""
+    """Parser from tokens to an expression, with a method for each rule of the grammar."""
 
     nothing = symbol(Symbol("unknown", ""))  # placeholder for an expression with an error
 
@@ -212,7 +215,7 @@ class Parser:
         return token
 
     def advance(self) -> Token:
-        """Return the current token and advance; the end is never passed."""
+        """Return the current token and go to the next one; the end token is never passed."""
         token = self.here
         self.position += token.kind != "end"
         return token
@@ -247,7 +250,7 @@ class Parser:
         return result
 
     def misplaced(self) -> _AbandonedError:
-        """The error for a token after a complete operand."""
+        """Return the error for a token after a complete operand."""
         token, previous = self.here, self.tokens[self.position - 1]
         if token.text in ("[", "]"):
             return self.bracket(token)
@@ -333,7 +336,7 @@ class Parser:
         raise self.abandon(f"unexpected {token.text!r}", token.index, hint)
 
     def bracket(self, token: Token) -> _AbandonedError:
-        """The error for a bracket that is no index."""
+        """Return the error for a bracket that is not an index."""
         follows = token.text == "[" and self.position and self.tokens[self.position - 1].kind == "name"
         hint = "neighbours, x[i+1], are for specs with lattice:" if follows else "an expression is a scalar: use ( )"
         return self.abandon(f"the character {token.text!r} does not belong in an expression", token.index, hint)
@@ -349,7 +352,7 @@ class Parser:
 
     def number(self, token: Token) -> Expression:
         mantissa, _, exponent = token.text.lower().partition("e")
-        # Checked before the conversion: 1e999999999 would fill the memory.
+        # The length is checked before the conversion: 1e999999999 would fill the memory.
         digits = len(mantissa) + abs(int(exponent or 0)) if len(exponent) < 6 else math.inf
         value = Fraction(token.text) if digits <= 2 * len(str(limits.DENOMINATOR)) else None
         if value is None or not limits.number_is_bounded(value):
@@ -396,7 +399,7 @@ class Parser:
         return self.applied(token, arguments)
 
     def piecewise(self, token: Token, opening: Token) -> Expression:
-        """Read the arguments of a piecewise function, whose name was read."""
+        """Read the arguments of a piecewise function whose name was read before."""
         name = token.text
         if not self.scope.piecewise:
             hint = "H, brackets, Casimirs and what steps depend on need derivatives"
@@ -413,7 +416,7 @@ class Parser:
         return _PIECEWISE[name](*arguments)
 
     def condition(self) -> Expression:
-        """Read a comparison, as an expression that is positive where it holds."""
+        """Read a comparison, and return an expression that is positive where the comparison is true."""
         left = self.sum()
         token = self.accept("<", "<=", ">", ">=")
         if token is None:
@@ -436,7 +439,7 @@ class Parser:
         return sqrt(first) if function == "sqrt" else call(function, *arguments)
 
     def raised(self, base: Expression, exponent: Fraction, token: Token) -> Expression:
-        """base ** exponent, refused before it is computed if it is undefined or too large."""
+        """Return base ** exponent; a power that is undefined or too large is refused before it is computed."""
         if abs(exponent) > limits.EXPONENT:
             message = f"the exponent {_brief(exponent)} is out of range"
             self.report(
@@ -459,7 +462,7 @@ class Parser:
         return self.bounded(power(base, exponent), token)
 
     def bounded(self, result: Expression, token: Token) -> Expression:
-        """The result, unless folding made a constant or an exponent that is out of range."""
+        """Return the result unless constant folding made a constant or an exponent that is out of range."""
         parts = [result, *result.args]
         for part in [*parts, *(a for p in parts[1:] for a in p.args)]:
             if part.is_number and not limits.number_is_bounded(part.value):
@@ -476,7 +479,7 @@ class Parser:
         return result
 
 
-#: Piecewise functions by ``choose(a, b, c)``, which is b where a > 0, else c; heaviside(0) is 1.
+#: Piecewise functions in terms of ``choose(a, b, c)``, which is b where a > 0, else c. heaviside(0) is 1.
 _PIECEWISE: Mapping[str, Callable[..., Expression]] = {
     "sign": lambda a: call("sign", a),
     "heaviside": lambda a: call("choose", neg(a), number(Fraction(0)), ONE),
@@ -496,9 +499,9 @@ def _defined(function: str, *arguments: Fraction) -> bool:
 
 
 def constant(expression: Expression) -> Fraction | None:
-    """The value of an expression without symbols: exact if it is rational, else that of the nearest double.
+    """Return the value of an expression without symbols: exact if it is rational, else the nearest double.
 
-    ``None`` if it is not finite or not a real number.
+    None if the value is not a finite real number.
     """
     if expression.is_number:
         value: Fraction = expression.value

@@ -1,4 +1,4 @@
-"""Digest of the parts of a spec that say what the columns of its output are."""
+"""Digest of those parts of a spec that determine the meaning of the columns of its output."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from phigen.spec.model import Spec
 from phigen.spec.problems import Problems
 from phigen.spec.yaml_source import Mapping, Node, Scalar, Sequence, read
 
-#: Keys of a spec that determine the meaning of columns. Values of parameters, methods and runs are left out: with
-#: others, a file holds the same quantities.
+#: Keys of a spec that determine the meaning of columns. Values of parameters, methods and runs are not among them:
+#: files with other values hold the same quantities.
 DETERMINING = (
     "coordinates", "time", "definitions", "poisson", "hamiltonian", "forces", "damping", "noise", "casimirs",
     "observables", "lattice", "monitor", "reconstruct",
 )  # fmt: skip
-#: Hexadecimal digits of a digest: two specs of one person do not share 64 bits by chance.
+#: Number of hexadecimal digits of a digest: the specs of one person do not share 64 bits by chance.
 DIGITS = 16
 
 

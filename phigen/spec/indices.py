@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 class Indices:
     """Names that may have an index, and the indices that they may have.
 
-    ``names`` maps names with values at sites to the expression at the site itself; ``refused`` has messages and hints
-    for names without. On a grid an index is an offset from the site; on a bond it is one of ``ends``.
+    ``names`` maps names with values at sites to the expression at the site itself. ``refused`` has messages and hints
+    for names without values at sites. On a grid an index is an offset from the site; on a bond it is one of ``ends``.
     """
 
     neighbours: Neighbours
@@ -35,7 +35,7 @@ class Indices:
     ends: tuple[str, ...] = ()
 
     def read(self, parser: Parser, token: Token) -> Expression:
-        """The value of a name with an index; the parser stands on the bracket."""
+        """Return the value of a name with an index; the parser is at the bracket."""
         opening = parser.advance()
         if not (self.ends or self.neighbours.axes):
             message = f"{token.text}[…]: sites of this lattice have no neighbours by index"

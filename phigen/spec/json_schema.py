@@ -1,4 +1,4 @@
-"""JSON Schema of the spec format, for editors: made from the table the validator reads with."""
+"""JSON Schema of the spec format, for editors, from the table of the format that the validator uses."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from phigen.spec.fields import FORMAT_VERSION, SPEC
 
 
 def schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of a spec file.
+    """Return the JSON Schema (draft 2020-12) of a spec file.
 
-    It says what can be said without reading expressions: a spec that phigen accepts always conforms.
+    It contains all rules that do not require reading expressions: every spec that phigen accepts conforms to it.
     """
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -1,11 +1,11 @@
-"""Kinds of values a spec is made of: each reads a node and describes itself as JSON Schema.
+"""Kinds of values in a spec: each kind reads a node and describes itself as JSON Schema.
 
-`fields.py` builds the table of the format from these; the validator and the schema both come from that
-table. Reading checks the shape only: texts of expressions stay `Scalar` nodes, to be parsed when the names
-are known. A value with an error is reported and reads as ``None``, which is never a value otherwise.
+`fields.py` builds the table of the format from kinds; the validator and the schema both come from that table. Reading
+checks the shape only: texts of expressions stay `Scalar` nodes, which are parsed when the names are known. A value with
+an error is reported and read as None, which is never a valid value.
 """
 
-# `return reader.error(…)` reports and returns None, the value of what has an error.
+# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from phigen.spec.yaml_source import Mapping as MappingNode
 from phigen.spec.yaml_source import Node, Scalar, describe, is_unprintable, kind_of
 from phigen.spec.yaml_source import Sequence as SequenceNode
 
-#: Dates of YAML would be read as differences: 2026-01-01 is 2024.
+#: YAML reads dates as text, whose parse as an expression would be a difference: 2026-01-01 is 2024.
 _DATE = re.compile(r"\s*[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}([Tt\s]|$)")
 
 _LISTS = "lists are written [a, b]"
@@ -35,7 +35,7 @@ Schema = dict[str, Any]
 
 @dataclass
 class Reader:
-    """Results of reading beside the values: the errors, and the place and the purpose of every part."""
+    """Results of reading in addition to the values: the errors, and the place and the purpose of every part."""
 
     problems: Problems
     locations: dict[Path, Location] = field(default_factory=dict)
@@ -47,13 +47,14 @@ class Reader:
 
 
 def label(path: Path) -> str:
-    """``key: `` for the innermost key around a value, to begin a message with."""
+    """Return ``key: `` for the innermost key around a value, with which messages begin."""
     keys = [part for part in path if isinstance(part, str)]
     return f"{keys[-1]}: " if keys else ""
 
 
 def list_hint(node: Node) -> str:
-    """Return the hint for a node in place of a list, with its number, its name or the names of its mapping in one."""
+    """Return the hint for a node where a list is required: the list of its number, its name, or the names of its
+    mapping."""
     if isinstance(node, MappingNode):
         names = [key.text for key, _ in node.entries.values()][:3]
         return f"{_LISTS}; of names only: [{', '.join(names)}]" if names else _LISTS
@@ -63,27 +64,27 @@ def list_hint(node: Node) -> str:
 
 
 class Kind:
-    """A kind of value; ``expected`` names it in messages."""
+    """A kind of value; ``expected`` is its name in messages."""
 
     expected = "a value"
 
     def read(self, node: Node, path: Path, reader: Reader) -> Any:
-        """Value of a node; ``None`` after reporting an error."""
+        """Return the value of a node; None after an error, which is reported."""
         raise NotImplementedError
 
     def schema(self) -> Schema:
-        """JSON Schema of the values."""
+        """Return the JSON Schema of the values."""
         raise NotImplementedError
 
     def mismatch(self, node: Node, path: Path, reader: Reader, hint: str = "") -> None:
-        """Report a node of the wrong kind; without a better hint, with the purpose of its key."""
+        """Report a node of the wrong kind. The hint is ``hint`` or, by default, the purpose of the key."""
         message = f"{label(path)}expected {self.expected}, found {kind_of(node)}"
         reader.error(node, message, hint or reader.purposes.get(path, ""))
 
 
 @dataclass(frozen=True)
 class Text(Kind):
-    """Human text of one or many lines."""
+    """Text for readers, of one or several lines."""
 
     lines: bool = False
     expected = "text"
@@ -126,7 +127,7 @@ class ShapedText(Kind):
         return node if self.accepts(node, reader) else None
 
     def accepts(self, node: Scalar, reader: Reader) -> bool:
-        """Whether the text has the shape; an error is reported if not."""
+        """Return whether the text has the form; an error is reported if it does not."""
         if len(node.text) > self.longest:
             message = f"the name {shown(node.text, 30)} has {len(node.text)} characters, the limit is {self.longest}"
             reader.error(node, message, limit=True)
@@ -170,7 +171,7 @@ class Integer(Kind):
 
     least: int
     most: int
-    limit: bool = False  # whether more than the most is the breach of a limit
+    limit: bool = False  # whether a number above the largest exceeds a limit
 
     expected = "an integer"
 
@@ -211,7 +212,7 @@ class Boolean(Kind):
 
 @dataclass(frozen=True)
 class ExpressionText(Kind):
-    """The text of an expression; parsed later. ``constant`` ones use no names."""
+    """The text of an expression, which is parsed later. A ``constant`` expression uses no names."""
 
     constant: bool = False
 
@@ -245,7 +246,7 @@ class ListOf(Kind):
     def read(self, node: Node, path: Path, reader: Reader) -> list[Any] | None:
         if isinstance(node, MappingNode) and isinstance(self.item, ShapedText):
             self.mismatch(node, path, reader, list_hint(node))
-            # What uses the names is right.
+            # The keys are read as the list: they are the right names, and their uses are not reported.
             node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
         if not isinstance(node, SequenceNode):
             return self.mismatch(node, path, reader, list_hint(node))
@@ -266,7 +267,7 @@ class ListOf(Kind):
 
 @dataclass(frozen=True)
 class MapOf(Kind):
-    """A mapping from names of the user's to values of one kind; reads as name → (key, value)."""
+    """A mapping from names chosen by the user to values of one kind; it is read as name → (key, value)."""
 
     key: ShapedText
     value: Kind
@@ -303,22 +304,22 @@ class MapOf(Kind):
 
 @dataclass(frozen=True)
 class RecordKey:
-    """A key of a record."""
+    """A key of a record, with the kind and the purpose of its value."""
 
     key: str
     kind: Kind
     description: str
     required: bool = False
-    default: Any = None  # for the schema; the validator's defaults are those of the model
+    default: Any = None  # for the schema; the defaults of the validator are those of the model
 
 
 @dataclass(frozen=True)
 class Record(Kind):
-    """A mapping with fixed keys; reads as key → value, keys in error absent.
+    """A mapping with fixed keys. It is read as key → value; keys with errors are left out.
 
-    Of the keys in ``one`` at most (``exactly``: exactly) one may be given; a key of ``instead`` satisfies this too,
-    and may be combined with one of them. ``some`` refuses an empty mapping. ``example`` is part of the error for
-    another kind of value; ``elsewhere`` says where keys that are not allowed here belong.
+    At most one of the keys in ``one`` may be present (with ``exactly``, exactly one). A key in ``instead`` also
+    satisfies this requirement, and may be combined with one of them. ``some`` refuses an empty mapping. ``example`` is
+    part of the error for another kind of value. ``elsewhere`` says where keys belong that are not allowed here.
     """
 
     what: str
@@ -352,7 +353,8 @@ class Record(Kind):
         return values
 
     def _read_value(self, known: RecordKey, key: Scalar, item: Node, path: Path, reader: Reader) -> Any:
-        """Return the value of a known key; for a misspelt word, which is an error, the word that it resembles."""
+        """Return the value of a known key. A misspelt word is an error; its value is then the word that it
+        resembles."""
         inner = (*path, known.key)
         reader.locations[inner] = place(key, item)
         reader.purposes[inner] = known.description
@@ -362,10 +364,11 @@ class Record(Kind):
         return value
 
     def _read_unknown(self, name: str, node: MappingNode, path: Path, reader: Reader) -> tuple[str, Any]:
-        """Report an unknown key; return the missing key that it stands for, and its value as such, None if unreadable.
+        """Report an unknown key, and return the missing key that it stands for, with its value; None if it is
+        unreadable.
 
-        So names that it declares are known, and errors within it are reported. A synonym of a key has no value: values
-        under the name of another program often have another form.
+        So names that the value declares are known, and errors inside the value are reported. A synonym of a key has no
+        value: under the name of another program, values often have another form.
         """
         key, item = node.entries[name]
         hint, meant = self._hint(name, node), self._resembled_key(name, node)
@@ -373,7 +376,7 @@ class Record(Kind):
         if not meant:
             return meant, None
         if name in MEANT or meant in node.entries or (*path, meant) in reader.locations or "did you mean" not in hint:
-            reader.locations.setdefault((*path, meant), key.location)  # so that nobody says it is missing
+            reader.locations.setdefault((*path, meant), key.location)  # so that the key is not reported as missing
             return meant, None
         before = reader.problems.copy()
         known = next(f for f in self.fields if f.key == meant)
@@ -383,7 +386,8 @@ class Record(Kind):
         return meant, value
 
     def _resembled_key(self, name: str, node: MappingNode) -> str:
-        """Return the existing key that an unknown name resembles, if it is not given yet; or ""."""
+        """Return the key of this record that an unknown name resembles and that is not present yet; "" if there is
+        none."""
         keys = [f.key for f in self.fields]
         key = intended(name, keys, MEANT)
         if key in node.entries and key != MEANT.get(name):
@@ -392,14 +396,17 @@ class Record(Kind):
         return key
 
     def _hint(self, name: str, node: MappingNode) -> str:
-        """Hint for an unknown key: the place of the key, or the name that is probably meant."""
+        """Return the hint for an unknown key: where the key belongs, or the name that was probably meant."""
         meant, keys = MEANT.get(name, name), [f.key for f in self.fields]
         misplaced = self.elsewhere.get(name) or ("" if meant in keys else self.elsewhere.get(meant, ""))
         key = self._resembled_key(name, node)
         return misplaced or (f"did you mean {key!r}?" if key else "") or self.instructions()
 
     def instructions(self, node: Node | None = None) -> str:
-        """Hint with the form of the mapping, for a node of another form; if the node names a key, with this key."""
+        """Return the hint for a node that is not a mapping: the form of the mapping.
+
+        If the node is the name of a key, the hint shows this key.
+        """
         named_field = next((f for f in self.fields if isinstance(node, Scalar) and f.key == node.text), None)
         if named_field is not None and isinstance(named_field.kind, Record) and named_field.kind.example:
             return f"write {{{named_field.key}: {named_field.kind.example}}}"
@@ -409,7 +416,7 @@ class Record(Kind):
     def check_presence(self, node: MappingNode, reader: Reader) -> None:
         """Report missing keys, and keys that exclude each other."""
         keys = [f.key for f in self.fields]
-        strange = set(node.entries) - set(keys)  # reported already
+        strange = set(node.entries) - set(keys)  # keys that were reported before
         present_keys = {*node.entries, *(self._resembled_key(name, node) for name in strange)}
         for key_field in self.fields:
             if key_field.required and key_field.key not in present_keys:
@@ -449,7 +456,7 @@ class Record(Kind):
 
 @dataclass(frozen=True)
 class Either(Kind):
-    """A value of the first kind whose node type fits: ``{node type: kind}``."""
+    """A value of the first kind whose node type fits, from ``{node type: kind}``."""
 
     kinds: Mapping[type[Node], Kind]
 
@@ -468,5 +475,5 @@ class Either(Kind):
 
 
 def place(key: Scalar, value: Node) -> Location:
-    """Return the place for messages about a part: a scalar itself, or the key of a collection."""
+    """Return the place for messages about a part: that of the value if it is a scalar, else that of its key."""
     return value.location if isinstance(value, Scalar) and not value.is_null else key.location

@@ -1,6 +1,6 @@
 """The parts of a spec that only lattices have: relations of sites, densities, brackets along bonds, runs."""
 
-# `return reader.error(…)` reports and returns None, the value of what has an error.
+# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
 
 KINDS = ("sites", "sum", "product")
-#: Densities of H by what they belong to, and the relation that they need.
+#: Keys of densities of H other than that of sites, and the relation between sites that each requires.
 COUPLINGS = {"bonds": "graph", "pairs": "pairs"}
 _WANTED = {"graph": "lattice: {graph: NAME}", "pairs": "lattice: {pairs: all}"}
 
 
 def densities(raw: Any, declared: Declarations) -> tuple[Expression, Expression]:
-    """H of a site, and of a bond or pair, from ``hamiltonian:``, an expression or a mapping."""
+    """Return the densities of H of a site, and of a bond or pair, from ``hamiltonian:``, an expression or a mapping."""
     if not isinstance(raw, dict):
         return declared.formula(raw, declared.dated_scope()) or ZERO, ZERO
     sites, coupling = declared.formula(raw.get("sites"), declared.dated_scope()), ZERO
@@ -48,7 +48,7 @@ def densities(raw: Any, declared: Declarations) -> tuple[Expression, Expression]
 
 
 def casimirs(raw: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, Expression], dict[str, str]]:
-    """The densities of Casimirs, and whether they belong to sites, to a sum or to a product, where the spec says it."""
+    """Return the densities of Casimirs, and their kinds (of sites, sum, product) for those with a kind in the spec."""
     formulas, kinds = {}, {}
     for name, (key, entry) in raw.items():
         options = entry if isinstance(entry, dict) else {"value": entry}
@@ -63,12 +63,15 @@ def casimirs(raw: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, 
 
 
 def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapping[str, str], **parts: Any) -> Lattice:
-    """The lattice with what was read since; a Casimir without neighbours is one of each site unless the spec says."""
+    """Return the lattice with the parts that were read later.
+
+    A Casimir without a kind in the spec is one of each site if it has no neighbours.
+    """
     local = {name: "sum" if any("[" in s for s in symbols_of(e)) else "sites" for name, e in casimirs.items()}
     return replace(lattice, kinds={**local, **kinds}, **parts)
 
 
-#: Keys of runs that lattices do not have: the reasons, and what to do.
+#: Keys of runs that lattices do not have, with the reason and a hint.
 _ABSENT_IN_RUNS = {
     "box": "certificates are those of ordinary systems; phigen show --expand prints a lattice as one",
     "exact": "closed forms are those of ordinary systems; phigen show --expand prints a lattice as one",
@@ -80,23 +83,25 @@ _ABSENT_IN_RUNS = {
 def watched_names(
     declared: Declarations, observables: Mapping[str, Expression], numbers: Collection[str]
 ) -> AllowedNames:
-    """The names that sections and stops of runs may use; ``numbers`` are the observables that are one number each."""
+    """Return the names that sections and stops of runs may use; ``numbers`` are observables that are one number
+    each."""
     if declared.lattice is None:
         return _scope_of_states(declared, observables)
     return _scope_of_numbers(declared, numbers, [name for name in observables if name not in numbers])
 
 
 def _scope_of_states(declared: Declarations, observables: Mapping[str, Expression]) -> AllowedNames:
-    """The names of functions of a state of an ordinary system, with its observables: for sections and stops of runs."""
+    """Return the names for sections and stops of an ordinary system: those of functions of states, and its
+    observables."""
     scope = declared.dated_scope()
     return replace(scope, names={**observables, **scope.names})
 
 
 def _scope_of_numbers(declared: Declarations, observables: Iterable[str], fields: Iterable[str]) -> AllowedNames:
-    """The names of numbers of a whole lattice: for sections and stops of runs.
+    """Return the names for sections and stops of a lattice: numbers of the whole lattice.
 
     They are ``observables`` that are reduced to one number, parameters with one value, and the time. ``fields`` are
-    observables with a value at each site.
+    observables with a value at each site, which are refused.
     """
     scope = declared.dated_constants("a number of the lattice")
     at_sites = [name for name, parameter in declared.parameters.items() if parameter.at != "all"]
@@ -194,7 +199,7 @@ def _names(name: str, raw: Raw, declared: Declarations) -> tuple[str, ...]:
 
 
 def _state(name: str, initial: Any, declared: Declarations) -> dict[str, Values]:
-    """Initial values by field, or of all fields under the name ``""``."""
+    """Return initial values by field, or of all fields under the name ``""``."""
     fields = declared.coordinates
     if initial is None:
         return {}

@@ -1,8 +1,8 @@
 """Content of a spec file as data: the first stage of the compiler.
 
-Nothing here is checked mathematically. Expressions have their definitions substituted and use the names
-of the spec's coordinates and parameters as symbols; ``p_NAME`` in a custom bi-realisation is the
-symbol ``momentum(NAME)``. Decimals are exact rationals.
+No mathematics is checked here. Definitions have been substituted into expressions, which use the names of coordinates
+and parameters as symbols; ``p_NAME`` in a custom bi-realisation is the symbol ``momentum(NAME)``. Decimals are exact
+rationals.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from phigen.symbolic.expression import ZERO, Expression
 #: The default order of a method.
 DEFAULT_ORDER = 4
 
-#: The default order with noise, which limits the order.
+#: The default order with noise, for which no higher order is possible.
 NOISY_ORDER = 2
 
 Matrix = tuple[tuple[Expression, ...], ...]
@@ -31,9 +31,10 @@ class Values:
     """An array over the sites, or the bonds, of a lattice.
 
     ``formula`` uses the symbols of the indices and sizes, ``i`` and ``N_i``. ``listed`` is in the order of the array,
-    the last axis fastest. ``file`` is a path from the folder of the spec. ``random`` names a distribution: ``normal``,
-    ``uniform`` between −1 and 1, or, for all fields of a site together, ``sphere``; it is
-    multiplied by ``scale``, and the formula, if there is one, added. Else exactly one of these sources is given.
+    the last axis fastest. ``file`` is a path relative to the folder of the spec. ``random`` names a distribution:
+    ``normal``, ``uniform`` between −1 and 1, or ``sphere`` for all fields of a site together. Random numbers are
+    multiplied by ``scale``, and the formula is added if there is one. In all other cases exactly one of these sources
+    is present.
     """
 
     formula: Expression | None = None
@@ -48,9 +49,9 @@ class Values:
 class Parameter:
     """A run-time argument of the generated code, with its default.
 
-    ``small`` says that the terms with this factor are a small part of H, ``nonnegative`` that it is 0 or positive.
-    ``at`` says of a lattice whether it is one number (``all``), or an array with a value at each of the ``sites`` or
-    ``bonds``; ``values`` are its defaults where they are not all ``value``. ``unit`` is text for readers: nothing is
+    ``small`` says that the terms with this factor are a small part of H, ``nonnegative`` that the parameter is 0 or
+    positive. For lattices ``at`` is ``all`` for one number, ``sites`` or ``bonds`` for an array with a value at each
+    site or bond; ``values`` are the defaults if not all are ``value``. ``unit`` is text for readers: nothing is
     converted.
     """
 
@@ -71,17 +72,18 @@ class Parameter:
 
     @property
     def inequality(self) -> str:
-        """The bound as it is shown: `` > 0``, `` ≥ 0`` or nothing."""
+        """The bound as displayed: `` > 0``, `` ≥ 0`` or ""."""
         return {"positive": " > 0", "nonnegative": " ≥ 0"}.get(self.bound, "")
 
     def refuses(self, value: float | Fraction) -> bool:
-        """Whether a number is beyond the bound."""
+        """Whether a number violates the bound."""
         return bool(self.bound and (value < 0 or (self.positive and value == 0)))
 
 
 @dataclass(frozen=True)
 class MatrixForm:
-    """π given entry by entry, π_ij = {x_i, x_j} (from ``matrix:`` or, completed by skew symmetry, ``brackets:``)."""
+    """π as a matrix of entries, π_ij = {x_i, x_j}, from ``matrix:`` or, completed by skew symmetry, from
+    ``brackets:``."""
 
     entries: Matrix
 
@@ -103,9 +105,9 @@ class LogCanonicalForm:
 
 @dataclass(frozen=True)
 class LieAlgebraForm:
-    """{x_i, x_j} = ± Σ_k c_ij^k x_k on the dual of a Lie algebra; exactly one of the three sources is given.
+    """{x_i, x_j} = ± Σ_k c_ij^k x_k on the dual of a Lie algebra, from exactly one of three sources.
 
-    ``structure_constants[i][j][k]`` is c_ij^k over 0-based basis indices, only the pairs that were given.
+    ``structure_constants[i][j][k]`` is c_ij^k with indices from 0; only the pairs in the spec are present.
     """
 
     sign: int = 1
@@ -124,16 +126,16 @@ class NambuForm:
 
 @dataclass(frozen=True)
 class ProductForm:
-    """Blocks side by side, as pairs (coordinates, form); every coordinate is in exactly one of them."""
+    """π with diagonal blocks, as pairs (coordinates, form); every coordinate belongs to exactly one block."""
 
     blocks: tuple[tuple[tuple[str, ...], PoissonForm], ...]
 
 
 @dataclass(frozen=True)
 class PullbackForm:
-    """A structure in other coordinates y: ``of`` is its form, ``map`` gives y as expressions in the spec's x.
+    """A structure in other coordinates y: ``of`` is its form, ``map`` has y as expressions in the spec's x.
 
-    ``inverse`` gives x as expressions in y, if the spec does.
+    ``inverse`` has x as expressions in y, if the spec states it.
     """
 
     coordinates: tuple[str, ...]
@@ -147,28 +149,28 @@ PoissonForm = MatrixForm | CanonicalForm | LogCanonicalForm | LieAlgebraForm | N
 
 @dataclass(frozen=True)
 class BirealisationChoice:
-    """The user's choice: a kind of the catalogue and its options (``custom``: alpha, beta).
+    """The choice of a bi-realisation in a spec: a kind of the catalogue and its options (``custom``: alpha, beta).
 
-    ``order`` is the order of the method where the caller overrides that of the spec; truncations need it.
+    ``order`` is the order of the method if the caller overrides that of the spec; truncations depend on it.
     """
 
     kind: str = "auto"
     alpha: tuple[Expression, ...] = ()
     beta: tuple[Expression, ...] = ()
     side: str = "q"  # canonical-euler
-    of: str = "auto"  # product, pullback: the kind for the blocks, for the structure that is pulled back
+    of: str = "auto"  # product: the kind for the blocks; pullback: the kind for the inner structure
     tau: Expression | Matrix | None = None  # group-map: f(MATRIX), or the entries of τ in the momenta
     spray: str | tuple[Expression, ...] = "auto"  # spray: auto, flat, natural or the components f_j(x, p)
-    degree: int | None = None  # spray: degree in p of a truncation, None for what the order needs
+    degree: int | None = None  # spray: degree in p of a truncation; None for the degree that the order needs
     order: int | None = None
 
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """The inner solve: ``method`` auto or newton, ``tolerance`` None for auto.
+    """Options of the inner solve: ``method`` is auto or newton, ``tolerance`` None for automatic.
 
-    ``lanes``: whether C makes steps, and members of ensembles, in SIMD lanes; without lanes the code is shorter and
-    slower. ``compensated``: whether C compensates sums over the steps of lattices.
+    ``lanes`` says whether C makes steps, and members of ensembles, in SIMD lanes; without lanes the code is shorter and
+    slower. ``compensated`` says whether C compensates sums over the steps of lattices.
     """
 
     method: str = "auto"
@@ -180,12 +182,13 @@ class SolverOptions:
 
 @dataclass(frozen=True)
 class Extras:
-    """Functions of the code beside the solver: ``tangent`` adds ``step_tangent``, the derivative of a step.
+    """Parts of the generated code that are optional.
 
-    ``modified_hamiltonian`` adds the function of that name, with so many correction terms; 0 for none. ``without`` are
-    parts to leave out (`phigen.spec.names.PARTS`). ``adjoint`` adds the transpose of a step and of a run, along state
-    and parameters. ``real`` are the numbers of the C, double or float. ``included`` are parts that the code has
-    although its profile leaves them out.
+    ``tangent`` adds ``step_tangent``, the derivative of a step. ``modified_hamiltonian`` adds the function of that name
+    with this number of correction terms; 0 for no function. ``without`` are parts to leave out
+    (`phigen.spec.names.PARTS`). ``adjoint`` adds the transpose of a step and of a run, with respect to state and
+    parameters. ``real`` is the number type of the C, double or float. ``included`` are parts that are included although
+    the profile leaves them out.
     """
 
     tangent: bool = False
@@ -196,7 +199,7 @@ class Extras:
     included: frozenset[str] = frozenset()
 
     def offers(self, part: str, profile: str) -> bool:
-        """Whether the code of a profile has a part, where it applies."""
+        """Whether code with this profile includes a part, if the part applies to the system."""
         return part not in self.without | (LEFT_OUT[profile] - self.included)
 
 
@@ -204,7 +207,7 @@ NO_EXTRAS = Extras()
 
 
 class Overrides(TypedDict, total=False):
-    """Options of a command or a call, which override what a spec says; None, False and () leave it as it is."""
+    """Options of a command or a call, which override those of a spec; None, False and () leave the spec unchanged."""
 
     order: int | None
     scheme: str | None
@@ -218,9 +221,9 @@ class Overrides(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class AverageChoice:
-    """``average:`` of a run: rows from the time ``after`` on, None for all rows, in at least ``blocks`` blocks.
+    """Setting ``average:`` of a run: rows from the time ``after`` on (None: all rows), in at least ``blocks`` blocks.
 
-    The averages are those ``of`` some observables, of all if it is empty.
+    ``of`` names the observables to be averaged; empty for all.
     """
 
     after: Fraction | None = None
@@ -237,22 +240,24 @@ class Run:
     step: Fraction
     steps: int
     stride: int = 1
-    start: Fraction = Fraction(0)  # the time at the start
-    seed: int = 0  # of the noise
-    members: int = 1  # paths of the noise from the same start
+    start: Fraction = Fraction(0)  # time of the initial state
+    seed: int = 0  # seed of the noise
+    members: int = 1  # number of paths of the noise from the same initial state
     parameters: Mapping[str, Fraction] = field(default_factory=dict)
-    exact: Mapping[str, Expression] = field(default_factory=dict)  # in ELAPSED, the time, initial(NAME), parameters
+    # functions of ELAPSED, the time, initial(NAME) and parameters
+    exact: Mapping[str, Expression] = field(default_factory=dict)
     compare: tuple[str, ...] = ()
     section: Expression | None = None
-    direction: str = "rising"  # in which the section is crossed
-    duration: Fraction | None = None  # what says how many steps there are, if that is a time
-    until: Fraction | None = None  # the physical time where it ends, by a part of a step
-    every: Fraction | None = None  # of physical time between rows that are stored, in place of the stride
+    direction: str = "rising"  # direction of the crossings of the section
+    duration: Fraction | None = None  # duration of the run, if it determines the number of steps
+    until: Fraction | None = None  # physical time of the end, which may be inside a step
+    every: Fraction | None = None  # physical time between stored rows, instead of the stride
     average: AverageChoice = AverageChoice()
-    at: tuple[Fraction, ...] = ()  # the times of rows, in place of the stride
-    stop: Expression | None = None  # it ends where this passes through 0
-    record: tuple[str, ...] = ()  # columns of the output: state, energy, Casimirs, observables; all by default
-    box: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=dict)  # ranges for which certify bounds errors
+    at: tuple[Fraction, ...] = ()  # times of stored rows, instead of the stride
+    stop: Expression | None = None  # the run ends where this passes through 0
+    record: tuple[str, ...] = ()  # columns of the output (state, energy, Casimirs, observables); all by default
+    # ranges of coordinates for which certify bounds errors
+    box: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=dict)
     description: str = ""
     lattice: LatticeRunSettings | None = None
 
@@ -263,13 +268,14 @@ class Run:
 
     @property
     def records_numbers(self) -> bool:
-        """Whether no states are recorded."""
+        """Whether only numbers, and no states, are recorded."""
         return bool(self.record) and "state" not in self.record
 
 
 @dataclass(frozen=True)
 class SpectrumChoice:
-    """``spectrum:`` of a run of a lattice: S(q, ω) of the fields ``of``, over the frames from a time ``after`` on."""
+    """Setting ``spectrum:`` of a run of a lattice: S(q, ω) of the fields ``of``, over the frames from the time
+    ``after`` on."""
 
     of: tuple[str, ...]
     after: Fraction | None = None
@@ -277,7 +283,10 @@ class SpectrumChoice:
 
 @dataclass(frozen=True)
 class CorrelationChoice:
-    """``correlation:`` of a run of a lattice: two fields, the ``axis`` and the largest distance, and `after`."""
+    """Setting ``correlation:`` of a run of a lattice: the correlation of the fields ``of`` and ``other``.
+
+    ``axis`` is the direction, ``up_to`` the largest distance in sites. Frames from the time ``after`` on are used.
+    """
 
     of: str
     other: str
@@ -288,12 +297,12 @@ class CorrelationChoice:
 
 @dataclass(frozen=True)
 class LatticeRunSettings:
-    """Further settings of a run of a lattice.
+    """Additional settings of a run of a lattice.
 
-    ``sizes`` are those of the axes; where there are none, the number of sites. ``state`` has initial values by field,
-    or of all fields under the name ``""``. ``bonds`` are pairs of sites, counted from 0, or a file with them.
-    ``arrays`` are the values of parameters at sites and bonds that differ from the defaults. ``spectrum`` and
-    ``correlation`` are computed from the frames. ``names`` are those of the sites of graphs and pairs, in pictures.
+    ``sizes`` are the sizes of the axes; for lattices without axes, the number of sites. ``state`` has initial values by
+    field, or of all fields under the name ``""``. ``bonds`` are pairs of sites, counted from 0, or a file with such
+    pairs. ``arrays`` are the values of parameters at sites and bonds that differ from the defaults. ``spectrum`` and
+    ``correlation`` are computed from the frames. ``names`` are labels of the sites of graphs and pairs, for pictures.
     """
 
     sizes: tuple[int, ...] = ()
@@ -307,9 +316,10 @@ class LatticeRunSettings:
 
 @dataclass(frozen=True)
 class Axis:
-    """The values of a parameter, of an initial coordinate, of ``step`` or ``start``, or numbers of draws (``seed``).
+    """Range of a sweep: values of a parameter, of an initial coordinate, of ``step`` or ``start``, or of ``seed``.
 
-    They are ``values``, or ``count`` of them from one of the ``ends`` to the other; drawn between these if count is 0.
+    The range consists of the listed ``values``, or of ``count`` values from one of the ``ends`` to the other. If
+    ``count`` is 0, values between the ends are drawn at random.
     """
 
     name: str
@@ -320,20 +330,20 @@ class Axis:
 
     @property
     def size(self) -> int:
-        """Number of values, 0 if they are drawn."""
+        """Number of values; 0 if they are drawn at random."""
         return len(self.values) or self.count
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """Value of an observable that a sweep stores: one of `STATISTICS` over the run, or, for "", the last."""
+    """Value of an observable that a sweep stores: one of `STATISTICS` over the run, or, for "", the last value."""
 
     observable: str
     of: str = ""
 
     @classmethod
     def read(cls, word: str, observables: Iterable[str]) -> Statistic | None:
-        """Return what ``M``, ``mean(M)``, ``std(M)`` or ``error(M)`` asks for; None if that is nothing."""
+        """Return the statistic that ``M``, ``mean(M)``, ``std(M)`` or ``error(M)`` names; None for another word."""
         function, bracket, argument = word.partition("(")
         name = argument.removesuffix(")").strip() if bracket else function
         is_known = name in observables and (not bracket or (function in STATISTICS and argument.endswith(")")))
@@ -342,10 +352,10 @@ class Statistic:
 
 @dataclass(frozen=True)
 class SweepSettings:
-    """A run for many values: a grid of axes, or a number of ``random`` members, or those in a ``file``.
+    """A sweep, a run for many values: a grid of axes, a number of ``random`` members, or the members in a ``file``.
 
-    ``keep`` (`phigen.spec.names.KEPT`, and statistics of observables) says what is stored of each member; with
-    ``frames``, the states after that number of steps are stored too. ``target`` is that of ``phigen sweep -t``.
+    ``keep`` (`phigen.spec.names.KEPT`, and statistics of observables) lists what is stored for each member. With
+    ``frames``, the states after every such number of steps are stored too. ``target`` is that of ``phigen sweep -t``.
     """
 
     name: str
@@ -361,7 +371,7 @@ class SweepSettings:
 
     @property
     def stored(self) -> tuple[str, ...]:
-        """``keep``, with the standard error of each mean, which figures show."""
+        """The entries of ``keep``, and the standard error of each mean, which figures display."""
         errors = (word.replace("mean(", "error(", 1) for word in self.keep if word.startswith("mean("))
         return tuple(dict.fromkeys((*self.keep, *errors)))
 
@@ -370,7 +380,7 @@ class SweepSettings:
 class Reduction:
     """Reduction of the density of an observable to one number: its ``kind`` is one of `phigen.spec.names.REDUCTIONS`.
 
-    ``over`` says what the density belongs to: ``sites``, ``bonds`` or ``pairs``.
+    ``over`` is what the density belongs to: ``sites``, ``bonds`` or ``pairs``.
     """
 
     kind: str
@@ -381,12 +391,12 @@ class Reduction:
 class Lattice:
     """Relation between the sites of a lattice, each of which has the coordinates of the spec.
 
-    ``axes`` name the directions of a grid, with the ``boundary`` of each: ``periodic`` or ``open``. ``graph`` is the
-    name of the list of bonds; ``pairs`` says that each site is paired with each other. ``poisson`` and ``hamiltonian``
-    of the spec are those of a site. ``bonds`` is the density of H of a bond or a pair. ``brackets`` maps (f, g), as
-    symbols of two different sites, to their bracket, in one order of the two. ``kinds`` says of Casimirs whether they
-    are those of ``sites``, a ``sum`` or a ``product``. ``reductions`` says how observables are reduced to one number;
-    those without a reduction are fields, with a value at each site.
+    ``axes`` name the directions of a grid, with a ``boundary`` for each: ``periodic`` or ``open``. ``graph`` is the
+    name of the list of bonds. ``pairs`` says that every two sites form a pair. ``poisson`` and ``hamiltonian`` of the
+    spec are those of a site. ``bonds`` is the density of H of a bond or a pair. ``brackets`` maps (f, g), symbols of
+    two different sites, to their bracket, in one order. ``kinds`` maps Casimirs to ``sites``, ``sum`` or ``product``.
+    ``reductions`` has the reductions of observables to one number; observables without a reduction are fields, with a
+    value at each site.
     """
 
     axes: tuple[str, ...] = ()
@@ -411,7 +421,7 @@ class Lattice:
 
 @dataclass(frozen=True)
 class SpecForces:
-    """Forces of ``forces:`` and ``damping:``: ζ and f by coordinates, where they are not 0, and λ."""
+    """Forces of ``forces:`` and ``damping:``: the nonzero ζ and f by coordinate, and λ."""
 
     covector: Mapping[str, Expression] = field(default_factory=dict)
     vector: Mapping[str, Expression] = field(default_factory=dict)
@@ -426,7 +436,7 @@ NO_FORCES = SpecForces()
 
 @dataclass(frozen=True)
 class SpecNoise:
-    """A source of noise, one of those of ``noise:``: + σ π∇g ∘ dW, with the Hamiltonian g and the amplitude σ."""
+    """A source of noise of ``noise:``, + σ π∇g ∘ dW, with the Hamiltonian g and the amplitude σ."""
 
     hamiltonian: Expression
     amplitude: Expression
@@ -434,17 +444,17 @@ class SpecNoise:
 
 @dataclass(frozen=True)
 class Spec:
-    """A spec file, about a cell where there is a ``lattice``.
+    """Content of a spec file. If there is a ``lattice``, it describes one cell.
 
-    `locations` gives the place of a part by its path of keys, e.g. ``("casimirs", "C")``. `written` is the spec of
-    the file, if options of a command or a call override it.
+    `locations` has the place of a part by its path of keys, e.g. ``("casimirs", "C")``. `written` is the spec of the
+    file, if options of a command or a call override it.
     """
 
     name: str
     coordinates: tuple[str, ...]
     poisson: PoissonForm
     hamiltonian: Expression
-    time: str = ""  # the name of the time, where functions may depend on it
+    time: str = ""  # the name of the time; "" if nothing depends on the time
     forces: SpecForces = SpecForces()
     noise: Mapping[str, SpecNoise] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
@@ -453,18 +463,18 @@ class Spec:
     invariants: Mapping[str, Expression] = field(default_factory=dict)
     observables: Mapping[str, Expression] = field(default_factory=dict)  # to record; nothing is proved of them
     birealisation: BirealisationChoice = BirealisationChoice()
-    order: int | None = DEFAULT_ORDER  # None where terms are given
+    order: int | None = DEFAULT_ORDER  # None if the spec states terms
     terms: int | None = None
     composition: str = "auto"
-    gauge: str | Mapping[str, Expression] = "auto"  # or the multiple of each Casimir
+    gauge: str | Mapping[str, Expression] = "auto"  # auto, none, or the multiple of each Casimir
     monitor: str | Expression | None = None  # log, or g of dt = g dτ
     scheme: str = "series"
-    structure: str = "exact"  # of a Gauss method: exact, to truncation
-    coordinates_from: str = ""  # of bodies in a splitting: jacobi, democratic_heliocentric
+    structure: str = "exact"  # for a Gauss method: exact, or to truncation
+    coordinates_from: str = ""  # for bodies in a splitting: jacobi or democratic_heliocentric
     profile: str = "fast"
     solver: SolverOptions = SolverOptions()
     extras: Extras = NO_EXTRAS
-    reconstruct: str = ""  # quaternion, matrix: the attitude beside the state
+    reconstruct: str = ""  # quaternion or matrix, if the attitude is reconstructed
     targets: tuple[str, ...] = DEFAULT
     runs: Mapping[str, Run] = field(default_factory=dict)
     sweeps: Mapping[str, SweepSettings] = field(default_factory=dict)
@@ -481,7 +491,7 @@ class Spec:
 
     @property
     def recorded(self) -> tuple[str, ...]:
-        """Names of the observables that are one number each; of a lattice those of sites are none."""
+        """Names of the observables that are one number each; fields of lattices are not among them."""
         lattice = self.lattice
         return tuple(name for name in self.observables if lattice is None or name in lattice.reductions)
 
@@ -492,7 +502,7 @@ class Spec:
 
     @property
     def wanted_order(self) -> int:
-        """The requested order; if terms are requested, the order of a symmetric method with this number of terms."""
+        """The requested order or, if terms are requested, the order of a symmetric method with this number of terms."""
         return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
 
     def overridden(
@@ -509,8 +519,8 @@ class Spec:
     ) -> Spec:
         """Return the spec with the options of a command or a call applied.
 
-        ``tangent``, ``adjoint`` and ``without`` are added to those of the spec, the others replace it; an ``order``
-        replaces ``terms`` too. Single precision has the profile small only.
+        ``tangent``, ``adjoint`` and ``without`` are added to those of the spec. The other options replace those of the
+        spec; an ``order`` replaces ``terms`` too. Single precision requires the profile small.
         """
         extras = Extras(
             tangent or self.extras.tangent,
@@ -530,10 +540,10 @@ class Spec:
         )
 
     def for_running(self, **options: Unpack[Overrides]) -> Spec:
-        """Return the spec with options applied, for code that phigen itself runs: in the profile fast unless the
-        options name one, and with parameters that can be changed between steps in any profile.
+        """Return the spec with options applied, for code that phigen itself runs.
 
-        The ``profile`` of a spec is about the code that ``phigen build`` writes.
+        The ``profile`` of a spec applies to the code that ``phigen build`` writes. Code that phigen runs has the
+        profile fast, unless the options name another one, and parameters that can be changed between steps.
         """
         options["profile"] = options.get("profile") or "fast"
         spec = self.overridden(**options)
@@ -542,11 +552,11 @@ class Spec:
         return replace(spec, extras=replace(spec.extras, included=spec.extras.included | {"parameters"}))
 
     def parameters_of(self, run: Run) -> dict[str, float]:
-        """Return the values of all parameters in a run: those of the run, else the defaults."""
+        """Return the values of all parameters in a run: those of the run, and defaults for the others."""
         return {p.name: float(run.parameters.get(p.name, p.value)) for p in self.parameters}
 
     def diagnostic(self, path: tuple[Any, ...], message: str, hint: str = "") -> Diagnostic:
-        """A diagnostic at the part with that path of keys, or at the nearest part around it."""
+        """Return a diagnostic located at the part with that path of keys, or at the nearest part around it."""
         while path and path not in self.locations:
             path = path[:-1]
         location = self.locations.get(path)
@@ -555,5 +565,5 @@ class Spec:
 
 
 def _profile(profile: str, real: str) -> str:
-    """The profile of C with numbers of a type: that for speed has double precision only."""
+    """Return the profile of C for a number type: the profile fast is for double precision only."""
     return "small" if profile == "fast" and real == "float" else profile

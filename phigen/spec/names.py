@@ -10,27 +10,28 @@ from phigen.symbolic.functions import FUNCTIONS
 #: Functions of expressions with their number of arguments.
 SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f.name: f.arity for f in FUNCTIONS.values() if not f.own}
 
-#: Piecewise functions with their number of arguments: for observables and ``stop``, which nothing differentiates.
+#: Piecewise functions with their number of arguments. They are for observables and ``stop``, which are not
+#: differentiated.
 PIECEWISE_FUNCTIONS: dict[str, int] = {"sign": 1, "heaviside": 1, "min": 2, "max": 2, "if": 3}
 
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
 
-#: Arguments of the generated functions, with which parameters, passed by keyword, must not clash.
+#: Arguments of the generated functions; parameters, which are passed by keyword, must have other names.
 ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge", "cotangent", "attitude0", "position0"])
-#: The same arguments if there is a time.
+#: The same arguments for systems with a time.
 TIMED_ARGUMENTS = ARGUMENTS | {"t", "t0"}
-#: Names of these arguments with noise, in addition.
+#: Further arguments for systems with noise.
 NOISY_ARGUMENTS = frozenset(["seed", "member", "step0", "increments"])
 
 
 def argument_hint(name: str) -> str:
-    """Return why a parameter cannot have the ``name`` of an argument."""
+    """Return the hint for a parameter that has the ``name`` of an argument."""
     proposed = f"{name}_0" if len(name) > 1 else f"{name}{name}"
     return f"parameters are passed by name in Python, where {name}= is an argument of solvers; call it {proposed}, say"
 
 
-#: Names in other programs, which users may type here.
+#: Names of keys in other programs, with those in specs.
 MEANT = {
     "friction": "damping", "dissipation": "damping", "drag": "damping", "force": "forces", "torque": "forces",
     "forcing": "forces", "drive": "forces", "driving": "forces", "control": "forces",
@@ -60,7 +61,7 @@ zlib-acknowledgement ZPL-2.1"""
 LICENSES = tuple(_LICENSES.split())
 LICENSE_REFERENCE = re.compile(r"LicenseRef-[A-Za-z0-9.-]{1,60}")
 
-#: Lie algebras by family: the smallest n and the dimension; the argument of sp is 2n.
+#: Families of Lie algebras: the smallest n, and the dimension as a function of n; the argument of sp is 2n.
 FAMILIES: dict[str, tuple[int, Callable[[int], int]]] = {
     "so": (2, lambda n: n * (n - 1) // 2),
     "se": (2, lambda n: n * (n + 1) // 2),
@@ -71,12 +72,12 @@ FAMILIES: dict[str, tuple[int, Callable[[int], int]]] = {
     "heisenberg": (1, lambda n: 2 * n + 1),
     "aff": (1, lambda n: 2),
 }
-#: Families of which only these members are built.
+#: Families of which only these members are available.
 MEMBERS = {"se": (2, 3), "aff": (1,)}
 FAMILY_HELP = "so(n), se(2), se(3), sl(n), gl(n), su(n), sp(2n), heisenberg(n) or aff(1)"
 FAMILY_NAME = re.compile(r"([a-z]+)\(([1-9][0-9]{0,2})\)")
 
-#: Kinds of bi-realisation.
+#: Kinds of bi-realisations.
 BIREALISATIONS = (
     "auto",
     "constant",
@@ -99,8 +100,8 @@ PROFILES = ("fast", "small", "certified")
 #: Number types of the C.
 REALS = ("double", "float")
 
-#: Parts of the code that can be left out one by one; the profile small leaves out parts that serve speed, members with
-#: parameters of their own, and the function that changes parameters between steps.
+#: Parts of the code that can be left out individually. The profile small leaves out parts that serve speed, members
+#: with different parameters, and the function that changes parameters between steps.
 PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "parameters", "recurrences")
 LEFT_OUT = {
     "fast": frozenset[str](),
@@ -111,22 +112,23 @@ LEFT_OUT = {
 #: Directions of crossings of a section.
 DIRECTIONS = ("rising", "falling", "both")
 
-#: Quantities that a sweep may vary besides parameters and initial values, and that it may store.
+#: Quantities that a sweep may vary besides parameters and initial values, and quantities that it may store.
 SWEEP_NAMES = ("step", "start", "seed")
 KEPT = ("final", "energy_error", "casimir_error", "lyapunov", "crossings")
-#: Reductions of the density of an observable of a lattice to one number; those that add densities.
+#: Reductions of the density of an observable of a lattice to one number, and those of them that add densities.
 REDUCTIONS = ("mean", "sum", "max", "min")
 ADDITIVE = ("mean", "sum")
 #: Sets over which the density of an observable is reduced.
 OVER = ("sites", "bonds", "pairs")
-#: What a sweep may keep of an observable M beside M at the end: over the run its mean(M), its standard deviation
-#: std(M), and error(M), the standard error of the mean.
+#: Statistics over a run that a sweep may store of an observable M: mean(M), the standard deviation std(M), and the
+#: standard error of the mean, error(M).
 STATISTICS = ("mean", "std", "error")
 
 #: Representations of attitudes.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
-#: Compositions of the flows of the parts of a splitting: for two parts, and for any number.
+#: Compositions: of near-integrable systems with corrector; of near-integrable systems; of two parts; of any number of
+#: parts.
 CORRECTED = (
     *(f"wisdom-holman{order}" for order in ("", "-3", "-5", "-7", "-11", "-17")),
     *(f"wisdom-holman-modified-{order}" for order in (7, 11, 17)),
@@ -143,12 +145,12 @@ COMPOSITIONS = (
     "sofroniou-spaletta",
     *FLOW_COMPOSITIONS,
 )
-#: The monitor of a splitting in two, K = log(A + e) − log(−B).
+#: The monitor of a splitting in two parts, K = log(A + e) − log(−B).
 LOGARITHMIC = "log"
 SCHEMES = ("auto", "series", "splitting", "gauss")
 #: Structures of a Gauss method: an exact Poisson map, or one up to its truncation error.
 STRUCTURES = ("exact", "to truncation")
-#: Relative coordinates of attracting bodies, in which a splitting finds its parts.
+#: Relative coordinates of attracting bodies, in which H is split.
 RELATIVE = ("jacobi", "democratic_heliocentric")
-#: Classical methods a run can be compared with.
+#: Classical methods with which a run can be compared.
 CLASSICAL_METHODS = ("euler", "rk2", "rk4", "implicit-midpoint", "dop853")

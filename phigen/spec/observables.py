@@ -1,4 +1,4 @@
-"""The observables of a spec: expressions; of lattices fields at sites, and sums, means and extremes of densities."""
+"""The observables of a spec: expressions. Those of lattices are fields, or sums, means and extremes of densities."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from phigen.spec.names import REDUCTIONS
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression
 
-#: Names of what output holds beside the observables.
+#: Names of the columns of output that are not observables.
 RECORDED = ("t", "tau", "x", "energy", "state", "attitude", "position")
-#: The relation of sites that densities of bonds and pairs need, and how a spec declares it.
+#: The relation between sites that densities of bonds and pairs require, and how a spec declares it.
 _RELATIONS = {"bonds": ("graph", "lattice: {graph: NAME}"), "pairs": ("pairs", "lattice: {pairs: all}")}
 
 
 def observables(
     raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations, casimirs: Iterable[str]
 ) -> tuple[dict[str, Expression], dict[str, Reduction]]:
-    """Return the expressions of ``observables``, and how densities of lattices are reduced to one number.
+    """Return the expressions of ``observables``, and the reductions of those of lattices to one number.
 
-    Names are those of columns of the output beside coordinates and Casimirs.
+    The names of observables must differ from those of coordinates and Casimirs, since all are columns of the output.
     """
     used_names = dict.fromkeys(declared.coordinates, "a coordinate") | dict.fromkeys(casimirs, "a Casimir")
     used_names |= {name: "a column of every output" for name in (*RECORDED, declared.time) if name}
@@ -51,7 +51,7 @@ def _scope(reduction: Reduction | None, declared: Declarations) -> AllowedNames:
 
 
 def _reduction(name: str, entry: Mapping[str, Any], declared: Declarations) -> Reduction | None:
-    """Return how a density is reduced; None after errors."""
+    """Return the reduction of a density; None after errors, which are reported."""
     kind = next((k for k in REDUCTIONS if entry.get(k) is not None), None)
     if kind is None:
         return None

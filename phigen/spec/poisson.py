@@ -1,9 +1,9 @@
-"""The forms of a Poisson structure: from what was read to the data of `model.py`.
+"""The forms of a Poisson structure: from the YAML nodes to the data of `model.py`.
 
-Only what can be said without mathematics is checked here: shapes, names, and double statements.
+Shapes, names and repetitions are checked here; the mathematics is checked later.
 """
 
-# `return reader.error(…)` reports and returns None, the value of what has an error.
+# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Pairs = dict[tuple[int, int], tuple[Scalar, Expression]]
 
 
 def poisson_form(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
-    """The form of ``poisson:``, or ``None`` after errors."""
+    """Return the form of ``poisson:``; None after errors, which are reported."""
     for form, read_form in _FORMS.items():
         if form in raw:
             return read_form(
@@ -45,7 +45,7 @@ def poisson_form(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm 
 
 
 def brackets_of_sites(raw: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
-    """The brackets of fields of different sites of a lattice, in one order: on a grid, or along bonds."""
+    """Return the brackets of fields of different sites of a lattice, in one order: on a grid, or along bonds."""
     if "bonds" in raw:
         return _along_bonds(raw["bonds"], declared)
     return _of_neighbours(raw.get("brackets") or {}, declared) if declared.relation == "grid" else {}
@@ -110,7 +110,7 @@ def _fail(declared: Declarations, path: tuple[Any, ...], message: str, hint: str
 def _entries(
     rows: Rows, path: tuple[Any, ...], declared: Declarations, scope: AllowedNames, size: int
 ) -> tuple[tuple[Expression, ...], ...] | None:
-    """A size×size matrix of expressions; errors name the row."""
+    """Return a size×size matrix of expressions; None after errors, which name the row."""
     key_path, error_count = ".".join(str(p) for p in path if isinstance(p, str)), len(declared.reader.problems.found)
     if len(rows) != size:
         hint = "one for each coordinate" if size == len(declared.coordinates) else "the matrix must be square"
@@ -137,7 +137,7 @@ def _log_canonical(rows: Rows, declared: Declarations) -> PoissonForm | None:
 
 
 def _dimension(declared: Declarations, otherwise: int) -> int:
-    """The number of coordinates, if they could all be read."""
+    """Return the number of coordinates, or ``otherwise`` if some of them could not be read."""
     return otherwise if declared.incomplete else len(declared.coordinates)
 
 
@@ -147,7 +147,8 @@ def _brackets(table: Mapping[str, Any], declared: Declarations) -> PoissonForm:
     for key, row in table.values():
         i = declared.coordinate(key)
         for second_name, cell in (row or {}).values():
-            if "[" in second_name.text and declared.relation == "grid":  # see `_of_neighbours`
+            # a bracket between sites, which is read elsewhere
+            if "[" in second_name.text and declared.relation == "grid":
                 continue
             j = declared.coordinate(second_name)
             value = declared.formula(cell, scope)
@@ -163,7 +164,7 @@ def _brackets(table: Mapping[str, Any], declared: Declarations) -> PoissonForm:
 def _state(
     pairs: Pairs, pair: tuple[int, int], keys: tuple[Scalar, Scalar], value: Expression, declared: Declarations
 ) -> None:
-    """Record {x_i, x_j} = value, unless it contradicts skew symmetry."""
+    """Record {x_i, x_j} = value; report a value that contradicts skew symmetry."""
     (i, j), (a, b) = pair, keys
     if i == j:
         declared.reader.error(b, f"the bracket of {a.text!r} with itself is always 0", "remove it")
@@ -278,7 +279,7 @@ def _product(entries: list[Mapping[str, Any] | None], declared: Declarations) ->
     places_by_name: dict[str, Scalar] = {}
     blocks: list[tuple[tuple[str, ...], PoissonForm | None]] = []
     for i, block in enumerate(entries):
-        if "coordinates" not in (block or {}):  # reported where blocks are read
+        if "coordinates" not in (block or {}):  # this is reported where blocks are read
             blocks.append(((), None))
             continue
         nodes = [node for node in (block or {}).get("coordinates", ()) if node is not None]

@@ -1,4 +1,4 @@
-"""Collecting everything that is wrong with a spec, so that one run reports all of it."""
+"""Collection of all errors in a spec, so that one run reports all of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from phigen.spec import limits
 
 
 def shown(value: object, length: int = 60) -> str:
-    """A value for a message: quoted, on one line, invisible characters escaped, shortened."""
+    """Return a value as text for a message: quoted, on one line, shortened, with invisible characters escaped."""
     text = str(value)
     if len(text) > length:
         text = text[: length - 1] + "…"
@@ -19,13 +19,16 @@ def shown(value: object, length: int = 60) -> str:
 
 
 def did_you_mean(word: str, candidates: Iterable[str], others: Mapping[str, str] = MappingProxyType({})) -> str:
-    """``did you mean 'x1'?``, or nothing when no candidate is meant; see `intended`."""
+    """Return the hint ``did you mean 'x1'?``; "" if no candidate is close; see `intended`."""
     candidate = intended(word, candidates, others)
     return f"did you mean {candidate!r}?" if candidate else ""
 
 
 def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = MappingProxyType({})) -> str:
-    """The candidate that a word stands for, "" if none does: one that ``others`` gives for it, or a close one."""
+    """Return the candidate that a word stands for; "" if there is none.
+
+    It is the one that ``others`` has for the word, or one with a similar name.
+    """
     if len(word) > limits.NAME_LENGTH:
         return ""
     choices = list(candidates)
@@ -41,7 +44,8 @@ def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = M
 
 
 def _numbered(word: str, choices: Iterable[str]) -> list[str]:
-    """Where the word is one of a row x1, x2, … but for its number: the others, those with the nearest number first."""
+    """Return the choices that differ from the word only in a number, such as x1, x2, …; the nearest numbers come
+    first."""
     stem = word.rstrip("0123456789")
     row = [c for c in choices if c != stem and c[len(stem) :].isdecimal()] if stem and stem != word else []
     return sorted(
@@ -50,7 +54,7 @@ def _numbered(word: str, choices: Iterable[str]) -> list[str]:
 
 
 def one_of(choices: Iterable[str]) -> str:
-    """``one of a, b, c``, or ``write a`` if there is no other, for hints."""
+    """Return the hint ``one of a, b, c``, or ``write a`` if there is only one choice."""
     choice_list = list(choices)
     return f"write {choice_list[0]}" if len(choice_list) == 1 else "one of " + ", ".join(choice_list)
 
@@ -61,7 +65,7 @@ def counted(number: int, noun: str, plural: str = "") -> str:
 
 
 class Problems:
-    """The diagnostics of one file; `finish` raises them, in the order of the file."""
+    """The diagnostics of one file; `finish` raises them in the order of the file."""
 
     def __init__(self, file: str, source: str = "") -> None:
         self.file = file
@@ -70,7 +74,8 @@ class Problems:
         self.only_limits = True
 
     def add(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> None:
-        """Record an error; the first mention of a message at a place counts. Raises when there are too many."""
+        """Record an error; a repeated message at the same place is ignored. Raises an exception after too many
+        errors."""
         line = self.lines[location.line - 1] if location.line <= len(self.lines) else ""
         self.found.setdefault((location, message), Diagnostic(message, location, hint, line))
         self.only_limits &= limit
@@ -78,32 +83,32 @@ class Problems:
             raise self.error()
 
     def copy(self) -> Problems:
-        """Return the errors so far, for `restore`."""
+        """Return a copy of the errors so far, for `restore`."""
         twin = Problems(self.file)
         twin.found, twin.only_limits = dict(self.found), self.only_limits
         return twin
 
     def restore(self, before: Problems) -> None:
-        """Drop the errors since a `copy`."""
+        """Drop the errors that were recorded since a `copy`."""
         self.found, self.only_limits = dict(before.found), before.only_limits
 
     def forget(self, line: int) -> None:
-        """Drop the errors of a line, which follow from one that is reported instead."""
+        """Drop the errors of a line, which follow from another error that is reported instead."""
         self.found = {position: d for position, d in self.found.items() if position[0].line != line}
 
     def stop(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> SpecError:
-        """Record an error after which nothing can be read, and return the exception to raise."""
+        """Record an error after which reading cannot continue, and return the exception to raise."""
         self.add(message, location, hint, limit=limit)
         return self.error()
 
     def error(self) -> SpecError:
-        """Exception with all problems; a `LimitError` if all problems are exceeded limits."""
+        """Return the exception with all errors; a `LimitError` if all of them are exceeded limits."""
         ordered = [self.found[key] for key in sorted(self.found, key=lambda key: key[0])]
         if len(ordered) >= limits.ERRORS:
             ordered.append(Diagnostic(f"there may be more: only {limits.ERRORS} errors are listed"))
         return (LimitError if self.only_limits else SpecError)(ordered)
 
     def finish(self) -> None:
-        """Raise the exception with all problems, if there are any."""
+        """Raise the exception with all errors, if there are any."""
         if self.found:
             raise self.error()

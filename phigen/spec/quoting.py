@@ -1,15 +1,15 @@
-"""Parts of a line of YAML that need quotes: expressions with an index, ``x[i+1]``, inside { } or [ ]."""
+"""Parts of a line of YAML that need quotes: expressions with an index, such as ``x[i+1]``, inside { } or [ ]."""
 
 from __future__ import annotations
 
 
 def needs_quotes(line: str, column: int) -> bool:
-    """Whether YAML stumbled there over an index: a bracket right after a name."""
+    """Whether YAML fails at this column because of an index: a bracket directly after a name."""
     return column < len(line) and line[column] == "[" and (column > 0) and _ends_name(line[:column])
 
 
 def quoted(line: str) -> str:
-    """The line with quotes about the keys and values that contain an index."""
+    """Return the line with quotes around the keys and values that contain an index."""
     written, part, depth, index, quote = "", "", 0, False, ""
     for position, character in enumerate(line + "\n"):
         following = line[position + 1 : position + 2]
@@ -33,7 +33,7 @@ def _ends_name(text: str) -> bool:
 
 
 def _finished(part: str) -> str:
-    """A key or a value, between quotes if it has an index and none yet."""
+    """Return a key or a value, in quotes if it contains an index and has no quotes yet."""
     inner = part.strip()
     if "[" not in inner or inner[:1] in "\"'":
         return part

@@ -1,4 +1,4 @@
-"""The named experiments of a spec."""
+"""The runs of a spec."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import ELAPSED, initial
 
-#: What the step of an adaptive method is called.
+#: Words that users may write as the step of an adaptive method, which does not exist here.
 _ADAPTING = ("auto", "adaptive", "variable")
-#: A duration counts as a multiple of the step up to this relative error: decimals of users are rounded.
+#: Largest relative error up to which a duration is a multiple of the step: decimals of users are rounded.
 NEAR_INTEGER = Fraction(1, 10**9)
 
 
@@ -32,10 +32,10 @@ def run(
     watched: AllowedNames,
     averaged: Collection[str],
 ) -> Run:
-    """The run of that name. After errors, which are reported, some of its values are stand-ins.
+    """Return the run of that name. After errors, which are reported, some of its values are placeholders.
 
-    ``recordable`` maps what ``record`` may name to "", other names of the spec to why it may not. ``watched`` has the
-    names of what changes along a run, for sections and stops, ``averaged`` those that ``average`` may name.
+    ``recordable`` maps the names that ``record`` may contain to "", and other names to the reason why they are refused.
+    ``watched`` has the names for sections and stops, ``averaged`` those for ``average``.
     """
     numbers = declared.numbers()
     step_node = raw.get("step")
@@ -97,11 +97,11 @@ def run(
 def _box(
     raw: Mapping[str, tuple[Scalar, Sequence[Scalar | None] | None]], declared: Declarations
 ) -> dict[str, tuple[Fraction, Fraction]]:
-    """The ranges of coordinates of ``box``."""
+    """Return the ranges of coordinates in ``box``."""
     box = {}
     for name, (key, nodes) in raw.items():
         if not nodes:
-            continue  # the reader reported it
+            continue  # reported by the reader
         bounds = [declared.number(node, declared.numbers()) for node in nodes]
         is_coordinate = declared.coordinate(key) is not None
         if len(bounds) != 2 or None in bounds or bounds[0] > bounds[1]:  # type: ignore[operator]
@@ -123,7 +123,7 @@ def _row_times(
     steps: int | None,
     declared: Declarations,
 ) -> tuple[Fraction, ...]:
-    """The times of ``at``, each once, in the order in which they come."""
+    """Return the times of ``at`` in the order of the run, without repetitions."""
     nodes = raw.get("at") or ()
     if nodes and (conflicting_key := next((key for key in ("every", "stride") if key in raw), None)):
         _fail(name, "at", f"at and {conflicting_key} exclude each other", declared, "give one of them")
@@ -147,7 +147,10 @@ def _fail(name: str, key: str, message: str, declared: Declarations, hint: str =
 def _recorded(
     name: str, nodes: Sequence[Scalar | None] | None, declared: Declarations, recordable: Mapping[str, str]
 ) -> tuple[str, ...]:
-    """Return ``record`` of a run; ``recordable`` has the columns that there are, and why others are none."""
+    """Return ``record`` of a run.
+
+    ``recordable`` maps column names to "", and other names to the reason why they are refused.
+    """
     columns_asked: list[str | None] = []
     for node in nodes or ():
         word = node.text if node is not None else None
@@ -166,7 +169,7 @@ def _recorded(
 def _average(
     name: str, raw: Mapping[str, Any] | None, declared: Declarations, averaged: Collection[str]
 ) -> AverageChoice:
-    """Return ``average`` of a run, ``of`` observables that are one number."""
+    """Return ``average`` of a run; ``averaged`` are the observables that are one number."""
     if raw is None:
         return AverageChoice()
     selected = without_repetition(
@@ -180,7 +183,7 @@ def _average(
 
 
 def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
-    """Report averages that begin after the end of a run with steps of equal time."""
+    """Report averages that begin after the end of a run, if its steps are equal in time."""
     start_time, end = run_.average.after, run_.until
     end = run_.start + run_.step * run_.steps if end is None else end
     if start_time is not None and (end - start_time) * run_.step < 0:
@@ -192,7 +195,7 @@ def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
 def crossed(
     name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: AllowedNames
 ) -> Expression | None:
-    """Expression whose zeros are searched along the run; an error is reported if it is constant."""
+    """Return an expression whose zeros are searched along the run; a constant one is reported."""
     section = declared.formula(raw.get(key), scope)
     constant = {n for n, p in declared.parameters.items() if p.at == "all"}
     if section is not None and not declared.incomplete and constant.issuperset(symbols_of(section)):
@@ -236,7 +239,10 @@ def _steps(
 def _steps_until(
     name: str, raw: Mapping[str, Any], span: Fraction, step: Fraction | None, declared: Declarations
 ) -> int | None:
-    """The whole steps before that time; with a monitor, whose steps differ, a number of the right size."""
+    """Return the number of whole steps before the time ``until``.
+
+    With a monitor, whose steps differ in time, it is only an estimate.
+    """
     if step is None:
         return None
     ratio = span / step
@@ -252,7 +258,8 @@ def _steps_until(
 
 
 def whole(ratio: Fraction) -> int | None:
-    """Number of steps in a ratio of times, up to the rounding of decimals; None if it is not a whole number."""
+    """Return a ratio of times as a number of steps, up to the rounding of decimals; None if it is not a whole
+    number."""
     steps = round(ratio)
     return steps if abs(ratio - steps) <= NEAR_INTEGER * abs(ratio) else None
 
@@ -260,8 +267,8 @@ def whole(ratio: Fraction) -> int | None:
 def with_step(run: Run, step: Fraction, *, parts: bool = False) -> Run:
     """Return the run with another step, which may be negative.
 
-    The duration is unchanged if the run gives one, else the number of steps. If the step does not divide the duration,
-    the run ends with a part of a step if ``parts`` are allowed; otherwise raises `ValueError`.
+    The duration is unchanged if the run states one; otherwise the number of steps is unchanged. If the step does not
+    divide the duration, the run ends with a part of a step if ``parts`` is true; otherwise `ValueError` is raised.
     """
     if run.until is not None:
         ratio = (run.until - run.start) / step
@@ -298,7 +305,7 @@ def _initial(name: str, raw: Any, declared: Declarations) -> tuple[Fraction, ...
 
 
 def _single(node: Any, scope: AllowedNames, key: Scalar, declared: Declarations) -> Fraction | None:
-    """The number where an ordinary spec has one, and a lattice may have an array."""
+    """Return the number of a node, for ordinary specs. Lattices may have an array in its place."""
     if node is None or isinstance(node, Scalar):
         return declared.number(node, scope)
     form = "a list" if isinstance(node, list) else "a mapping"
@@ -309,7 +316,7 @@ def _single(node: Any, scope: AllowedNames, key: Scalar, declared: Declarations)
 def _overrides(
     raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations
 ) -> tuple[dict[str, Fraction], dict[str, Values]]:
-    """The values of parameters, numbers and arrays."""
+    """Return the values of parameters in a run: numbers, and arrays."""
     values: dict[str, Fraction] = {}
     arrays: dict[str, Values] = {}
     for name, (key, node) in raw.items():
@@ -342,7 +349,7 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
     time_values = dict(zip(dated, substitute(list(dated.values()), {declared.time: symbol(ELAPSED)}), strict=True))
     scope = declared.constants("an exact solution", symbols | time_values)
     hints = {c: (scope.refused[c][0], f"initial values are written x0_{c}") for c in declared.coordinates}
-    # A coordinate t is no obstacle: an exact solution is about the time.
+    # A coordinate called t is allowed: an exact solution is a function of the time.
     refused = {n: reason for n, reason in {**scope.refused, **hints}.items() if n not in symbols}
     scope = AllowedNames(scope.names, refused, scope.open)
     values = {}
@@ -354,7 +361,7 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
 
 
 def without_repetition(entries: Any, path: tuple[Any, ...], declared: Declarations) -> tuple[str, ...]:
-    """A list of words, each once; repetitions are reported."""
+    """Return a list of words, each once; repetitions are reported."""
     distinct: list[str] = []
     for index, word in enumerate(entries):
         if word in distinct:

@@ -1,4 +1,4 @@
-"""``spectrum`` and ``correlation`` of runs of lattices."""
+"""The keys ``spectrum`` and ``correlation`` of runs of lattices."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from phigen.spec.model import CorrelationChoice, SpectrumChoice
 from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.yaml_source import Scalar
 
-#: The key of the largest distance.
+#: Key of the largest distance of a correlation.
 UP_TO = "up to"
 
 
 def spectrum_of(name: str, raw: Mapping[str, Any], declared: Declarations) -> SpectrumChoice | None:
-    """Return ``spectrum`` of the run of that name, None without one or after errors, which are reported."""
+    """Return ``spectrum`` of the run of that name; None if it has none, or after errors, which are reported."""
     entries = raw.get("spectrum")
     if entries is None or not _is_allowed(name, "spectrum", raw, declared):
         return None
@@ -27,7 +27,10 @@ def spectrum_of(name: str, raw: Mapping[str, Any], declared: Declarations) -> Sp
 def correlation_of(
     name: str, raw: Mapping[str, Any], sizes: tuple[int, ...], declared: Declarations
 ) -> CorrelationChoice | None:
-    """Return ``correlation`` of the run of that name, of a lattice with ``sizes``; None as for `spectrum_of`."""
+    """Return ``correlation`` of the run of that name, for a lattice with ``sizes``.
+
+    None if the run has none, or after errors, which are reported.
+    """
     entries = raw.get("correlation")
     if entries is None or not _is_allowed(name, "correlation", raw, declared):
         return None
@@ -53,7 +56,7 @@ def correlation_of(
 
 
 def _is_allowed(name: str, key: str, raw: Mapping[str, Any], declared: Declarations) -> bool:
-    """Whether a run has frames on a grid; what is wrong is reported at the key."""
+    """Return whether a run has frames on a grid; if not, an error is reported at the key."""
     place, add = declared.reader.locations["runs", name, key], declared.reader.problems.add
     if declared.relation != "grid":
         add(f"{key} is along the axes of a grid", place, "lattice: {axes: [i]} declares one")
@@ -66,7 +69,7 @@ def _is_allowed(name: str, key: str, raw: Mapping[str, Any], declared: Declarati
 
 
 def _field(node: Scalar, key: str, declared: Declarations) -> str:
-    """Return the coordinate that a node names; "" after an error."""
+    """Return the coordinate that a node names; "" after an error, which is reported."""
     if node.text in declared.coordinates or declared.incomplete:
         return node.text
     hint = did_you_mean(node.text, declared.coordinates) or one_of(declared.coordinates)

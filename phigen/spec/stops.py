@@ -1,4 +1,4 @@
-"""``stop`` of a run that is written on the command line, not in the spec."""
+"""Expressions of ``stop`` that are written on the command line instead of in a spec."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from phigen.symbolic.expression import Expression
 
 
 def stop_of(spec: Spec, run: str, text: str, place: str) -> Expression | None:
-    """Return the expression in a text, which may use the names that ``stop:`` of the run may use.
+    """Return the expression in a text, which may use the names that are allowed in ``stop:`` of the run.
 
-    Raises `SpecError` with the words of ``stop:``; its locations are columns of the text, in the file ``place``.
+    Raises `SpecError` with the messages of ``stop:``; its locations are columns of the text, in the file ``place``.
     """
     of_spec = Reader(Problems(spec.file, spec.source))
     declared = declare(SPEC.read(read(spec.source, of_spec.problems), (), of_spec) or {}, of_spec)

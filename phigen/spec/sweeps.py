@@ -15,7 +15,7 @@ from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.runs import whole, without_repetition
 from phigen.spec.yaml_source import Scalar
 
-#: What ``over`` may hold besides ranges.
+#: Keys of ``over`` other than ranges.
 _WORDS: Mapping[str, Kind] = {
     "random": Integer(1, limits.SWEPT, limit=True),
     "seed": Integer(0, limits.SWEEP_SEED, limit=True),
@@ -32,7 +32,7 @@ def sweep(
     *,
     monitored: bool,
 ) -> SweepSettings:
-    """The sweep of that name. After errors, which are reported, some of its values are stand-ins."""
+    """Return the sweep of that name. After errors, which are reported, some of its values are placeholders."""
     place = ("sweeps", name)
     run = raw["run"].text if raw.get("run") else next(iter(runs), "")
     if run not in runs:
@@ -67,7 +67,7 @@ def sweep(
 def _kept(
     nodes: Sequence[Scalar | None] | None, place: tuple[Any, ...], declared: Declarations, observables: Collection[str]
 ) -> tuple[str, ...]:
-    """Return ``keep``: words of `KEPT`, and statistics of observables."""
+    """Return ``keep``: words of `KEPT` and statistics of observables."""
     quantities: list[str | None] = []
     for node in nodes or ():
         word = node.text.replace(" ", "") if node is not None else None
@@ -83,7 +83,10 @@ def _kept(
 
 
 def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
-    """Refusal of a run that does not end, for all members, with its last whole step; otherwise empty."""
+    """Return the reason why a run cannot be swept; "" if it can be.
+
+    All members must make the same number of whole steps, so the end of the run must not depend on the member.
+    """
     statement = f"all members of a sweep make the same number of whole steps; the run {run.name} ends"
     if run.stop is not None:
         return f"{statement} where its stop: is met"
@@ -103,7 +106,7 @@ def _fail(place: tuple[Any, ...], message: str, declared: Declarations, hint: st
 
 
 def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
-    """The values of one name: a list, or a range; none where there are errors."""
+    """Return the range of one name, a list or an interval; no range after errors, which are reported."""
     name, numbers = key.text, declared.numbers()
     allowed_names = [*declared.parameters, *(() if declared.lattice else declared.coordinates), *SWEEP_NAMES]
     if name not in allowed_names and not declared.incomplete:
@@ -144,7 +147,7 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
 
 
 def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
-    """The numbers of draws, along a dimension of the sweep."""
+    """Return the range of ``seed``: the numbers of the random draws, as an axis of the sweep."""
     if isinstance(value, list):
         draw_counts = [Integer(0, limits.SWEEP_SEED).read(node, ("seed",), declared.reader) for node in value if node]
         numbers = tuple(float(n) for n in draw_counts if n is not None)

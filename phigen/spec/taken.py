@@ -1,8 +1,7 @@
 """Names that a spec must not have.
 
-The name of a spec becomes the name of files, NAME.h and NAME.py, and the prefix of symbols, NAME_init. So it must
-not hide a header or a module when the folder of a solver is on a search path, and symbols must not clash with
-others.
+The name of a spec is used for files, NAME.h and NAME.py, and as the prefix of symbols, NAME_init. So it must not hide a
+header or a module if the folder of a solver is on a search path, and symbols must not clash with others.
 """
 
 from __future__ import annotations
@@ -22,8 +21,8 @@ _PYTHON = """and as assert async await break class continue def del elif else ex
 import in is lambda nonlocal not or pass raise return try while with yield match type"""
 _KEYWORDS = frozenset(f"{_C} {_CPP} {_PYTHON}".split())
 
-# Headers of standard C, of POSIX and the libraries of Linux, macOS and Windows, and those of compilers: others include
-# them as <NAME.h>. Where file names have no case, <Availability.h> is meant too.
+# Headers of standard C, of POSIX and of the libraries of Linux, macOS and Windows, and those of compilers: other
+# headers include them as <NAME.h>. On file systems without case, <Availability.h> is found as availability.h.
 _HEADERS = """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
 stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype
 aio aliases alloca ar argp argz backtrace byteswap cpio crypt cxxabi dirent dlfcn elf endian envz err error execinfo
@@ -38,18 +37,18 @@ winsock2"""
 _HEADER_FAMILIES = r"\w+intrin|(arm|hexagon|hvx|riscv|wasm)_\w+|ncurses\w*|curses"
 _HEADER = re.compile(rf"{'|'.join(_HEADERS.split())}|{_HEADER_FAMILIES}")
 
-# Modules that are imported together with a generated module; modules of Python that this version no longer or not yet
-# has.
+# Modules that are imported together with a generated module, and modules that only other versions of Python have.
 _MODULES = frozenset(["numpy", "scipy", "sympy", "matplotlib", "pandas", "phigen"])
 _OTHER_VERSIONS = frozenset(["annotationlib", "asynchat", "asyncore", "compression", "distutils", "imp", "smtpd"])
 
 _DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")
 
-# Functions of C libraries of the form X_init, X_status: linked into one program, ours would be called for theirs.
+# Functions of C libraries with names such as X_init and X_status: linked into one program, ours would be called
+# instead.
 _LIBRARY = re.compile(r"pthread_\w+|posix_\w+|inet6_\w+|argp_err_exit|acc|atomic|cnd|fanotify|inotify|mtx|res|sem|si")
 
-#: Symbols of one spec that are also those of another, which has a longer name: NAME_default_params is the default of
-#: NAME, and would be the type of the parameters of NAME_default.
+#: Ends of names whose symbols clash with those of another spec with a longer name. NAME_default_params is the default
+#: of NAME, but would also be the type of the parameters of NAME_default.
 CLASHING_ENDS = {
     "default": "default_params",
     "modified": "modified_hamiltonian",
@@ -68,7 +67,7 @@ _REASONS: tuple[tuple[Callable[[str], object], str], ...] = (
 
 
 def objection(name: str) -> tuple[str, str] | None:
-    """Why no spec can have a name that is otherwise well formed, and what to do; None if it can have it."""
+    """Return the reason why a well-formed name is refused for a spec, and a hint; None if the name is allowed."""
     for refuses, reason in _REASONS:
         if refuses(name):
             return f"the spec name {name!r} {reason.format(name=name)}", f"{name}_system would do"

@@ -37,7 +37,7 @@ from phigen.spec.yaml_source import Scalar, decode, read
 from phigen.symbolic.expression import ONE, ZERO, Expression, symbol, symbols_of
 from phigen.symbolic.symbols import MATRIX, momentum
 
-#: Options of bi-realisations and the kind that each belongs to.
+#: Options of bi-realisations, with the kind that each belongs to.
 OPTIONS = {
     "alpha": ("custom",),
     "beta": ("custom",),
@@ -50,9 +50,9 @@ OPTIONS = {
 
 
 def validate(data: bytes, file: str) -> Spec:
-    """The spec in the bytes of a file.
+    """Return the spec in the bytes of a file.
 
-    Raises `SpecError` with every error, in the order of the file; `LimitError` if a limit is among them.
+    Raises `SpecError` with all errors, in the order of the file; `LimitError` if one of them is an exceeded limit.
     """
     source = decode(data, file)
     problems = Problems(file, source)
@@ -66,7 +66,7 @@ def validate(data: bytes, file: str) -> Spec:
 
 
 def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
-    """The arguments of `Spec`; after errors, which are reported, some of them are stand-ins."""
+    """Return the arguments of `Spec`. After errors, which are reported, some of them are placeholders."""
     references = raw.get("references", ())
     poisson = raw.get("poisson", {})
     hamiltonian, coupling = densities(raw.get("hamiltonian"), declared)
@@ -81,7 +81,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     if lattice is None:
         columns |= dict.fromkeys(declared.coordinates, "is recorded with the state")
     summed = [name for name in casimirs if lattice is None or lattice.kinds[name] != "sites"]
-    # An observable with an error of its own is none of a run that records it.
+    # A run that records an observable with an error is not reported in addition.
     broken = [name for name in raw.get("observables", {}) if name not in observed]
     columns |= dict.fromkeys(["state", "energy", *summed, *numbers, *broken], "")
     watched = watched_names(declared, observed, numbers)
@@ -140,16 +140,17 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     }
 
 
-#: Keys of the Hamilton–Jacobi series, which mean nothing to a splitting, and the values that do no harm.
+#: Keys of the Hamilton–Jacobi series, which have no meaning for a splitting, with the values that are allowed all the
+#: same.
 SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": ("auto",), "modified_hamiltonian": (0,)}
-#: Schemes that have no series, and what they do instead.
+#: Schemes without a series, with the part of the message that says what they do instead.
 WITHOUT_SERIES = {
     "splitting": "scheme: splitting follows exact flows of parts of H",
     "gauss": "scheme: gauss solves for the stages of a collocation method",
 }
 
 
-#: Keys that lattices do not take: the values that do no harm, and what to do.
+#: Keys that lattices do not have: the values that are allowed all the same, and a hint.
 NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
     "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
     "terms": ((), "order: sets the method of a lattice"),
@@ -158,7 +159,7 @@ NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
 }
 
 
-#: Keys that noise excludes: the values that do no harm, the reason, and what to do.
+#: Keys that are refused with noise: the values that are allowed all the same, the reason, and a hint.
 NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "monitor": (
         (),
@@ -174,7 +175,7 @@ NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "terms": ((), "with noise the method is chosen by order", "order: 2"),
     "adjoint": ((False,), "it is not offered", ""),
 }
-#: Keys of runs that it excludes, and those that mean nothing without it.
+#: Keys of runs that are refused with noise, and those that are refused without noise.
 NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "every", "at"), ("seed", "members")
 
 
@@ -220,7 +221,7 @@ def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, re
 
 
 def _no_brackets(declared: Declarations) -> MatrixForm:
-    """π of a site whose brackets are all along bonds; after errors it is a stand-in."""
+    """Return π of a site if all brackets are along bonds. After errors it is a placeholder."""
     n = len(declared.coordinates)
     return MatrixForm(((ZERO,) * n,) * n)
 
@@ -243,7 +244,7 @@ def _formulas(
 
 
 def _inputs(nodes: Sequence[Scalar | None], declared: Declarations) -> tuple[str, ...]:
-    """Return the names under ``inputs``, each that of a parameter with one value, each once."""
+    """Return the names under ``inputs``, which must be different parameters with one value each."""
     names: list[str] = []
     for node in filter(None, nodes):
         parameter = declared.parameters.get(node.text)
@@ -260,7 +261,7 @@ def _inputs(nodes: Sequence[Scalar | None], declared: Declarations) -> tuple[str
 
 
 def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
-    """``forces`` and ``damping``; by coordinates."""
+    """Return the forces of ``forces`` and ``damping``, by coordinate."""
     entries_of_kinds, damping = raw.get("forces") or {}, raw.get("damping")
     forces: dict[str, dict[str, Expression]] = {}
     for kind in ("covector", "vector"):
@@ -274,7 +275,7 @@ def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
 
 
 def _noise(raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dict[str, SpecNoise]:
-    """The sources of ``noise``; amplitudes are the same everywhere, for σ∇g to be the gradient of a function."""
+    """Return the sources of ``noise``. Amplitudes must be constants, so that σ∇g is the gradient of a function."""
     scope, sources = declared.dated_constants("an amplitude"), {}
     if len(raw) > limits.SOURCES:
         message = f"noise: {len(raw)} sources, the limit is {limits.SOURCES}"
@@ -291,7 +292,8 @@ def _noise(raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dic
 def _gauge(
     raw: str | Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations
 ) -> str | dict[str, Expression]:
-    """auto, none, or the multiples of Casimirs: constants along trajectories, hence free of coordinates."""
+    """Return auto, none, or the multiples of Casimirs, which must not depend on coordinates, so that they are
+    constant along trajectories."""
     if isinstance(raw, str):
         return raw
     values = _formulas(raw, declared)
@@ -305,7 +307,10 @@ def _gauge(
 
 
 def _monitor(node: Scalar | None, declared: Declarations) -> str | Expression | None:
-    """log, or g of dt = g dτ; a coordinate or another declared name ``log`` cannot stand alone there."""
+    """Return log, or the factor g of dt = g dτ.
+
+    If a declared name is ``log``, the word alone is ambiguous and is refused.
+    """
     if node is None:
         return None
     if node.text == LOGARITHMIC:
@@ -380,7 +385,7 @@ def _spray(options: Mapping[str, Any], declared: Declarations) -> BirealisationC
 def _on_covectors(
     lists: Mapping[str, Sequence[Scalar | None]], where: str, declared: Declarations
 ) -> dict[str, tuple[Expression, ...]]:
-    """Lists of n expressions in the coordinates and ``p_NAME``, by the key of the bi-realisation that holds them."""
+    """Return lists of n expressions in the coordinates and ``p_NAME``, by key of the bi-realisation."""
     n, scope, expressions = len(declared.coordinates), declared.scope(_momenta(declared, where)), {}
     for key, nodes in lists.items():
         place = declared.reader.locations.get(("birealisation", key))
@@ -392,7 +397,7 @@ def _on_covectors(
 
 
 def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
-    """The names ``p_NAME``, which must not be those of something else."""
+    """Return the names ``p_NAME``; report names that have another meaning."""
     momenta = {f"p_{c}": symbol(momentum(c)) for c in declared.coordinates}
     for name in [c for c in momenta if c in declared.nodes]:
         message = f"the name {name!r} means the momentum of {name[2:]!r} in {where}"

@@ -1,6 +1,6 @@
 """Values at the sites or bonds of a lattice: a formula of the indices, a list, a file, or random numbers."""
 
-# `return reader.error(…)` reports and returns None, the value of what has an error.
+# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ _WHOLE_SPHERE = "initial: {random: sphere}"
 
 
 def values(raw: Any, declared: Declarations, *, whole: bool = False) -> Values | None:
-    """Read an array, ``None`` after errors; with ``whole`` it is the array of all fields together."""
+    """Return an array that was read; None after errors, which are reported.
+
+    If ``whole``, it is the array of all fields together.
+    """
     if raw is None:
         return None
     if isinstance(raw, Scalar):
@@ -48,13 +51,13 @@ def values(raw: Any, declared: Declarations, *, whole: bool = False) -> Values |
 
 
 def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> Values | None:
-    """Random values: every key of their mapping is honoured, or reported."""
+    """Return random values; keys that have no effect are reported."""
     reader, before = declared.reader, len(declared.reader.problems.found)
     for key, (node, _) in entries.items():
         if key not in RANDOM_KEYS:
             hint = did_you_mean(key, RANDOM_KEYS) or f"keys: {', '.join(RANDOM_KEYS)}"
             reader.error(node, f"random values have no key {shown(key)}", hint)
-    if not entries:  # its keys are no names, which was reported
+    if not entries:  # the mapping has keys that are not names, which was reported
         return None
     if "random" not in entries:
         first = next(iter(entries.values()))[0]
@@ -73,7 +76,7 @@ def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> 
 
 
 def _option(entries: Mapping[str, tuple[Scalar, Any]], key: str, declared: Declarations) -> Any:
-    """The value of a key of random values, ``None`` where there is none or where it is wrong, which is reported."""
+    """Return the value of a key of random values; None if the key is absent or its value wrong, which is reported."""
     node, value = entries.get(key, (None, None))
     if node is None or value is None:
         return None

@@ -1,8 +1,8 @@
-"""YAML 1.2 into a tree of nodes with their places.
+"""Parser of YAML 1.2 into a tree of nodes with their places.
 
-Built on ruamel's event stream rather than its loaders: anchors, aliases and tags are refused as they come
-by, before anything can expand; nesting is counted before it can exhaust the stack; and a scalar keeps its
-text, so that ``1e-3`` is an exact rational and ``no`` is a name.
+It uses the event stream of ruamel instead of its loaders: anchors, aliases and tags are refused before anything is
+expanded, and nesting is limited before it can exhaust the stack. A scalar keeps its text, so ``1e-3`` is an exact
+rational and ``no`` is a name.
 """
 
 from __future__ import annotations
@@ -20,18 +20,19 @@ from phigen.spec.quoting import needs_quotes, quoted
 
 @dataclass
 class Node:
-    """A YAML value and where it starts."""
+    """A YAML value and the place where it starts."""
 
     location: Location
 
 
 @dataclass
 class Scalar(Node):
-    """Text as YAML delivers it; ``offset`` says how far its first character is from the location, if fixed.
+    """A scalar, as its text.
 
-    ``offset`` is ``None`` when characters of the text do not correspond one to one to columns of a line. Of a text over
-    several lines ``places`` are the lines and columns of its characters but for blanks, and of what follows; they are
-    unknown where there are escapes.
+    ``offset`` is the number of columns from the location to the first character of the text. It is None if the
+    characters of the text do not correspond one to one to columns of a line. For a text over several lines, ``places``
+    are the lines and columns of its characters other than blanks, and of its end; they are unknown if there are
+    escapes.
     """
 
     text: str
@@ -40,7 +41,7 @@ class Scalar(Node):
     places: tuple[tuple[int, int], ...] = ()
 
     def at(self, index: int) -> Location:
-        """The place of a character of the text, or of the scalar where that is unknown."""
+        """Return the place of a character of the text; the place of the scalar if the character's is unknown."""
         here = self.location
         if self.offset is not None:
             return Location(here.line, here.column + self.offset + index, here.file)
@@ -51,30 +52,30 @@ class Scalar(Node):
 
     @property
     def is_null(self) -> bool:
-        """Whether YAML reads it as null."""
+        """Whether YAML reads the text as null."""
         return self.plain and self.text in ("", "~", "null", "Null", "NULL")
 
     @property
     def boolean(self) -> bool | None:
-        """The boolean that YAML 1.2 reads, if it is one."""
+        """Return the boolean that YAML 1.2 reads; None if the text is not a boolean."""
         return _BOOLEANS.get(self.text) if self.plain else None
 
     @property
     def is_numeric(self) -> bool:
-        """Whether YAML reads it as a number."""
+        """Whether YAML reads the text as a number."""
         return self.plain and _NUMBER.fullmatch(self.text) is not None
 
 
 @dataclass
 class Sequence(Node):
-    """A sequence of YAML with its position in the file."""
+    """A YAML sequence."""
 
     items: list[Node] = field(default_factory=list)
 
 
 @dataclass
 class Mapping(Node):
-    """A YAML mapping, in the order of the file; duplicate keys are already reported and dropped."""
+    """A YAML mapping, in the order of the file. Duplicate keys have been reported and dropped."""
 
     entries: dict[str, tuple[Scalar, Node]] = field(default_factory=dict)
 
@@ -90,12 +91,12 @@ _BYTE_ORDER_MARKS = (
     (b"\xff\xfe", "UTF-16"),
     (b"\xfe\xff", "UTF-16"),
 )
-#: Joiners and the soft hyphen occur in honest text; other format characters can make a line read differently.
+#: Joiners and the soft hyphen, which occur in ordinary text. Other format characters can make a line look different.
 _HARMLESS = "\u200c\u200d\u00ad"
 
 
 def kind_of(node: Node) -> str:
-    """Name the kind of a node, for "expected …, found …"."""
+    """Return the name of the kind of a node, for messages such as "expected …, found …"."""
     if isinstance(node, Sequence):
         return "a list"
     if isinstance(node, Mapping):
@@ -109,21 +110,21 @@ def kind_of(node: Node) -> str:
 
 
 def is_unprintable(character: str) -> bool:
-    """Whether a character is a control, bidirectional override, surrogate or the like."""
+    """Whether a character is a control character, bidirectional override, surrogate or similar."""
     if character in _HARMLESS:
         return False
     return unicodedata.category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp") or (ord(character) & 0xFFFE) == 0xFFFE
 
 
 def describe(character: str) -> str:
-    """Return code point and name of a character, as ``U+202E RIGHT-TO-LEFT OVERRIDE``."""
+    """Return the code point and the name of a character, such as ``U+202E RIGHT-TO-LEFT OVERRIDE``."""
     return f"U+{ord(character):04X} {unicodedata.name(character, 'control character')}"
 
 
 def decode(data: bytes, file: str) -> str:
-    """The text of a file, with ``\\n`` line ends.
+    r"""Return the text of a file, with ``\n`` line ends.
 
-    Raises `SpecError` for what is not text in UTF-8 and `LimitError` for what is too long.
+    Raises `SpecError` if the bytes are not text in UTF-8, and `LimitError` if the file is too long.
     """
     problems, start = Problems(file), Location(1, 1, file)
     if len(data) > limits.FILE_BYTES:
@@ -160,7 +161,7 @@ def _location(text: str, index: int, file: str) -> Location:
 
 
 def read(text: str, problems: Problems) -> Mapping:
-    """The top-level mapping of a spec. Raises `SpecError` where reading cannot go on."""
+    """Return the top-level mapping of a spec. Raises `SpecError` at errors after which reading cannot continue."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
@@ -171,7 +172,7 @@ def read(text: str, problems: Problems) -> Mapping:
     except MarkedYAMLError as error:
         raise builder.syntax_error(error) from None
     except (YAMLError, ValueError, OverflowError) as error:
-        # Such as a directive or an escape with an absurd number.
+        # for instance a directive or an escape with an impossible number
         raise problems.stop(f"not valid YAML: {shown(error, 200)}", Location(1, 1, problems.file)) from None
     root = builder.root
     if root is None or (isinstance(root, Scalar) and root.is_null):
@@ -185,7 +186,7 @@ def read(text: str, problems: Problems) -> Mapping:
 
 
 class _Builder:
-    """Assembles nodes from ruamel's events, with a stack of the open collections."""
+    """Builder of nodes from the events of ruamel, with a stack of the open collections."""
 
     def __init__(self, text: str, problems: Problems) -> None:
         self.text, self.problems = text, problems
@@ -195,12 +196,13 @@ class _Builder:
         self.documents = 0
 
     def place(self, mark: Any) -> Location:
-        """The location of one of ruamel's marks."""
+        """Return the location of a mark of ruamel."""
         return Location(mark.line + 1, mark.column + 1, self.problems.file)
 
     def syntax_error(self, error: Any) -> Exception:
         mark = error.problem_mark or error.context_mark
-        if error.context_mark and mark.index >= len(self.text):  # rather where it opens than the end of the file
+        # the start of the open collection is more helpful than the end of the file
+        if error.context_mark and mark.index >= len(self.text):
             mark = error.context_mark
         location = self.place(mark) if mark else Location(1, 1, self.problems.file)
         what = " ".join(part for part in (error.context, error.problem) if part)
@@ -209,7 +211,7 @@ class _Builder:
             hint = "indent with spaces, not with tabs"
         line = self.text.split("\n")[location.line - 1]
         if needs_quotes(line, location.column - 1):
-            self.problems.forget(location.line)  # what was made of the line before is no error of its own
+            self.problems.forget(location.line)  # drops errors about the line that follow from this one
             what = "inside { } and [ ], what contains [ ] stands between quotes"
             hint = f"write {quoted(line).strip()}"
         return self.problems.stop(f"not valid YAML: {what}", location, hint)
@@ -266,13 +268,13 @@ class _Builder:
         return 1 if raw[:1] in ("'", '"') and raw[1:-1] == event.value else None
 
     def places(self, event: Any) -> tuple[tuple[int, int], ...]:
-        """Places of the characters of a text over several lines, without blanks, and of its end.
+        """Return the places of the characters of a text over several lines, without blanks, and of its end.
 
-        Folding changes blanks only; where other characters differ, there are escapes, and nothing is known.
+        Folding changes blanks only. If other characters differ, there are escapes, and the places are unknown: ().
         """
         start, end = event.start_mark.index, event.end_mark.index
         characters = [c for c in event.value if not c.isspace()]
-        if event.style in ("|", ">"):  # what stands beside the sign is about the text
+        if event.style in ("|", ">"):  # the rest of the line after the sign is not part of the text
             start = self.text.find("\n", start, end)
         elif event.style:
             start += 1
@@ -289,7 +291,7 @@ class _Builder:
         return (*places, (places[-1][0], places[-1][1] + 1))
 
     def attach(self, node: Node) -> None:
-        """Put a node into the innermost open collection."""
+        """Add a node to the innermost open collection."""
         if not self.stack:
             self.root = node
             return
@@ -303,7 +305,7 @@ class _Builder:
         else:
             key, pending[0] = pending[0], None
             if isinstance(node, Scalar) and node.is_null and not node.text:
-                node.location = key.location  # ruamel places nothing before what follows it
+                node.location = key.location  # ruamel gives an empty value the place of the next token
             first = parent.entries.get(key.text)
             if first is None:
                 parent.entries[key.text] = (key, node)

@@ -1,4 +1,4 @@
-"""A spec as the text of a file that parses to it: specs made by programs, printed for users."""
+"""Writer of a spec as YAML that parses to the same spec, for specs that were made by programs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from phigen.spec.model import DEFAULT_ORDER, MatrixForm, Parameter, Run, Spec, V
 from phigen.symbolic.expression import Expression, neg, number, text
 from phigen.symbolic.readable import infix, signed_sum
 
-#: Longer expressions are given in parts, by definitions.
+#: Lengths above which expressions are divided into definitions: nine tenths of the limits.
 _LENGTH, _NODES = limits.EXPRESSION_LENGTH * 9 // 10, limits.EXPRESSION_NODES * 9 // 10
 _WIDTH = 110
 _PLAIN = re.compile(r"[A-Za-z0-9_+*/(). ^-]*")
@@ -20,7 +20,7 @@ _WORDS = frozenset(["null", "Null", "NULL", "~", "true", "True", "TRUE", "false"
 
 
 def spec_text(spec: Spec) -> str:
-    """The text of a spec that was made in memory: its name, system and runs; π must be a matrix."""
+    """Return the text of a spec that was made in memory: its name, system and runs. π must be a matrix."""
     return "\n".join(_Writer(spec).lines()) + "\n"
 
 
@@ -65,7 +65,7 @@ class _Writer:
                 yield from _indented(_run(run))
 
     def short(self, name: str, expression: Expression) -> str:
-        """The text of an expression, the parts of long ones by definitions."""
+        """Return the text of an expression; parts of a long expression become definitions."""
         terms = [(t, _size(t) + 1) for t in map(infix, _terms(expression))]
         groups: list[list[str]] = [[]]
         length = nodes = 0
@@ -132,7 +132,7 @@ class _Writer:
 
 
 def _size(written: str) -> int:
-    """Count the numbers, names and operators of a text, like the grammar."""
+    """Return the number of numbers, names and operators in a text, counted as the grammar does."""
     return len(re.findall(r"[\w.]+|\*\*|[-+*/]", written))
 
 
@@ -150,7 +150,7 @@ def _terms(e: Expression) -> Iterator[Expression]:
 
 
 def _flat(e: Expression) -> str:
-    """An expression as text, sums without parentheses."""
+    """Return an expression as text, with sums without parentheses."""
     return _sum([infix(t) for t in _terms(e)])
 
 
@@ -201,7 +201,7 @@ def _run(run: Run) -> Iterator[str]:
 
 
 def _number(value: Fraction) -> str:
-    """A decimal where the number has one that is short, else a quotient."""
+    """Return a number as a decimal if that is exact and short, else as a quotient."""
     decimal = repr(float(value))
     return str(value) if value.denominator == 1 else decimal if Fraction(decimal) == value else text(number(value))
 

@@ -1,1 +1,1 @@
-"""The Hamiltonian as a sum of parts whose flows are elementary, and these flows: explicit steps."""
+"""Explicit steps: H as a sum of parts with elementary flows, and these flows."""

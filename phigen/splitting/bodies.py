@@ -1,7 +1,7 @@
-"""Splittings of attracting bodies in relative coordinates: Kepler motions, and the small remainder.
+"""Splittings of attracting bodies in relative coordinates: Kepler motions A and a small remainder B.
 
-H is Σ p_i²/2m_i − Σ k_ij/|q_i − q_j| and further terms. Those without the coordinates of the bodies, such as the free
-rotation of one of them, belong to A, all others to B.
+H is Σ p_i²/2m_i − Σ k_ij/|q_i − q_j| and further terms. Further terms without coordinates of the bodies, such as the
+free rotation of one of the bodies, belong to A, all others to B.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Generator, Poly
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: The key of specs.
+#: Key of specs for relative coordinates.
 KEY = "coordinates_from"
 
 _FORM = (
@@ -39,7 +39,10 @@ class _NoBodiesError(Exception):
 
 
 def split_bodies(system: System, change: str) -> SplitHamiltonian:
-    """Return the two parts of H in the relative coordinates of this name. Raises `SpecError`, located at the key."""
+    """Return the parts A and B of H in the relative coordinates called ``change``.
+
+    Raises `SpecError`, located at the key, if H is not of this form.
+    """
     summands = hamiltonian_terms(system)
     ring = ring_of(system, summands)
     terms = [Term(e, ring.tower.convert(e)) for e in summands]
@@ -58,14 +61,14 @@ def split_bodies(system: System, change: str) -> SplitHamiltonian:
 
 @dataclass(frozen=True)
 class _Distance:
-    """1/|q_a − q_b|, a variable of the ring: pairs of coordinates, one for each axis."""
+    """The variable 1/|q_a − q_b| of the ring, with a pair of coordinates (indices) for each axis."""
 
     variable: int
     pairs: tuple[tuple[int, int], ...]
 
 
 def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[Term]]:
-    """Return the bodies, and the terms that are neither their kinetic energies nor attractions of pairs."""
+    """Return the bodies, and the terms that are neither kinetic energies nor attractions of pairs."""
     distances = [d for g in ring.tower.generators if is_inverse_distance(g) for d in [_distance(ring, g)] if d]
     if not distances:
         raise _NoBodiesError("no attraction of two bodies was found")
@@ -124,7 +127,7 @@ def _distance(ring: Ring, generator: Generator) -> _Distance | None:
 
 
 def _axes(pairs: Iterator[tuple[int, int]]) -> list[list[int]]:
-    """Return the coordinates along each axis, which differences connect, in the order of the coordinates."""
+    """Return the coordinates along each axis, in order. Coordinates whose difference occurs in H are on one axis."""
     axes: list[set[int]] = []
     for pair in pairs:
         merged = {*pair}.union(*(axis for axis in axes if not axis.isdisjoint(pair)))
@@ -139,7 +142,7 @@ def _power(ring: Ring, variable: int, exponent: int) -> Monomial:
 def _commuting_terms(
     ring: Ring, bodies: AttractingBodies, other_terms: Sequence[Term]
 ) -> tuple[list[Term], list[Term]]:
-    """Return the terms that commute with all coordinates of the bodies, and the others."""
+    """Return the terms that commute with all coordinates of the bodies, and the remaining terms."""
     body_coordinates = {ring.coordinates.index(name) for name in bodies.names}
     partners = {j for i in body_coordinates for j in (i, *ring.brackets_of[i])}
     alone = [t for t in other_terms if partners.isdisjoint(ring.support(t.element))]
@@ -147,12 +150,12 @@ def _commuting_terms(
 
 
 def _with_others(ring: Ring, flow: Flow, terms: Sequence[Term]) -> Flow:
-    """Return the composition of a flow with that of terms that commute with it."""
+    """Return the composition of a flow with that of ``terms``, which commute with the flow."""
     return composed(ring.coordinates, [flow, _flow(ring, terms)]) if terms else flow
 
 
 def _flow(ring: Ring, terms: Sequence[Term]) -> Flow:
-    """Return the flow of terms. Raises `_NoBodiesError` if they do not commute, or have none."""
+    """Return the flow of a sum of terms. Raises `_NoBodiesError` if the terms do not commute, or have no flow."""
     conflicts = Conflicts(ring).grouped(terms)
     if len(conflicts) > 1:
         first, second = (shortened(group[0].expression) for group in conflicts[:2])
@@ -166,7 +169,7 @@ def _flow(ring: Ring, terms: Sequence[Term]) -> Flow:
 def _remainder(
     system: System, ring: Ring, remainder: Expression, terms: Sequence[Term], positions: frozenset[int], *, moving: bool
 ) -> Flow | None:
-    """Return the flow of B, or None where B is 0; a ``moving`` remainder contains momenta."""
+    """Return the flow of B, or None if B is 0. A ``moving`` remainder contains momenta."""
     shifting = [t for t in terms if positions.issuperset(ring.support(t.element))]
     other_terms = [t for t in terms if t not in shifting]
     if moving and not remainder.is_zero and terms:
@@ -187,5 +190,5 @@ def _remainder(
 
 
 def _positions(ring: Ring, bodies: AttractingBodies) -> frozenset[int]:
-    """Return the positions of the bodies, as indices."""
+    """Return the indices of the positions of the bodies."""
     return frozenset(ring.coordinates.index(name) for body in bodies.positions for name in body)

@@ -1,8 +1,8 @@
 """Linear equations of coordinates along the flow of a part, by closing sets of monomials under differentiation.
 
-The derivative of a coordinate along π∇G is written as a polynomial in the moving variables, and each new monomial
-joins the list. If the list ends, its entries w obey ẇ = Aw, where A contains frozen and static quantities alone. So
-kicks and drifts, rotations, shears and scalings are all one case; triangular polynomial equations are another.
+The derivative of a coordinate along π∇G is a polynomial in the moving variables, and each new monomial of it joins a
+list. If the list is finite, its entries w satisfy ẇ = Aw, where A contains only frozen and static quantities. Kicks and
+drifts, rotations, shears and scalings are special cases, as are triangular polynomial equations.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: Bounds of a list: monomials, their degree, and coordinates in a list without products. Longer ones count as infinite.
+#: Bounds of a list: number of monomials, their degree, and number of coordinates in a list without products. Longer
+#: lists are treated as infinite.
 MOST_MONOMIALS, MOST_DEGREE, MOST_COORDINATES = 16, 8, 64
 
 Row = dict[Monomial, Poly]
@@ -21,9 +22,9 @@ Row = dict[Monomial, Poly]
 
 @dataclass(frozen=True)
 class LinearMotion:
-    """ẇ = Aw for the monomials w in ``basis``, of which the first are the ``coordinates`` (indices); A is constant.
+    """Linear equations ẇ = Aw for the monomials w in ``basis``; the first of them are the ``coordinates`` (indices).
 
-    The monomial 1, if the equations need it, is the last one.
+    A, the ``matrix``, is constant. If the equations need the monomial 1, it is the last one.
     """
 
     coordinates: tuple[int, ...]
@@ -33,7 +34,7 @@ class LinearMotion:
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion of the coordinates: linear motions, and the rates of other coordinates.
+    """The motion of the coordinates: linear equations for some, and the rates of the ``other`` coordinates by index.
 
     ``moving`` are the variables that are not constant.
     """
@@ -44,7 +45,7 @@ class Motion:
 
 
 def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
-    """Return the motion along a vector field, coordinate by coordinate."""
+    """Return the motion along a vector field."""
     rates = {v: ring.rate(ring.tower.gens[v], field) for v in ring.state}
     rates = {v: r for v, r in rates.items() if r != 0}
     rows: dict[Monomial, Row] = {}
@@ -67,7 +68,9 @@ def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
 def _closed(
     ring: Ring, rates: Mapping[int, Poly], start: Monomial, known_rows: Mapping[Monomial, Row]
 ) -> dict[Monomial, Row] | None:
-    """Return the rows of all monomials in the repeated derivatives of one; None if there seem to be infinitely many."""
+    """Return the rows of all monomials in the repeated derivatives of ``start``; None if there seem to be infinitely
+    many.
+    """
     rows: dict[Monomial, Row] = {}
     pending = [start]
     while pending:
@@ -83,7 +86,7 @@ def _closed(
 
 
 def _row(ring: Ring, rates: Mapping[int, Poly], m: Monomial) -> Row:
-    """Return the derivative of a monomial."""
+    """Return the derivative of a monomial, by monomials."""
     parts = []
     for v, rate in rates.items():
         if m[v]:
@@ -94,7 +97,7 @@ def _row(ring: Ring, rates: Mapping[int, Poly], m: Monomial) -> Row:
 
 
 def _motions(ring: Ring, rows: Mapping[Monomial, Row], starts: Mapping[Monomial, int]) -> Iterator[LinearMotion]:
-    """Yield the equations, split into systems that share no monomials other than 1."""
+    """Yield the linear equations, divided into systems that share no monomials other than 1."""
     label = {m: k for k, m in enumerate(rows) if any(m)}
     for m, row in rows.items():
         merged = {label[k] for k in (m, *row) if any(k)}

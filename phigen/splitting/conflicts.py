@@ -1,6 +1,6 @@
 """Assignment of terms that do not commute to different parts: a colouring of the graph of conflicts.
 
-The colouring follows D. Brélaz (DSATUR, 1979), which finds two colours wherever two suffice, as in lattices.
+The colouring is by D. Brélaz (DSATUR, 1979), which uses two colours wherever two are sufficient, as on lattices.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from phigen.splitting.flow import Term
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: Number of pairs of terms above which the progress display has a stage for them.
+#: Number of pairs of terms above which the progress display shows a stage for them.
 MIN_PAIRS_FOR_PROGRESS = 100
 
 
 class Conflicts:
-    """The commuting pairs among the terms of H.
+    """Which pairs of terms of H commute.
 
-    Results for a term, and for a pair, are cached, since most candidate groupings share them.
+    Results for a term and for a pair are cached, since most candidate groupings share them.
     """
 
     def __init__(self, ring: Ring) -> None:
@@ -60,7 +60,7 @@ class Conflicts:
         return conflicts
 
     def grouped(self, terms: Sequence[Term]) -> list[list[Term]]:
-        """Return the terms in commuting groups, as few as the colouring finds."""
+        """Return the terms in commuting groups, in as few groups as the colouring needs."""
         neighbours = self.graph(terms)
         colours = coloured(neighbours, [self.support(t) for t in terms])
         return [[t for t, c in zip(terms, colours, strict=True) if c == k] for k in sorted(set(colours))]
@@ -72,7 +72,7 @@ class Conflicts:
             self._partners[id(term)] = frozenset(j for i in support for j in self.ring.brackets_of[i])
 
     def _decide(self, pairs: Sequence[tuple[Term, Term]]) -> None:
-        """Decide and store whether the terms of each pair commute."""
+        """Decide for each pair whether its terms commute, and store the results."""
         open_ = [(a, b) for a, b in pairs if (id(a), id(b)) not in self._commute]
         with (
             progress.stage("pairs of terms", len(open_))
@@ -95,13 +95,13 @@ class Conflicts:
 
 
 def coloured(neighbours: Sequence[set[int]], supports: Sequence[Collection[int]]) -> list[int]:
-    """Return a colour for each node, from 0, so that neighbours differ.
+    """Return a colour for each node, from 0, such that neighbours differ.
 
-    Among the possible colours a node takes that of the nodes with which it shares most of its support.
+    Among the possible colours, a node gets that of the nodes with which it shares most of its support.
     """
     colours = [-1] * len(neighbours)
     neighbour_colours: list[set[int]] = [set() for _ in neighbours]
-    sharing: list[Counter[int]] = []  # for each colour how many nodes have a coordinate
+    sharing: list[Counter[int]] = []  # for each colour: coordinate → number of nodes that have it
     uncoloured = set(range(len(neighbours)))
     while uncoloured:
         i = max(uncoloured, key=lambda i: (len(neighbour_colours[i]), len(neighbours[i]), -i))

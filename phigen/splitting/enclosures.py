@@ -12,18 +12,18 @@ from phigen.splitting.matrices import MAX_PADE_NORM, PADE, MatrixExponential
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement
 
-#: Times of the comparison, as multiples of 1/‖A‖.
+#: Times at which the values are compared, as multiples of 1/‖A‖.
 TIMES = (1e-3, 1.0, 30.0)
 
-#: Largest error in units of rounding, relative to the norm of the matrix, for each row and for each unit of ‖tA‖.
+#: Largest error relative to the norm of the matrix, in units of rounding, for each row and for each unit of ‖tA‖.
 UNITS = 8.0
 
-#: Bits of the enclosures.
+#: Precision of the enclosures in bits.
 BITS = 200
 
 
 def enclosed(name: str, exponential: MatrixExponential, values: Mapping[str, float]) -> Statement:
-    """Decide whether exp(tA) − 1 is exact up to rounding, with these values of parameters."""
+    """Return the statement that exp(tA) − 1 is exact up to rounding, for these values of parameters."""
     try:
         rates = np.array(evaluate(list(exponential.rates), values)).reshape(exponential.size, -1)
     except (DomainError, KeyError):

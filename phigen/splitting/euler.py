@@ -1,13 +1,15 @@
 """The flow of a free rigid body: ẋ_i = α_i x_j x_k for three coordinates, α of both signs, by elliptic functions.
 
-E_i = α_j α_k x_i² differ by constants. With the largest and the smallest of them, P = max − min, and R = the third less
-min, S, C and κ of `phigen.symbolic.elliptic` give, by the addition theorem of Jacobi's functions,
+The differences of E_i = α_j α_k x_i² are constant. Let max and min be the largest and the smallest E_i, P = max − min,
+and R the third E_i minus min. With S, C and κ of `phigen.symbolic.elliptic`, the addition theorem of Jacobi's functions
+yields
 
     x_i' = (x_i σ_j σ_k + α_i x_j x_k S σ_i)/D,    σ_i² = D + E_i S²,    D = 1 − max S² = C² − min S²,
 
-where σ_i > 0, but σ_i = C for the smallest E_i. An error of κ gives the motion of another time, and does not change the
-energy and |x|. No step has a phase, and nothing is divided by the difference of two moments: the separatrix, rotations
-about an axis and symmetric bodies are no special cases. Near the separatrix R has the digits of x_i close to its axis.
+where σ_i > 0, but σ_i = C for the smallest E_i. An error of κ results in the motion over a different time; it does not
+change the energy and |x|. No phase is stored between steps, and no division is by the difference of two moments: the
+separatrix, rotations about an axis and symmetric bodies are not special cases. Near the separatrix R has the accuracy
+of x_i close to its axis.
 
 C. G. J. Jacobi, Sur la rotation d'un corps, Crelle's Journal 39 (1850); R. van Zon, J. Schofield, Numerical
 implementation of the exact dynamics of free rigid bodies, Journal of Computational Physics 225 (2007).
@@ -26,7 +28,7 @@ from phigen.symbolic.symbols import Symbol
 
 Vector = Sequence[Expression]
 
-#: The other two indices of each one, in cyclic order.
+#: For each index, the other two indices in cyclic order.
 CYCLIC = ((1, 2), (2, 0), (0, 1))
 
 _HALF = number(Fraction(1, 2))
@@ -34,7 +36,7 @@ _HALF = number(Fraction(1, 2))
 
 @dataclass(frozen=True)
 class EulerMotion:
-    """ẋ_i = α_i x_j x_k for the ``coordinates`` x_i, with the ``factors`` α_i, which depend on parameters only."""
+    """The motion ẋ_i = α_i x_j x_k of the ``coordinates`` x_i; the ``factors`` α_i depend on parameters only."""
 
     coordinates: tuple[str, ...]
     factors: tuple[Expression, ...]
@@ -42,29 +44,30 @@ class EulerMotion:
 
     @property
     def manner(self) -> str:
-        """Description of the motion for reports."""
+        """Description of the motion, for reports."""
         return f"{', '.join(self.coordinates)} moved as a free rigid body, by elliptic functions"
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return expressions as they are compared in proofs."""
+        """Return the expressions unchanged: proofs on this motion need no further symbols."""
         return [*roots]
 
     def field(self, names: Sequence[str]) -> list[Expression]:
-        """Return the rates of all coordinates."""
+        """Return the rates of all coordinates ``names``; coordinates that are not part of the motion have the rate
+        0."""
         x = [symbol(name) for name in self.coordinates]
         rates = [a * x[j] * x[k] for a, (j, k) in zip(self.factors, CYCLIC, strict=True)]
         return self._placed(names, rates)
 
     def increments(self, names: Sequence[str]) -> list[Expression]:
-        """Return the increments of all coordinates in the time of the flow."""
+        """Return the increments of all coordinates ``names`` over the time of the flow."""
         return self._placed(names, self.addition(symbol(TIME)).changes())
 
     def addition(self, time: Expression) -> Addition:
-        """Return the addition theorem for a time."""
+        """Return the addition theorem for a duration."""
         return Addition.at([symbol(name) for name in self.coordinates], self.factors, time)
 
     def residuals(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals that vanish if the changes are the motion."""
+        """Yield the residuals that vanish if the increments are the motion."""
         yield from identities()
 
     def _placed(self, names: Sequence[str], values: Vector) -> list[Expression]:
@@ -74,7 +77,7 @@ class EulerMotion:
 
 @dataclass(frozen=True)
 class Addition:
-    """The addition theorem at a state ``x``: P, R and κ, with S, C and D, the E_i, and their order as conditions."""
+    """The addition theorem at a state ``x``: P, R and κ, the E_i (``levels``), and conditions for their order."""
 
     x: Vector
     factors: Vector
@@ -86,7 +89,7 @@ class Addition:
 
     @classmethod
     def at(cls, x: Vector, factors: Vector, time: Expression) -> Addition:
-        """Return the theorem for a time."""
+        """Return the theorem for a duration."""
         levels = levels_of(x, factors)
         conditions = _order(levels)
         low, middle, high = sorted_by(conditions, levels)
@@ -94,22 +97,22 @@ class Addition:
         return cls(x, factors, levels, conditions, p, r, call(AMPLITUDE, time, p, r))
 
     def sorted(self, values: Vector) -> tuple[Expression, Expression, Expression]:
-        """Return those of three values that belong to the lowest, the middle and the highest E_i."""
+        """Return the three values in the order of the E_i: those of the lowest, the middle and the highest E_i."""
         return sorted_by(self.conditions, values)
 
     def changes(self) -> list[Expression]:
-        """Return the changes of the x_i."""
+        """Return the increments of the x_i."""
         s, c, _ = functions_of(self.kappa, self.p, self.r)
         low, _, high = self.sorted(self.levels)
         gaps_below, gaps_above = [e - low for e in self.levels], [high - e for e in self.levels]
         square, z = s**2, self.p * self.kappa**2
         roots = [sqrt(c**2 + e * square) for e in gaps_below]
-        # On the separatrix C > 0, but may be negative by rounding.
+        # On the separatrix C > 0, but rounding may make it negative.
         sigma = self._at_lowest([call("choose", self.r, c, root) for root in roots], roots)
         versine = 8 * z * power(1 + z, -2)  # 1 − C
         losses = self._at_lowest([versine] * 3, [d * square / (1 + r) for d, r in zip(gaps_above, roots, strict=True)])
         divisor = c**2 - low * square
-        # Where D is small, 1 − σ_j and 1 − σ_k are not.
+        # For small D, σ_j σ_k − D is computed from 1 − σ_j and 1 − σ_k, which are not small.
         gaps = [
             call("choose", divisor - _HALF, high * square - (u + v - u * v), sigma[j] * sigma[k] - divisor)
             for j, k, u, v in ((j, k, losses[j], losses[k]) for j, k in CYCLIC)
@@ -117,7 +120,8 @@ class Addition:
         return _ends(self.x, self.factors, sigma, s, divisor, gaps)
 
     def _at_lowest(self, chosen: Vector, others: Vector) -> list[Expression]:
-        """Return the i-th of ``chosen`` for the i with the lowest E_i, and those of ``others`` for the other two.
+        """Return the i-th of ``chosen`` for the i with the lowest E_i, and the values of ``others`` for the other two
+        indices.
 
         On the separatrix two E_i are equal, but have different derivatives.
         """
@@ -131,13 +135,13 @@ class Addition:
 
 
 def levels_of(x: Vector, factors: Vector) -> list[Expression]:
-    """Return the first integrals E_i of the free rigid body (module docstring)."""
+    """Return the first integrals E_i = α_j α_k x_i² of the free rigid body."""
     return [factors[j] * factors[k] * e**2 for e, (j, k) in zip(x, CYCLIC, strict=True)]
 
 
 def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
-    """Return what is positive if the second is above the first, the third above the lower of these, and the upper of
-    the first two above the rest."""
+    """Return three conditions, positive if: E_2 > E_1; E_3 is above the lower of these; the upper of these is above
+    the rest."""
     second = levels[1] - levels[0]
     lower, upper = call("choose", second, *levels[:2]), call("choose", second, levels[1], levels[0])
     third = levels[2] - lower
@@ -145,7 +149,7 @@ def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
 
 
 def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Expression, Expression, Expression]:
-    """Return three values in the order of the E_i with these conditions, the lowest first."""
+    """Return three values in the order of the E_i, the lowest first, by the conditions of `_order`."""
     second, third, last = conditions
     lower, upper = call("choose", second, *values[:2]), call("choose", second, values[1], values[0])
     low, upper_pair = call("choose", third, lower, values[2]), call("choose", third, values[2], lower)
@@ -155,7 +159,7 @@ def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Express
 def _ends(
     x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Expression, gaps: Vector
 ) -> list[Expression]:
-    """Return the changes of the x_i, where ``gaps`` are σ_j σ_k − D."""
+    """Return the increments of the x_i; ``gaps`` are σ_j σ_k − D."""
     inverse = power(divisor, -1)
     return [
         (x[i] * gap + factors[i] * x[j] * x[k] * (s * sigma[i])) * inverse
@@ -172,7 +176,7 @@ def moved(x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Exp
 def identities() -> Iterator[tuple[str, Expression]]:
     """Yield the residuals that vanish if the increments are the flow, in independent symbols x_i, α_i and S.
 
-    Let E_m be the largest. Then σ_m = 1 and Ṡ = σ_j σ_k, which is CD of the elliptic functions, and σ_j, σ_k are roots
+    Let E_m be the largest. Then σ_m = 1 and Ṡ = σ_j σ_k, which is CD for the elliptic functions, and σ_j, σ_k are roots
     of 1 − (E_m − E_j)S². The factors σ_j σ_k − D are compared with their form for small S.
     """
     names = [Symbol("body", kind, i) for kind in ("x", "a") for i in range(3)]
@@ -194,7 +198,7 @@ def identities() -> Iterator[tuple[str, Expression]]:
 
 
 def _function_identities() -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals that vanish if S(κ) moves with CD, where κ moves with (1 + z)D/4."""
+    """Yield the residuals that vanish if dS(κ)/dt = CD for dκ/dt = (1 + z)D/4."""
     name, p, r = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "R"))
     kappa = symbol(name)
     s, c, _ = functions_of(kappa, p, r)

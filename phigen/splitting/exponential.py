@@ -1,13 +1,13 @@
 """exp(tA)w − w in closed form, for the linear equations ẇ = Aw of `phigen.splitting.closure`.
 
-The closed forms rest on the relation that the powers of A satisfy; A commutes with its entries, which are constant:
+The closed forms use a relation between powers of A. The entries of A are constant along the flow:
 
 - A^k = 0: a polynomial in t
-- A^{a+1} = dA^a: Σ_{k<a} (tA)^k/k! and (e^{td} − …) A^a/d^a, the part of the exponential series from (td)^a on
-- A^{a+2} = −cA^a: the same with sin and cos of t√c, or with sinh and cosh, for a = 1 and a = 2
+- A^{a+1} = dA^a: Σ_{k<a} (tA)^k/k! and (e^{td} − …) A^a/d^a, the terms of the exponential series from (td)^a on
+- A^{a+2} = −cA^a: likewise with sin and cos of t√c, or with sinh and cosh, for a = 1 and a = 2
 
 If d depends on the state, A/d may be 0/0 where d vanishes, so A^a/d^a is not in the ring. Then the entire functions of
-`phigen.symbolic.entire` replace the quotients; they serve for both signs of c.
+`phigen.symbolic.entire` replace the quotients; they are valid for both signs of c.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from phigen.symbolic.tower import Poly, rational
 
 Matrix = Sequence[Sequence[Poly]]
 
-#: Largest number of powers of a matrix that are tried: with 64 rows all powers take minutes.
+#: Largest number of powers of a matrix that are computed: for 64 rows, all powers would take minutes.
 MOST_POWERS = 16
 
-#: The manner of a motion at a constant rate.
+#: Description of a motion at a constant rate.
 SHIFTED = "shifted"
 
 _HALF = number(Fraction(1, 2))
@@ -40,7 +40,7 @@ class NoClosedFormError(Exception):
 
 @dataclass(frozen=True)
 class Solution:
-    """The increments of the coordinates of a linear motion, and a word for the motion."""
+    """The increments of the coordinates of a linear motion, and a word that describes the motion."""
 
     increments: tuple[Expression, ...]
     manner: str
@@ -75,7 +75,7 @@ def _powers(ring: Ring, a: Matrix) -> list[Matrix]:
 
 
 def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]]) -> Solution | None:
-    """Return Σ t^k A^k w/k!, if some power of A vanishes."""
+    """Return Σ t^k A^k w/k! if some power of A vanishes, else None."""
     if not _vanishes(powers[-1]):
         return None
     tower, t, factorial = ring.tower, ring.tower.variable(TIME), 1
@@ -129,7 +129,10 @@ def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 def _without_quotients(
     ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], c: Poly, a: int
 ) -> Solution | None:
-    """Return the solution by functions of s = ct²: sin and 1 − cos of the angle √s from those of its half."""
+    """Return the solution by functions of s = ct², or None.
+
+    sin and 1 − cos of the angle √s are computed from those of its half.
+    """
     t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
     if a == 1:
         return _solution_of_scaled_matrix(ring, matrix, images, s)
@@ -143,7 +146,7 @@ def _without_quotients(
 def _solution_of_scaled_matrix(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Expression) -> Solution:
     """Return the solution for a = 1, with A = fM: the static factor f of all entries multiplies the time.
 
-    M²w is computed as M times Mw where that takes fewer operations than its entries, as for cross products.
+    M²w is computed as M times Mw if that needs fewer operations than the entries of M², as for cross products.
     """
     factor = _static_factor(ring, matrix)
     once = [ring.expression(v / factor) for v in images[0]]
@@ -180,7 +183,7 @@ def _circular(
 def _hyperbolic(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """Return the solution with sinh and cosh, where cosh θ − 1 = 2 sinh²(θ/2) replaces 1 − cos θ."""
+    """Return the solution with sinh and cosh; cosh θ − 1 = 2 sinh²(θ/2) replaces 1 − cos θ."""
     s, c = call("sinh", angle / 2), call("cosh", angle / 2)
     if a == 1:
         increments = tuple(2 * s * (c * u + s * v) for u, v in zip(*units, strict=True))
@@ -206,9 +209,9 @@ def _image(ring: Ring, a: Matrix, w: Sequence[Poly]) -> list[Poly]:
 
 
 def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
-    """Return d with a = d·b, or None if there is none in the ring.
+    """Return d with a = d·b, or None if the ring contains no such d.
 
-    Where cancelled reciprocals hide d from the division, d stands on the diagonal of ``guess``.
+    If cancelled reciprocals hide d from the division, d is on the diagonal of ``guess``.
     """
     pairs = [(x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True)]
     if any(x != 0 and y == 0 for x, y in pairs):
@@ -220,7 +223,7 @@ def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
 
 
 def _quotients(ring: Ring, elements: Sequence[Poly], divisor: Poly) -> list[Expression] | None:
-    """Return the elements over the divisor, if all quotients are in the ring."""
+    """Return the elements divided by the divisor; None unless all quotients are in the ring."""
     divided = [divmod(e, divisor) for e in elements]
     return (
         None
@@ -231,7 +234,7 @@ def _quotients(ring: Ring, elements: Sequence[Poly], divisor: Poly) -> list[Expr
 
 @dataclass(frozen=True)
 class _Root:
-    """c = ±(scale·element)²; ``positive`` is the sign."""
+    """The root of c = ±(scale·element)²; ``positive`` is true for the sign +."""
 
     positive: bool
     scale: Expression
@@ -239,7 +242,7 @@ class _Root:
 
 
 def _root(ring: Ring, c: Poly) -> _Root | None:
-    """Return the square root of c or of −c, if it is in the ring up to the root of a number."""
+    """Return the square root of c or of −c, if it is an element of the ring times the root of a number; else None."""
     content, factors = c.factor()
     if any(multiplicity % 2 for _, multiplicity in factors):
         return None

@@ -26,20 +26,21 @@ from phigen.symbolic.remainders import REMAINDERS
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.tower import Poly, Tower
 
-#: Motions with flows of their own, which are proved by identities.
+#: Motions whose flows have special formulas, which are proved by identities.
 Motion = KeplerMotion | RelativeMotions | EulerMotion
 
-#: Methods for linear equations, each with those before: closed forms, exponentials of matrices that are computed before
-#: the steps, and exponentials of small matrices that depend on the state.
+#: Methods for linear equations; each includes those before it. They are closed forms, exponentials of matrices that are
+#: computed before the steps, and exponentials of small matrices that depend on the state.
 CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES = range(3)
 
-#: The manner of a linear motion with a matrix exponential.
+#: Description of a linear motion with a matrix exponential.
 BY_MATRIX = "moved by exp(tA), computed before the steps"
 
 
 @dataclass(frozen=True)
 class Term:
-    """A term of H, as the user wrote it and in the ring; ``motion`` is set for Kepler motions and rigid bodies."""
+    """A term of H, as written by the user and as an element of the ring; ``motion`` is set for Kepler motions and
+    rigid bodies."""
 
     expression: Expression
     element: Poly
@@ -48,11 +49,11 @@ class Term:
 
 @dataclass(frozen=True)
 class Flow:
-    """The flow of ``hamiltonian`` for the time `TIME`: x + ``increment``; ``manner`` describes the motion in words.
+    """The flow of ``hamiltonian`` over the time `TIME`: x + ``increment``; ``manner`` describes the motion in words.
 
-    For a ``force``, a vector field, the Hamiltonian is 0. ``pieces`` are the commuting flows that compose it, if
-    there are several; one ``motion`` of bodies has no pieces. ``exponentials`` are the matrices whose entries are in
-    the increments, as symbols.
+    If it is the flow of a ``force``, a vector field, the Hamiltonian is 0. ``pieces`` are the commuting flows of which
+    it is composed, if there are several; a flow with a ``motion`` of bodies has no pieces. ``exponentials`` are the
+    matrix exponentials whose entries occur in the increments, as symbols.
     """
 
     hamiltonian: Expression
@@ -70,7 +71,7 @@ class Flow:
 
     @property
     def has_motion(self) -> bool:
-        """Whether the flow is that of a motion, or some of its pieces are."""
+        """Whether the flow, or one of its pieces, has a ``motion``."""
         return any(flow.motion for flow in (self, *self.pieces))
 
     def vector_field(self, system: System) -> tuple[Expression, ...]:
@@ -79,17 +80,17 @@ class Flow:
 
     @property
     def calls_remainders(self) -> bool:
-        """Whether the flow has exponentials of small matrices that depend on the state."""
+        """Whether the flow contains exponentials of small matrices that depend on the state."""
         return any(e.op in REMAINDERS for e in topological(self.increment))
 
     @property
     def moving(self) -> int:
-        """The number of coordinates that move."""
+        """The number of coordinates that the flow changes."""
         return sum(not e.is_zero for e in self.increment)
 
 
 class NoFlowError(Exception):
-    """phigen finds no elementary flow of a term; the text is the reason."""
+    """No elementary flow of a term is known; the text is the reason."""
 
     def __init__(self, term: Term, reason: str) -> None:
         super().__init__(reason)
@@ -99,8 +100,8 @@ class NoFlowError(Exception):
 def flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool = True) -> Flow:
     """Return the flow of a sum of commuting terms: in closed form or, if ``numeric``, by matrix exponentials.
 
-    These are computed before the steps or, where the matrix depends on the state, by the theorem of Cayley and
-    Hamilton, which is the last resort. Raises `NoFlowError` for the first term that has none of these.
+    Matrix exponentials are computed before the steps. If the matrix depends on the state, they are computed by the
+    theorem of Cayley and Hamilton, which is the last choice. Raises `NoFlowError` for the first term without a flow.
     """
     motions = [_flow_of_motion(ring, term, term.motion) for term in terms if term.motion]
     if motions:
@@ -138,14 +139,14 @@ def _flow_of(ring: Ring, terms: Sequence[Term], methods: int) -> Flow:
 
 
 def _flow_of_motion(ring: Ring, term: Term, motion: KeplerMotion | EulerMotion) -> Flow:
-    """Return the flow of a motion."""
+    """Return the flow of a term that is a motion of bodies."""
     return Flow(term.expression, tuple(motion.increments(ring.coordinates)), motion.manner, motion=motion)
 
 
 def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
-    """Return the composition of flows that commute; flows that move fewer coordinates come first.
+    """Return the composition of flows that commute.
 
-    The later flows then read few updated coordinates.
+    Flows that change fewer coordinates come first; so later flows read few updated coordinates.
     """
     ordered = sorted(flows, key=lambda f: f.moving)
     so_far: list[Expression] = [ZERO] * len(coordinates)
@@ -162,8 +163,8 @@ def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
 def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Flow | str:
     """Return the joint flow of terms, or the reason why there is none; ``linear`` admits only linear equations.
 
-    Flows of linear equations resolve small coordinates to their own precision, unlike differences with a constant
-    sum. ``methods`` are `CLOSED_FORMS`, and more with `EXPONENTIALS` and `SMALL_MATRICES`.
+    Solutions of linear equations compute small coordinates to full relative precision, unlike differences from a
+    constant sum. ``methods`` is `CLOSED_FORMS`, `EXPONENTIALS` or `SMALL_MATRICES`.
     """
     g = total(t.expression for t in terms)
     field = ring.field(ring.tower.combine(t.element for t in terms))
@@ -178,7 +179,7 @@ def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, metho
 
 @dataclass(frozen=True)
 class Solved:
-    """Increments along a vector field, a description, and matrix exponentials.
+    """Increments along a vector field, a description of the motion, and its matrix exponentials.
 
     ``shifted`` are the indices of the coordinates that move at a constant rate.
     """
@@ -192,7 +193,7 @@ class Solved:
 def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Solved | str:
     """Return the increments along a vector field, or the reason why there are none.
 
-    Linear first integrals are substituted where that helps. The field need not be that of a Hamiltonian. ``linear``
+    The field need not be Hamiltonian. Linear first integrals are substituted if that leads to a solution. ``linear``
     and ``methods`` are those of `joint_flow`.
     """
     direct = _increments(ring, field, linear)
@@ -206,7 +207,7 @@ def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False, methods: 
 
 
 def _nonlinear(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """Return the increments by methods for equations that are not linear in the coordinates."""
+    """Return the increments by methods for equations that are not linear in the coordinates, or None."""
     return _with_integrals(ring, field) or _with_common_factor(ring, field) or _on_sphere(ring, field)
 
 
@@ -262,7 +263,7 @@ def _increments(ring: Ring, field: Sequence[Poly], linear: bool = False, methods
 def _with_replacements(
     increments: Sequence[Expression], places: Sequence[int], values: Sequence[Expression]
 ) -> list[Expression]:
-    """Return the increments with those of some coordinates replaced."""
+    """Return the increments with those at ``places`` replaced by ``values``."""
     replacements = dict(zip(places, values, strict=True))
     return [replacements.get(i, e) for i, e in enumerate(increments)]
 
@@ -282,10 +283,10 @@ def _with_integrals(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 
 
 def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """Return the increments with a common factor of all rates as a constant, if it is constant along the flow.
+    """Return the increments if all rates have a common factor that is constant along the flow, or None.
 
-    The flow of a function of a first integral is that of the integral with another speed: (q² + p²)² rotates q and p
-    by an angle that grows with q² + p².
+    The flow of a function of a first integral is that of the integral at another speed: (q² + p²)² rotates q and p by
+    an angle that is proportional to q² + p².
     """
     moving = [f for f in field if f != 0]
     factor = reduce(lambda a, b: a.gcd(b), moving) if moving else ring.tower.constant(1)
@@ -301,7 +302,7 @@ def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 
 
 def _as_written(ring: Ring, g: Expression, solution: Solved) -> list[Expression]:
-    """Return the increments; those of shifted coordinates are t π∇g with g as written, if this is cheaper.
+    """Return the increments; for shifted coordinates, t π∇g with g as written by the user, if this is cheaper.
 
     An example is g = (x − y)⁴.
     """
@@ -312,7 +313,7 @@ def _as_written(ring: Ring, g: Expression, solution: Solved) -> list[Expression]
 
 
 def _operations(ring: Ring, increments: Sequence[Expression]) -> int:
-    """Return the number of operations on the state."""
+    """Return the number of operations of the increments that depend on the state."""
     moving: set[int] = set()
     for e in topological(increments):
         if (e.op == "symbol" and e.value in ring.coordinates) or any(id(a) in moving for a in e.args):

@@ -1,12 +1,12 @@
-"""The flows of forces, as parts of a splitting besides those of H: of ẋ = πζ + f, or of its summands.
+"""The flows of forces, as parts of a splitting in addition to those of H: of ẋ = πζ + f, or of its summands.
 
-The first of these sums with flows is taken: the whole field; πζ and f; πζ for the single covectors ζ_i dx_i, and f by
-components. πζ_i dx_i is the field of the coordinate x_i times a factor, tangent to the leaves, so each summand of πζ
-preserves the Casimirs.
+Three divisions are tried, and the first one in which every summand has a flow is used: the whole field; πζ and f; πζ
+for each covector ζ_i dx_i and f for each component. πζ_i dx_i is the Hamiltonian field of x_i times a factor, tangent
+to the leaves, so each summand of πζ preserves the Casimirs.
 
-Damping, ζ = λπb with b = ∇H, is divided by the terms of b, for each block of π: the terms that do not depend on the
-coordinates of the block, and each component of the rest. Flows that do not update coordinates that others read form
-one part.
+Damping, ζ = λπb with b = ∇H, is divided for each block of π: into the terms of b that do not depend on the coordinates
+of the block, and each component of the remaining terms. Flows that do not change coordinates that others read form one
+part.
 """
 
 from __future__ import annotations
@@ -64,7 +64,8 @@ def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
 
 
 def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow, ...]:
-    """Return the flows of πζ: one flow, one for each covector, or those of damping and of the other covectors."""
+    """Return the flows of πζ: a single flow, else a flow for each covector, else those of damping and of the other
+    covectors."""
     try:
         covectors = list(_covectors(system, forces.covector))
         return tuple(_summand_flows(system, tangent, covectors, ("forces", "covector"), ("damping",)))
@@ -80,7 +81,7 @@ def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow
 
 
 def _damping_flows(system: System, damping: Expression) -> list[Flow]:
-    """Return the flows of λππb, b = ∇H: those of the blocks of π in as few parts as possible."""
+    """Return the flows of λππb, b = ∇H, for all blocks of π, combined into as few parts as possible."""
     flows = [
         flow for block in blocks(system.coordinates, system.poisson) for flow in _damped_block(system, damping, block)
     ]
@@ -104,7 +105,7 @@ def _damping_flows(system: System, damping: Expression) -> list[Flow]:
 
 
 def _merged_flows(flows: Sequence[Flow]) -> Flow:
-    """Return flows that neither update nor read what the others update, as one flow."""
+    """Return several flows as one; none of them may change coordinates that another one reads or changes."""
     increment, force = (
         tuple(total(entries) for entries in zip(*vectors, strict=True))
         for vectors in ([f.increment for f in flows], [f.force for f in flows])
@@ -146,7 +147,7 @@ def _damped(system: System, damping: Expression, b: Sequence[Expression]) -> Flo
 
 
 def _covectors(system: System, covector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:
-    """Yield the fields of ζ_i dx_i."""
+    """Yield the fields of the single covectors ζ_i dx_i, with their names."""
     for i, (c, zeta) in enumerate(zip(system.coordinates, covector, strict=True)):
         if not zeta.is_zero:
             alone = [zeta if k == i else ZERO for k in range(system.dimension)]
@@ -162,9 +163,9 @@ def _components(vector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:
 def _summand_flows(
     system: System, field: Field, summands: Sequence[tuple[str, Field]], *keys: tuple[str, ...]
 ) -> Iterator[Flow]:
-    """Yield the flow of a field or, where it is not elementary, the flows of its summands.
+    """Yield the flow of a field or, if it is not elementary, the flows of its summands.
 
-    ``keys`` are the keys of the spec that may have defined the field.
+    ``keys`` are the keys of the spec that may have defined the field, for errors.
     """
     common_flow = _flow(system, field) if summands else ""
     if isinstance(common_flow, Flow):

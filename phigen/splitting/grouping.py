@@ -1,10 +1,10 @@
 """Sums of terms of H whose joint flow is simpler than those of the terms, such as rotations about a vector.
 
-*Cancelling terms.* In m·N on se(3)*, each m_i N_i changes m and N by products of both, while the sum changes neither
+*Cancelling terms.* For m·N on se(3)*, each m_i N_i changes m and N by products of both, while the sum changes neither
 and rotates other vectors about N. Terms are summed if monomials of their vector fields cancel.
 
-*Linear terms.* Σ v_i m_i, where all v commute with each other and with all m, is a rotation about v, or a shear, or
-any other motion of a Lie algebra: v is constant, and m obeys linear equations.
+*Linear terms.* The flow of Σ v_i m_i, where all v commute with each other and with all m, is a rotation about v, a
+shear, or another motion of a Lie algebra: v is constant, and m satisfies linear equations.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ _Place = tuple[int, Monomial]
 
 
 def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
-    """Yield the terms with such sums: cancelling terms, linear terms, and both; nothing where π is constant."""
+    """Yield the terms with such sums in place of their summands: cancelling terms, linear terms, and both.
+
+    Nothing is yielded if π is constant.
+    """
     if not _algebra(ring):
         return
     cancelling = _with_cancelling(ring, terms)
@@ -33,7 +36,10 @@ def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
 
 
 def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms, with a sum of those whose fields have cancelling monomials if the sum has a flow."""
+    """Return the terms with a sum in place of those whose fields have cancelling monomials.
+
+    None if there are none, or the sum has no flow.
+    """
     fields = [_field_monomials(ring, t) for t in terms]
     users: dict[_Place, list[int]] = {}
     for k, field in enumerate(fields):
@@ -53,7 +59,7 @@ def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
 
 
 def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
-    """Return the sum of several terms as one, if it has a flow."""
+    """Return a list with the sum of several terms as its only term; None if the sum has no flow."""
     if len(group) == 1:
         return None
     sum_of_terms = Term(total(t.expression for t in group), ring.tower.combine(t.element for t in group))
@@ -61,7 +67,7 @@ def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
 
 
 def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:
-    """Return the coefficients of π∇G by coordinate and monomial of all variables of the ring."""
+    """Return the coefficients of π∇G, by coordinate and monomial in all variables of the ring."""
     return {
         (i, tuple(map(int, m))): c
         for i, rate in enumerate(ring.field(term.element))
@@ -71,7 +77,7 @@ def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:
 
 
 def _with_linear(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms, with a sum of those that are linear in an algebra, unless all of these commute."""
+    """Return the terms with a sum in place of those that are linear in an algebra; None if all of these commute."""
     algebra = _algebra(ring)
     linear: list[Term] = []
     other_terms: list[Term] = []
@@ -89,7 +95,7 @@ def _with_linear(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
 
 
 def _algebra(ring: Ring) -> frozenset[int]:
-    """Return the coordinates that have a bracket which is not constant."""
+    """Return the coordinates that have a non-constant bracket with some coordinate."""
     n = range(len(ring.coordinates))
     return frozenset(i for i in n if any(ring.support(ring.poisson[i][j]) for j in ring.brackets_of[i]))
 

@@ -1,6 +1,7 @@
-"""Linear first integrals of a part, and its equations with the integrals substituted as constants.
+"""Linear first integrals of a part, and its equations with the integrals as constants.
 
-The sum S = s_1 + s_2 of two spins is constant along s_1·s_2, which makes ṡ_1 = s_1 × s_2 the linear ṡ_1 = s_1 × S.
+The sum S = s_1 + s_2 of two spins is constant along the flow of s_1·s_2. With S as a constant, ṡ_1 = s_1 × s_2 becomes
+the linear equation ṡ_1 = s_1 × S.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ from phigen.symbolic.tower import Poly, Tower, rational
 
 @dataclass(frozen=True)
 class Reduced:
-    """A ring in which some coordinates do not occur: x_i = I − L_i, with an integral I, a symbol of the ring.
+    """A ring in which some coordinates are eliminated: x_i = I − L_i, with an integral I, a symbol of the ring.
 
-    ``forms`` has for each of these coordinates the linear form L_i in the others. ``field`` is the vector field in
-    this ring, 0 for these coordinates; ``integrals`` maps the symbols of integrals to their expressions.
+    ``forms`` has for each of these coordinates the linear form L_i in the others. ``field`` is the vector field in this
+    ring, 0 for the eliminated coordinates. ``integrals`` maps the symbols of integrals to their expressions.
     """
 
     ring: Ring
@@ -31,14 +32,18 @@ class Reduced:
 
 
 def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
-    """Return the equations without the coordinates that linear integrals with rational coefficients determine."""
+    """Return the equations after elimination of the coordinates that linear integrals with rational coefficients
+    determine.
+
+    None if there are no such integrals.
+    """
     moving = [i for i, f in enumerate(field) if f != 0]
     relations = kernel(Field(), _equations(field, moving), len(moving))
     if not relations:
         return None
     forms: dict[int, Expression] = {}
     integrals: dict[str, Expression] = {}
-    for relation in relations:  # a relation is 1 at its last place, where the other relations are 0
+    for relation in relations:  # a relation is 1 at its last coordinate, where all others are 0
         pivot = moving[max(relation)]
         other_terms = total(
             number(rational(c)) * symbol(ring.coordinates[moving[k]]) for k, c in relation.items() if moving[k] != pivot

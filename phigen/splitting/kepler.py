@@ -6,8 +6,9 @@ Let μ = wk, v = wp, r0 = |q|, η = q·v, β = 2μ/r0 − |v|², and s the unive
     g = r0 G1 + ηG2,    r = r0 + ηG1 + (μ − βr0)G2 = |q'|,
 
 where G1 = 2SC, G2 = 2S², C = cosroot(βs²/4) and S = s sinroot(βs²/4)/2. These are the coefficients f, g, ḟ, ġ of
-Lagrange, with g free of the time: an error of s gives the motion of another time, and does not change the energy.
-One formula, which divides by neither β nor w, holds for ellipses, parabolas, hyperbolas and both signs of k.
+Lagrange, with g written without the time: an error of s results in the motion over a different time, and does not
+change the energy. The formula, which divides by neither β nor w, holds for ellipses, parabolas, hyperbolas and both
+signs of k.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ Vector = Sequence[Expression]
 
 @dataclass(frozen=True)
 class KeplerMotion:
-    """w|p|²/2 − k/|q| for a ``position`` q and a ``momentum`` p, coordinates or linear forms of coordinates.
+    """The motion of w|p|²/2 − k/|q| with ``position`` q and ``momentum`` p, coordinates or linear forms of coordinates.
 
-    ``inverse_mass`` is w, ``strength`` k; both depend on parameters only.
+    ``inverse_mass`` is w, ``strength`` is k; both depend on parameters only.
     """
 
     position: tuple[Expression, ...]
@@ -43,7 +44,7 @@ class KeplerMotion:
 
     @property
     def manner(self) -> str:
-        """Description of the motion for reports."""
+        """Description of the motion, for reports."""
         return f"{', '.join(map(str, (*self.position, *self.momentum)))} moved along a conic section"
 
     def rates(self) -> tuple[list[Expression], list[Expression]]:
@@ -57,26 +58,26 @@ class KeplerMotion:
         return power(sqrt(square(self.position)), -3)
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return expressions as they are compared in proofs."""
+        """Return the expressions with a symbol for 1/|q|³, for proofs."""
         return [*roots]
 
     def changes(self) -> tuple[list[Expression], list[Expression]]:
-        """Return the changes of q and p in the time of the flow."""
+        """Return the changes of q and p over the time of the flow."""
         orbit = _Orbit.through(self.position, self.momentum, self.inverse_mass, self.strength)
         s = call(ANOMALY, symbol(TIME), orbit.distance, orbit.moment, orbit.beta, orbit.mu, orbit.spin)
         z = orbit.beta * s**2 / 4
         return orbit.changes(call("cosroot", z), s * call("sinroot", z) / 2)
 
     def field(self, coordinates: Sequence[str]) -> list[Expression]:
-        """Return the rates of all coordinates, those of the motion as its position and momentum."""
+        """Return the rates of all ``coordinates``, those of the motion as its position and momentum."""
         return self._placed(coordinates, self.rates())
 
     def increments(self, coordinates: Sequence[str]) -> list[Expression]:
-        """Return the increments of all coordinates in the time of the flow."""
+        """Return the increments of all ``coordinates`` over the time of the flow."""
         return self._placed(coordinates, self.changes())
 
     def residuals(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals that vanish if the changes are the motion."""
+        """Yield the residuals that vanish if the increments are the motion."""
         yield from identities()
 
     def _placed(
@@ -89,7 +90,7 @@ class KeplerMotion:
 
 @dataclass(frozen=True)
 class _Orbit:
-    """An orbit by its state at the start, with r0, η, β and μ."""
+    """An orbit, given by its initial state, with r0, η, β and μ."""
 
     position: Vector
     momentum: Vector
@@ -102,7 +103,7 @@ class _Orbit:
 
     @classmethod
     def through(cls, q: Vector, p: Vector, w: Expression, k: Expression) -> _Orbit:
-        """Return the orbit with this state."""
+        """Return the orbit through the state (q, p)."""
         distance, mu = sqrt(square(q)), w * k
         moment = w * total(a * b for a, b in zip(q, p, strict=True))
         beta = 2 * mu * power(distance, -1) - w**2 * square(p)
@@ -115,7 +116,7 @@ class _Orbit:
         return self.inverse_mass**2 * total((a * d - b * c) ** 2 for (a, b), (c, d) in pairs)
 
     def end(self, c: Expression, s: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return G1, G2 and the distance r at the end, from C and S."""
+        """Return G1, G2 and the final distance r, from C and S."""
         g1, g2 = 2 * s * c, 2 * s**2
         return g1, g2, self.distance + (self.moment * g1 + (self.mu - self.beta * self.distance) * g2)
 
@@ -124,7 +125,7 @@ class _Orbit:
         g1, g2, r = self.end(c, s)
         inverse, inverse_end = power(self.distance, -1), power(r, -1)
         along = self.inverse_mass * (self.distance * g1 + self.moment * g2)
-        # the factors of the pull and of the momentum, not their rounded product, keep the flow canonical
+        # the products of unrounded factors keep the flow canonical
         towards = self.inverse_mass * (self.strength * g2)
         pull = inverse * inverse_end * (self.strength * g1)
         q_change = [along * b - towards * inverse * a for a, b in zip(self.position, self.momentum, strict=True)]
@@ -135,10 +136,10 @@ class _Orbit:
 def identities() -> Iterator[tuple[str, Expression]]:
     """Yield the residuals that vanish if the increments are the flow.
 
-    They are in C, S, r0, η, β, w, k and one component of q and of p. Along the motion ds = dt/r, so dS/dt = C/(2r)
-    and dC/dt = −βS/(2r); the state at the start is constant. Required are the equations of motion with r for |q'|,
-    and r² = |q'|² with |v|² = 2wk/r0 − β. C² + βS² = 1 is substituted as β = (1 − C²)/S², which leaves rational
-    functions of independent symbols.
+    They are functions of C, S, r0, η, β, w, k and one component of q and of p. Along the motion ds = dt/r, so dS/dt =
+    C/(2r) and dC/dt = −βS/(2r); the initial state is constant. The residuals are those of the equations of motion with
+    r for |q'|, and of r² = |q'|² with |v|² = 2wk/r0 − β. C² + βS² = 1 is substituted as β = (1 − C²)/S², so that only
+    rational functions of independent symbols remain.
     """
     names = [Symbol("orbit", name) for name in ("C", "S", "r0", "η", "β", "w", "k", "q", "p")]
     c, s, distance, moment, beta, w, k, q, p = map(symbol, names)

@@ -1,12 +1,12 @@
 """Linear parts with a matrix known before the steps: exp(tA) − 1 as numbers, for any A up to `MOST_ROWS` rows.
 
 The entries of A are functions of parameters. The coefficients of a linear motion may also contain values that are
-constant along the flow but change from step to step, as a coupling to a coordinate of another part. Products of such
-values with moving variables are then further unknowns: q̇ = p, ṗ = −q + f is linear in q, p and f, with f as the
+constant along the flow but change from step to step, such as a coupling to a coordinate of another part. Products of
+such values with moving variables are then further unknowns: q̇ = p, ṗ = −q + f is linear in q, p and f, with f as the
 third unknown.
 
-Scaling and squaring: if ‖A/2^s‖ ≤ 1/2, the Padé approximant of order 6 is F = 2(V − U)⁻¹U, with the even part V and
-the odd part U of its numerator. F ↦ 2F + F² takes exp(A) − 1 to exp(2A) − 1, which preserves all digits of a small A.
+Scaling and squaring: if ‖A/2^s‖ ≤ 1/2, the Padé approximant of order 6 is F = 2(V − U)⁻¹U, with the even part V and the
+odd part U of its numerator. F ↦ 2F + F² maps exp(A) − 1 to exp(2A) − 1, which preserves all digits for a small A.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ from phigen.symbolic.expression import Expression, symbol, total
 from phigen.symbolic.symbols import EXPONENTIAL, Symbol
 from phigen.symbolic.tower import Poly
 
-#: Bounds of a matrix: its rows, and the factors of an unknown. A step multiplies by the whole matrix.
+#: Largest number of rows of a matrix, and largest number of factors of an unknown. A step multiplies by the whole
+#: matrix.
 MOST_ROWS, MOST_DEGREE = 64, 8
 
-#: The numerator of the Padé approximant of order 6, and the largest norm for it: the error is 2·10⁻¹⁷.
+#: The numerator of the Padé approximant of order 6, and the largest norm for which it is used: the error is 2·10⁻¹⁷.
 PADE = tuple(Fraction(1, n) * m for m, n in ((1, 1), (1, 2), (5, 44), (1, 66), (1, 792), (1, 15840), (1, 665280)))
 MAX_PADE_NORM = 0.5
 
@@ -54,7 +55,7 @@ class MatrixExponential:
 
     @cached_property
     def reached(self) -> list[set[int]]:
-        """For each row the columns where exp(tA) − 1 may not vanish, by the zeros of A."""
+        """For each row, the columns in which exp(tA) − 1 may be nonzero, by the zeros of A."""
         n = range(self.size)
         columns = [{j for j in n if not self.rates[i * self.size + j].is_zero} for i in n]
         while True:
@@ -64,7 +65,7 @@ class MatrixExponential:
             columns = wider
 
     def slopes(self) -> dict[str, Expression]:
-        """Return the derivatives of the entries along the time: A exp(tA)."""
+        """Return the derivatives of the entries of exp(tA) − 1 with respect to the time, by symbol: A exp(tA)."""
         n, entries = self.size, self.symbols
         rates: dict[str, Expression] = {}
         for k, name in enumerate(entries):
@@ -76,14 +77,14 @@ class MatrixExponential:
 
 @dataclass(frozen=True)
 class StaticSolution:
-    """The increments of the coordinates of a linear motion in the entries of a matrix exponential."""
+    """The increments of the coordinates of a linear motion, in terms of the entries of a matrix exponential."""
 
     increments: tuple[Expression, ...]
     exponential: MatrixExponential
 
 
 def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
-    """Return exp(tA)w − w with a matrix of static entries, or None."""
+    """Return exp(tA)w − w for a matrix with static entries; None if the equations have no such matrix."""
     rows = _static_rows(ring, motion)
     if rows is None:
         return None
@@ -101,7 +102,8 @@ def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
 
 
 def _static_rows(ring: Ring, motion: LinearMotion) -> dict[Monomial, dict[Monomial, Poly]] | None:
-    """Return the equations of products of the unknowns with constant values, or None if they do not close."""
+    """Return the equations of the products of unknowns with constant values, or None if these equations are not
+    closed."""
     matrix = {
         m: {k: c for k, c in zip(motion.basis, row, strict=True) if c != 0}
         for m, row in zip(motion.basis, motion.matrix, strict=True)

@@ -1,7 +1,7 @@
 """Motions among the terms of H: sums of p²/2m and −k/|q| of one body, which do not commute, and free rigid bodies.
 
-A body is two or three coordinates q with 1/|q| in H, and their conjugate momenta. The remaining terms are
-perturbations; where these are small compared with the motions, H = A + εB is near-integrable.
+A body has two or three coordinates q, with 1/|q| in H, and their conjugate momenta. The remaining terms are
+perturbations. If these are small compared with the motions, H = A + εB is near-integrable.
 """
 
 from __future__ import annotations
@@ -20,21 +20,19 @@ from phigen.symbolic.expression import symbol
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.tower import Generator, Poly
 
-#: Dimensions of the space in which a body moves.
+#: Dimensions of space in which a body may move.
 _DIMENSIONS = (2, 3)
 
-#: Largest ratio of the coefficients of a perturbation to those of the motions for methods of a near-integrable system.
-#: Below, errors of ε² h^6 and ε³ h^4 are less than those of general methods of order 4.
+#: Largest ratio of the coefficients of a perturbation to those of the motions for which near-integrable methods are
+#: used. Below this ratio, errors of ε² h^6 and ε³ h^4 are less than those of general methods of order 4.
 SMALL = 0.02
 
 
 def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term] | None:
-    """Return the terms with motions as single terms, these first; None if there are no motions.
+    """Return the terms with each motion as a single term, the motions first; None if there are no motions.
 
-    They are Kepler motions and, if ``rigid``, free rigid bodies.
-
-    Only terms of a single body belong to its motion: (p_1 + p_2)² is not divided, and commutes with functions of q_1
-    − q_2.
+    The motions are Kepler motions and, if ``rigid``, free rigid bodies. Only terms of a single body belong to its
+    motion: (p_1 + p_2)² is not divided, and commutes with functions of q_1 − q_2.
     """
     motions: list[tuple[KeplerMotion | EulerMotion, Poly]] = [*_motions(ring, terms)]
     if rigid:
@@ -46,10 +44,11 @@ def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term
 
 
 def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> int | None:
-    """Return the index of the part εB of a near-integrable H = A + εB, None if H is no such sum of two parts.
+    """Return the index of the part εB of a near-integrable H = A + εB; None if H is not such a sum of two parts.
 
-    A part with a factor that is declared small is small. Without such a declaration, or if A is divided by the small
-    parameter as p²/2m by a small mass, the part without Kepler motions is small if its coefficients are.
+    A part with a factor that is declared small is small. Without such a declaration, or if the small parameter also
+    occurs as a divisor, such as a small mass in p²/2m, the part without Kepler motions is small if its coefficients
+    are.
     """
     if len(parts) != 2:
         return None
@@ -71,14 +70,15 @@ def _vanishes_with(ring: Ring, term: Term, variables: Sequence[int]) -> bool:
 
 
 def _divided_by(ring: Ring, term: Term, names: Sequence[str]) -> bool:
-    """Whether a term has a function of these parameters as a denominator."""
+    """Whether one of these parameters occurs in a denominator of a term."""
     powers = term.element.degrees()[len(ring.tower.symbols) :]
     occurring = (g for g, degree in zip(ring.tower.generators, powers, strict=True) if degree > 0)
     return any(g.kind == "reciprocal" and ring.tower.depends_on(g.arguments[0], names) for g in occurring)
 
 
 def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
-    """Return the sum of the magnitudes of the coefficients of terms that move coordinates, at default parameters."""
+    """Return the sum of the magnitudes of the coefficients of terms that change coordinates, with default
+    parameters."""
     values = {p.name: float(p.value) for p in system.parameters}
     sizes = []
     for term in terms:
@@ -92,7 +92,7 @@ def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
 
 
 def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> list[Term]:
-    """Return the terms without the monomials of the motions; terms without such monomials stay as written."""
+    """Return the terms without the monomials of the motions; terms that contain none of them are left as written."""
     untouched, remaining = [], []
     for term in terms:
         shared_monomials = {
@@ -108,12 +108,12 @@ def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> li
 
 
 def _is_of(ring: Ring, term: Term, motion: Term) -> bool:
-    """Whether a term depends on the coordinates of one motion only."""
+    """Whether a term depends only on the coordinates of the motion."""
     return {*ring.support(term.element)} <= {*ring.support(motion.element)}
 
 
 def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, Poly]]:
-    """Yield the Kepler motions in H with their elements of the ring."""
+    """Yield the Kepler motions in H, each with its element of the ring."""
     size = len(ring.tower.gens)
     supports = [{*ring.support(t.element)} for t in terms]
     for generator in ring.tower.generators:
@@ -143,14 +143,15 @@ def is_inverse_distance(generator: Generator) -> bool:
 
 
 def _distance_from(ring: Ring, arguments: Sequence[Poly]) -> tuple[int, ...]:
-    """Return the coordinates whose squares sum to the argument of a root; none if it is of another form."""
+    """Return the coordinates whose squares sum to the argument of a root; () if the argument has another form."""
     support = ring.support(arguments[0])
     squares = ring.tower.combine(ring.tower.variable(ring.coordinates[i]) ** 2 for i in support)
     return support if len(support) in _DIMENSIONS and arguments[0] == squares else ()
 
 
 def conjugate(ring: Ring, i: int) -> int | None:
-    """Return the coordinate p with {q, p} = 1, if neither has a bracket with another coordinate."""
+    """Return the coordinate p with {q, p} = 1 for q = x_i, if neither has a bracket with another coordinate; else
+    None."""
     partners = ring.brackets_of[i]
     alone = len(partners) == 1 and ring.brackets_of[partners[0]] == [i]
     return partners[0] if alone and ring.poisson[i][partners[0]] == 1 else None

@@ -20,7 +20,7 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Poly
 
-#: Largest number of companions that are subtracted from the terms.
+#: Largest number of companions (functions without a flow) that are subtracted from the terms.
 MAX_COMPANIONS = 3
 
 
@@ -28,8 +28,8 @@ MAX_COMPANIONS = 3
 class SplitHamiltonian:
     """The flows of the parts of H, in the order of a step.
 
-    ``kick`` is the index of the part V if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`); then a
-    multiple of {V, {V, T}} may be in the Hamiltonian of its flow. ``small`` is the index of the part εB of a
+    ``kick`` is the index of the part V if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`); the
+    Hamiltonian of its flow may contain a multiple of {V, {V, T}}. ``small`` is the index of the part εB of a
     near-integrable H = A + εB.
     """
 
@@ -39,14 +39,14 @@ class SplitHamiltonian:
 
 
 def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitHamiltonian:
-    """Return H as a sum of parts with elementary flows: as few as possible, among these with the most invariants.
+    """Return H as a sum of parts with elementary flows: as few as possible and, among these, with the most invariants.
 
-    Kepler motions are single terms if ``motions``, and so are free rigid bodies if ``rigid`` too. A near-integrable
-    H is split in its two parts. Raises `SpecError`, located at the Hamiltonian, with the term that has no flow.
+    If ``motions``, Kepler motions are single terms; if also ``rigid``, so are free rigid bodies. A near-integrable H is
+    split into its two parts. Raises `SpecError`, located at the Hamiltonian, with the term that has no flow.
     """
     summands = hamiltonian_terms(system)
     ring = ring_of(system, summands)
-    # A constant H is one term, so that there is a flow, in which nothing moves.
+    # A constant H is one term, so that there is a flow, although it changes nothing.
     terms = terms_of(ring, summands) or [Term(system.hamiltonian, ring.tower.convert(system.hamiltonian))]
     invariants = _invariants(system, ring)
     refused: NoFlowError | None = None
@@ -70,7 +70,7 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
         if rank < least:
             best, least = SplitHamiltonian(flows, small=small_index), rank
         if best and best.small is not None:
-            break  # two parts, one of them small: no other grouping is better
+            break  # no grouping is better than two parts, one of them small
     if best is None:
         raise _refusal(system, refused)
     return (
@@ -81,7 +81,7 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
 
 
 def _invariants(system: System, ring: Ring) -> list[Poly]:
-    """Return the invariants of the spec, except those with functions or symbols that H and π do not have."""
+    """Return the invariants of the spec, without those that contain functions or symbols that H and π do not have."""
     elements = []
     for e in system.invariants.values():
         try:
@@ -92,9 +92,9 @@ def _invariants(system: System, ring: Ring) -> list[Poly]:
 
 
 def _lost_invariant_count(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly]) -> int:
-    """Return the number of invariants that some part does not preserve.
+    """Return the number of invariants that at least one part does not preserve.
 
-    s_1 + s_2 is constant along s_1·s_2, but not along x_1 x_2.
+    For example, s_1 + s_2 is constant along the flow of s_1·s_2, but not of x_1 x_2.
     """
     sums = [ring.tower.combine(t.element for t in part) for part in parts]
     return sum(not all(ring.commute(invariant, g) for g in sums) for invariant in invariants)
@@ -103,7 +103,8 @@ def _lost_invariant_count(ring: Ring, parts: Sequence[Sequence[Term]], invariant
 def _candidates(
     system: System, conflicts: Conflicts, terms: list[Term], *, motions: bool, rigid: bool
 ) -> Iterator[list[Term]]:
-    """Yield the terms as written, squares whole, with motions, by blocks, without companions, and in groups."""
+    """Yield lists of terms: as written, with whole squares, with motions, by blocks, without companions, and in
+    groups."""
     yield terms
     ring = conflicts.ring
     whole_terms = _with_whole_summands(ring, hamiltonian_terms(system))
@@ -125,9 +126,9 @@ def _candidates(
 
 
 def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term] | None:
-    """Return the terms with summands that have a flow as they are, such as squares of linear forms; None without any.
+    """Return the terms with those summands undivided that have a flow, such as squares of linear forms.
 
-    (v·m)² on so(3) rotates m about v, while its monomials do not commute.
+    None if there are none. (v·m)² on so(3) rotates m about v, while its monomials do not commute.
     """
     whole_terms: list[Term] = []
     remaining: list[Expression] = []
@@ -144,7 +145,7 @@ def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term]
 
 
 def _without_companions(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:
-    """Yield the terms without companions where this reduces the number of parts."""
+    """Yield the terms minus companions if this reduces the number of parts."""
     ring = conflicts.ring
     for _ in range(MAX_COMPANIONS):
         fewest = len(conflicts.grouped(terms))
@@ -163,7 +164,7 @@ def _without_companions(system: System, conflicts: Conflicts, terms: list[Term])
 
 
 def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
-    """Return the flows, with one flow for parts whose sum has linear equations with a closed form."""
+    """Return the flows; parts whose sum has linear equations with a closed form are merged into one flow."""
     for i, first in enumerate(flows):
         for second in flows[i + 1 :]:
             if first.has_motion or second.has_motion:
@@ -176,7 +177,8 @@ def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
 
 
 def _exact_linear_flow(ring: Ring, flows: list[Flow]) -> list[Flow]:
-    """Return one flow if the equations of the sum of all parts are linear: the exact flow, by a matrix exponential."""
+    """Return one exact flow, by a matrix exponential, if the equations of the sum of all parts are linear; else the
+    flows."""
     if len(flows) == 1:
         return flows
     terms = [Term(f.hamiltonian, ring.tower.convert(f.hamiltonian)) for f in flows]

@@ -1,8 +1,9 @@
 """Other forms of H as a sum of terms, which may need fewer parts.
 
-*Quadratic companions.* A Casimir C has no flow, and |P|² on se(3)* commutes with every function of P. So in H = λC +
-(H − λC) the bracket may lose a term that conflicts with others, at no cost: the free rigid body has two parts instead
-of three. C is a Casimir of π, or of a closed bracket of some coordinates.
+*Quadratic companions* are functions without an effect on the other terms. A Casimir C has no flow, and |P|² on se(3)*
+commutes with every function of P. In H = λC + (H − λC), a suitable λ cancels a term that conflicts with others, at no
+cost: the free rigid body then has two parts instead of three. C is a Casimir of π, or of a closed bracket of some
+coordinates.
 
 *Blocks.* Terms that couple the same blocks of π, such as products of the components of two spins, are summed.
 """
@@ -22,7 +23,7 @@ from phigen.splitting.terms import joined, monomial_terms
 from phigen.symbolic.expression import Expression, total
 from phigen.symbolic.tower import Poly
 
-#: Largest number of coordinates of a closed bracket for the search for its Casimirs.
+#: Largest number of coordinates of a closed bracket whose Casimirs are searched for.
 MOST_COORDINATES = 8
 
 
@@ -51,7 +52,7 @@ def with_companions(system: System, conflicts: Conflicts, terms: Sequence[Term])
 
 
 def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> Iterator[Term]:
-    """Yield Casimirs, and quadratic Casimirs of the closed brackets that pairs of conflicting terms generate."""
+    """Yield the companions: Casimirs, and quadratic Casimirs of the closed brackets of pairs of conflicting terms."""
     ring, candidates = conflicts.ring, list(system.casimirs.values())
     closures: set[tuple[int, ...]] = set()
     for i, neighbours in enumerate(conflicts.graph(terms)):
@@ -63,12 +64,12 @@ def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> 
     for e in candidates:
         try:
             yield Term(e, ring.tower.convert(e))
-        except ValueError:  # with functions that H and π do not have
+        except ValueError:  # the Casimir contains functions that H and π do not have
             continue
 
 
 def _closure(ring: Ring, coordinates: set[int]) -> tuple[int, ...]:
-    """Return the closure of coordinates under brackets."""
+    """Return the smallest set of coordinates that contains these and is closed under brackets."""
     while True:
         added = {k for i in coordinates for j in coordinates for k in ring.support(ring.poisson[i][j])}
         if added <= coordinates:
@@ -83,7 +84,8 @@ def _casimirs_within(system: System, inside: Sequence[int]) -> list[Expression]:
 
 
 def by_blocks(system: System, ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return sums of the terms that depend on the same two or more blocks of π; None if that changes nothing."""
+    """Return the terms with those summed that depend on the same two or more blocks of π; None if there are no such
+    terms."""
     block_of = {i: k for k, block in enumerate(blocks(system.coordinates, system.poisson)) for i in block}
     groups: dict[tuple[int, ...], list[Term]] = {}
     for n, term in enumerate(terms):

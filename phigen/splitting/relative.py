@@ -1,13 +1,13 @@
-"""Kepler motions of bodies in relative coordinates, written in the Cartesian ones: a linear canonical change.
+"""Kepler motions of bodies in relative coordinates, written in Cartesian coordinates: a linear canonical change.
 
 Bodies 0, …, N have masses m_i, positions q_i and momenta p_i; k_ij is the strength of the attraction −k_ij/|q_i − q_j|,
-M_i = m_0 + … + m_i, and M is the mass of all. A is the sum of w_i|P_i|²/2 − K_i/|Q_i| over i ≥ 1 and of
-|p_0 + … + p_N|²/2M, the motion of the centre of mass.
+M_i = m_0 + … + m_i, and M is the total mass. A is the sum of w_i|P_i|²/2 − K_i/|Q_i| over i ≥ 1 and of |p_0 + … +
+p_N|²/2M, the motion of the centre of mass.
 
-- *Jacobi*: Q_i = q_i − (m_0 q_0 + … + m_{i−1} q_{i−1})/M_{i−1} and P_i = p_i − (m_i/M_i)(p_0 + … + p_i), with w_i =
-  M_i/(m_i M_{i−1}) and K_i = Σ_{j<i} k_ij. The kinetic energy is that of the Q_i and of the centre of mass.
+- *Jacobi*: Q_i = q_i − (m_0 q_0 + … + m_{i−1} q_{i−1})/M_{i−1} and P_i = p_i − (m_i/M_i)(p_0 + … + p_i), with
+  w_i = M_i/(m_i M_{i−1}) and K_i = Σ_{j<i} k_ij. The kinetic energy is that of the Q_i and of the centre of mass.
 - *Democratic heliocentric*: Q_i = q_i − q_0 and P_i = p_i − (m_i/M)(p_0 + … + p_N), with w_i = 1/m_i and K_i = k_i0.
-  The kinetic energy has one term more, |p_0 − (m_0/M)(p_0 + … + p_N)|²/2m_0.
+  The kinetic energy has one more term, |p_0 − (m_0/M)(p_0 + … + p_N)|²/2m_0.
 
 J. Wisdom, M. Holman, Symplectic maps for the n-body problem, Astronomical Journal 102 (1991); M. J. Duncan, H. F.
 Levison, M. H. Lee, A multiple time step symplectic algorithm for integrating close encounters, Astronomical Journal 116
@@ -52,7 +52,7 @@ class AttractingBodies:
         return total(square(p) * power(m, -1) / 2 for p, m in zip(map(_vector, self.momenta), self.masses, strict=True))
 
     def attraction(self, i: int, j: int) -> Expression:
-        """Return −k_ij/|q_i − q_j|, 0 for bodies that do not attract one another."""
+        """Return −k_ij/|q_i − q_j|; 0 for bodies that do not attract each other."""
         strength = self.strengths.get((i, j), ZERO)
         return ZERO if strength.is_zero else -strength * inverse_length(self.between(i, j))
 
@@ -65,10 +65,9 @@ class AttractingBodies:
 class RelativeMotions:
     """The motion of A: ``kepler`` motions in linear forms of the coordinates, and the motion of the centre of mass.
 
-    ``hamiltonian`` is A in the coordinates; ``total_momentum`` and ``inverse_mass`` are of all bodies together.
-    ``spread`` has the changes of the coordinates, by name, in symbols for the changes of the Q_i, the P_i and the
-    centre of mass.
-    ``masses`` are pairs of masses m_i, or sums M_i, with symbols for proofs.
+    ``hamiltonian`` is A in the coordinates. ``total_momentum`` and ``inverse_mass`` belong to all bodies together.
+    ``spread`` maps each coordinate to its change, in symbols for the changes of the Q_i, the P_i and the centre of
+    mass. ``masses`` are pairs of an expression, a mass m_i or a sum M_i, and a symbol for proofs.
     """
 
     hamiltonian: Expression
@@ -80,20 +79,20 @@ class RelativeMotions:
 
     @property
     def manner(self) -> str:
-        """Description of the motion for reports."""
+        """Description of the motion, for reports."""
         return f"{len(self.kepler)} relative positions moved along conic sections, the centre of mass shifted"
 
     def field(self, names: Sequence[str]) -> list[Expression]:
-        """Return the rates of all coordinates."""
+        """Return the rates of all coordinates ``names``."""
         return self._spread(names, [motion.rates() for motion in self.kepler], self.drift)
 
     def increments(self, names: Sequence[str]) -> list[Expression]:
-        """Return the increments of all coordinates in the time of the flow."""
+        """Return the increments of all coordinates ``names`` over the time of the flow."""
         shift = [symbol(TIME) * e for e in self.drift]
         return self._spread(names, [motion.changes() for motion in self.kepler], shift)
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return expressions with symbols for each |Q_i|⁻³ and M_i, and M_i − M_{i−1} for m_i.
+        """Return the expressions with symbols for each |Q_i|⁻³ and M_i, and with M_i − M_{i−1} for m_i.
 
         An expression that vanishes with these symbols vanishes for all bodies.
         """
@@ -102,7 +101,10 @@ class RelativeMotions:
         return fold(roots, lambda e, args: by_node.get(id(e)) or rebuild(e, args))
 
     def residuals(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals that vanish if changes of the coordinates change the forms as their symbols say."""
+        """Yield the residuals of the change of coordinates, and the identities of Kepler motions.
+
+        They vanish if the changes ``spread`` of the coordinates change the forms Q_i and P_i as their symbols say.
+        """
         for i, motion in enumerate(self.kepler, 1):
             forms = substitute([*motion.position, *motion.momentum], self.spread)
             axes = len(motion.position)
@@ -120,7 +122,8 @@ class RelativeMotions:
     def _spread(
         self, names: Sequence[str], values: Sequence[tuple[list[Expression], list[Expression]]], of_centre: Vector
     ) -> list[Expression]:
-        """Return the changes of all coordinates for changes of the relative ones."""
+        """Return the changes of all coordinates ``names`` from those of relative coordinates and of the centre of
+        mass."""
         axes = len(of_centre)
         changes: dict[str, Expression] = dict(zip(_names("R", 0, axes), of_centre, strict=True))
         for i, pair in enumerate(values, 1):
@@ -131,7 +134,7 @@ class RelativeMotions:
 
 
 def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
-    """Return the motion of A in Jacobi coordinates, and B."""
+    """Return the motion of A in Jacobi coordinates, and the expression B."""
     masses = bodies.masses
     q, p = (list(map(_vector, names)) for names in (bodies.positions, bodies.momenta))
     mass = list(accumulate(masses, add))
@@ -159,7 +162,8 @@ def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
 
 
 def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> Iterator[tuple[Expression, Expression]]:
-    """Yield the M_i with symbols, and the m_i with the differences of these symbols, unless m_i is a number."""
+    """Yield the masses with expressions for proofs: M_i with a symbol, m_i with a difference of symbols unless it is
+    a number."""
     previous = ZERO
     for i, (m, sum_of_masses) in enumerate(zip(masses, mass, strict=True)):
         if m.is_number:
@@ -171,7 +175,7 @@ def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> It
 
 
 def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
-    """Return the motion of A in democratic heliocentric coordinates, and B."""
+    """Return the motion of A in democratic heliocentric coordinates, and the expression B."""
     axes, masses = range(bodies.axes), bodies.masses
     q, p = (list(map(_vector, names)) for names in (bodies.positions, bodies.momenta))
     inverse = power(total(masses), -1)
@@ -196,13 +200,14 @@ def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, 
 
 
 def _spread_from_jacobi(bodies: AttractingBodies, mass: Sequence[Expression]) -> dict[str, Expression]:
-    """Return the changes of the coordinates for those of Jacobi coordinates, from the last body to the first.
+    """Return the changes of the coordinates in terms of those of Jacobi coordinates, from the last body to the first.
 
     With the centre of mass R_i and the momentum T_i of the bodies up to i, and s_i = m_i/M_i: R_{i−1} = R_i − s_i Q_i,
     q_i = R_{i−1} + Q_i, p_i = P_i + s_i T_i, T_{i−1} = T_i − p_i. The total momentum T_N does not change.
 
-    As in the forms Q_i and P_i, the masses occur as s_i only. So the change is canonical, and inverse to the forms, if
-    the s_i are rounded. With several quotients of masses the energy would drift in proportion to their rounding errors.
+    As in the forms Q_i and P_i, the masses occur as s_i only. So the change is canonical, and exactly inverse to the
+    forms, even if the s_i are rounded. With several different quotients of masses, rounding errors would cause a drift
+    of the energy.
     """
     spread = dict[str, Expression]()
     centre: list[Expression] = changes_of("R", 0, bodies.axes)
@@ -219,7 +224,7 @@ def _spread_from_jacobi(bodies: AttractingBodies, mass: Sequence[Expression]) ->
 
 
 def _spread_from_star(bodies: AttractingBodies, shares: Sequence[Expression]) -> dict[str, Expression]:
-    """Return the changes of the coordinates for those of democratic heliocentric coordinates."""
+    """Return the changes of the coordinates in terms of those of democratic heliocentric coordinates."""
     axes, spread, planets = bodies.axes, dict[str, Expression](), range(1, len(shares))
     of_q, of_p = ([changes_of(kind, i, axes) for i in planets] for kind in "QP")
     weighted = [total(m * d[axis] for m, d in zip(shares[1:], of_q, strict=True)) for axis in range(axes)]
@@ -233,7 +238,7 @@ def _spread_from_star(bodies: AttractingBodies, shares: Sequence[Expression]) ->
 
 
 def changes_of(kind: str, body: int, axes: int) -> list[Expression]:
-    """Return the symbols of the change of Q_i, of P_i, or of the centre of mass R."""
+    """Return the symbols of the change of Q_i, of P_i, or of the centre of mass R, by ``kind``."""
     return [symbol(name) for name in _names(kind, body, axes)]
 
 
@@ -241,7 +246,7 @@ def _names(kind: str, body: int, axes: int) -> list[Symbol]:
     return [Symbol("change", kind, body, axis) for axis in range(axes)]
 
 
-#: The changes of coordinates by their names in specs.
+#: The changes of coordinates, by their names in specs.
 CHANGES: Mapping[str, Callable[[AttractingBodies], tuple[RelativeMotions, Expression]]] = {
     "jacobi": jacobi,
     "democratic_heliocentric": democratic_heliocentric,

@@ -20,10 +20,10 @@ from phigen.symbolic.horner import horner
 from phigen.symbolic.symbols import STEP, Symbol
 from phigen.symbolic.tower import Poly, Tower, rational
 
-#: The time of a flow, as a symbol: the step size of the solver.
+#: Symbol of the duration of a flow: the step size of the solver.
 TIME = STEP
 
-#: The multiple κ of {V, {V, T}} in a kick with modified potential, as a symbol: see `phigen.splitting.kicks`.
+#: Symbol of the multiple κ of {V, {V, T}} in a kick with modified potential; see `phigen.splitting.kicks`.
 KICK = Symbol("κ")
 
 #: Exponents of some of the ring's variables.
@@ -32,30 +32,30 @@ Monomial = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Ring:
-    """A tower that contains a system, with its bracket; ``brackets`` is π in the form of the system."""
+    """A tower that contains the functions of a system, with its bracket; ``brackets`` is π as elements of the tower."""
 
     tower: Tower
     coordinates: tuple[str, ...]
     poisson: tuple[tuple[Poly, ...], ...]
     brackets: Matrix
-    #: Symbols that are constant along all flows, but change from step to step: the time, and neighbours in lattices.
+    #: Symbols that are constant along all flows but change from step to step: the time, and neighbours on lattices.
     still: tuple[str, ...] = ()
 
     @cached_property
     def state(self) -> tuple[int, ...]:
-        """The variables that depend on coordinates, as indices."""
+        """The indices of the variables that depend on coordinates."""
         tower = self.tower
         return tuple(i for i, g in enumerate(tower.gens[: len(tower.names)]) if tower.depends_on(g, self.coordinates))
 
     @cached_property
     def changing(self) -> tuple[int, ...]:
-        """The variables that are unknown before the steps, as indices."""
+        """The indices of the variables that are not known before the steps."""
         tower, names = self.tower, [*self.coordinates, *self.still]
         return tuple(i for i, g in enumerate(tower.gens[: len(tower.names)]) if tower.depends_on(g, names))
 
     @cached_property
     def values(self) -> list[Expression]:
-        """The expression of each variable."""
+        """The expression that each variable stands for."""
         return [symbol(n) for n in self.tower.symbols] + [g.expression for g in self.tower.generators]
 
     @cached_property
@@ -66,12 +66,12 @@ class Ring:
 
     @cached_property
     def brackets_of(self) -> list[list[int]]:
-        """For each coordinate the coordinates with which its bracket is not 0."""
+        """For each coordinate, the coordinates with which it has a nonzero bracket."""
         n = range(len(self.coordinates))
         return [[j for j in n if (i, j) not in self.zero_pairs] for i in n]
 
     def support(self, element: Poly) -> tuple[int, ...]:
-        """Return the coordinates that an element depends on, directly or inside a function, as indices."""
+        """Return the indices of the coordinates that an element depends on, directly or inside a function."""
         names = self.tower.names_in(element)
         return tuple(i for i, c in enumerate(self.coordinates) if c in names)
 
@@ -86,7 +86,7 @@ class Ring:
         return [self.lowest(self.tower.combine(sums[j])) if j in sums else zero for j in range(len(self.poisson))]
 
     def lowest(self, element: Poly) -> Poly:
-        """Return the element with q·(1/q) cancelled where the polynomial q divides the cofactor of 1/q."""
+        """Return the element with q·(1/q) cancelled if the polynomial q divides the cofactor of 1/q."""
         for g in self.tower.generators:
             if g.kind != "reciprocal" or element == 0:
                 continue
@@ -107,7 +107,7 @@ class Ring:
         return element
 
     def rate(self, element: Poly, field: Sequence[Poly]) -> Poly:
-        """Return the derivative of an element along a vector field; 0 as a polynomial if it vanishes."""
+        """Return the derivative of an element along a vector field; it is the polynomial 0 if it vanishes."""
         derivative = self.tower.combine(
             field[j] * self.tower.derivative(element, self.coordinates[j])
             for j in self.support(element)
@@ -122,7 +122,7 @@ class Ring:
         return bool(self.rate(f, self.field(g)) == 0)
 
     def terms(self, element: Poly, variables: Collection[int]) -> dict[Monomial, Poly]:
-        """Return the element as a polynomial in some of the variables, with coefficients in the others."""
+        """Return the element as a polynomial in ``variables``: coefficients in the other variables, by exponents."""
         groups: dict[Monomial, dict[Monomial, Any]] = {}
         chosen_variables = frozenset(variables)
         mask = [int(i in chosen_variables) for i in range(len(self.tower.gens))]
@@ -134,11 +134,12 @@ class Ring:
         return {m: self.tower.context.from_dict(part) for m, part in groups.items()}
 
     def monomial(self, exponents: Monomial) -> Poly:
-        """Return the product of powers of the variables of the ring."""
+        """Return the product of the variables of the ring with these exponents."""
         return self.tower.context.from_dict({exponents: 1})
 
     def expression(self, element: Poly) -> Expression:
-        """Return the element as an expression with collected static factors, to be computed before the steps."""
+        """Return the element as an expression; static factors are collected, so that they are computed before the
+        steps."""
         names = len(self.tower.names)
         state = set(self.state)
         static = [i for i in range(names) if i not in state]
@@ -152,7 +153,7 @@ class Ring:
 
 
 def ring_of(system: System, further: Iterable[Expression] = (), symbols: Sequence[str] = ()) -> Ring:
-    """Return the ring of a system, with the time, further static ``symbols``, and the functions in ``further``."""
+    """Return the ring of a system, with the time, additional static ``symbols``, and the functions in ``further``."""
     further_expressions = list(further)
     roots = [system.hamiltonian, *further_expressions, *(e for row in system.poisson for e in row)]
     tower = Tower([*system.coordinates, *system.parameter_names, *symbols, TIME], roots, system.coordinates)

@@ -12,10 +12,10 @@ from phigen.symbolic.tower import Poly, rational
 
 
 def rotors(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[EulerMotion, Poly]]:
-    """Yield the free rigid bodies in H with their elements of the ring.
+    """Yield the free rigid bodies in H, each with its element of the ring.
 
-    The squares of three coordinates with the brackets of so(3), up to positive factors, which no other coordinate has
-    a bracket with; at least two of the moments may differ from one another.
+    A body is a sum of squares of three coordinates that have the brackets of so(3), up to positive factors, and no
+    brackets with other coordinates. At least two of its moments must be able to differ.
     """
     supports = [{*ring.support(t.element)} for t in terms]
     for triple in combinations(range(len(ring.coordinates)), 3):
@@ -36,7 +36,8 @@ def rotors(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[EulerMotion, Pol
 
 
 def _rotates(ring: Ring, triple: tuple[int, ...]) -> bool:
-    """Whether three coordinates have the brackets {x_i, x_j} = β_k x_k, β numbers of one sign, and no others."""
+    """Whether three coordinates have the brackets {x_i, x_j} = β_k x_k, with numbers β of one sign, and no other
+    brackets."""
     if any({*ring.brackets_of[i]} != {*triple} - {i} for i in triple):
         return False
     numbers = []
@@ -50,7 +51,7 @@ def _rotates(ring: Ring, triple: tuple[int, ...]) -> bool:
 
 
 def _factor(ring: Ring, rate: Poly, j: int, k: int) -> Poly | None:
-    """Return α of a rate α x_j x_k, or None where it is 0 or the rate has another form."""
+    """Return the factor α of a rate α x_j x_k, or None if it is 0 or the rate has another form."""
     product = tuple(a + b for a, b in zip(_power(ring, j, 1), _power(ring, k, 1), strict=True))
     terms = ring.terms(rate, ring.state)
     return terms.get(product) if len(terms) == 1 else None

@@ -4,7 +4,7 @@
 - r' = kr: z − log(1 − krt)/k
 - zr' = nr: z(1 + (1 − n) t r/z)^{1/(1 − n)}
 
-Each flow ends where the solution becomes infinite; beyond, the increment is not a number, and the step fails.
+Each flow ends where the solution becomes infinite. Beyond this time the increment is NaN, and the step fails.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ from phigen.symbolic.tower import Poly, rational
 
 
 def solve(ring: Ring, i: int, rate: Poly, moving: Collection[int]) -> Solution | None:
-    """Return the increment of coordinate i, if its rate depends on no other moving variables than functions of it."""
+    """Return the increment of coordinate i, or None.
+
+    The rate may depend on no moving variables other than the coordinate and functions of it.
+    """
     name = ring.coordinates[i]
     other_names = [ring.coordinates[j] for j in range(len(ring.coordinates)) if j != i]
     if any(ring.tower.depends_on(ring.tower.gens[v], other_names) for v in _variables(ring, rate) if v in moving):

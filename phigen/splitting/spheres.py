@@ -1,9 +1,9 @@
-"""Motions on spheres: ẋ = (β·x)x − |x|²β for some of the coordinates, as double-bracket damping of spins.
+"""Motions on spheres: ẋ = (β·x)x − |x|²β for some of the coordinates, such as double-bracket damping of spins.
 
-The end point is the reflection of x at the line of y = x − e. This preserves |x| for any rounding of e, and is
-accurate for small e: x + 2(y(y·e)/|y|² − e).
+The end point is the reflection of x in the line of y = x − e, where e is chosen below. The reflection preserves |x| for
+any rounding of e, and is accurate for small e: it is x + 2(y(y·e)/|y|² − e).
 
-If β is constant, the flow is a boost: e = |x|β tanh(θ/2)/|β| with θ = t|x||β|.
+If β is constant, the flow is the projective action of a Lorentz boost: e = |x|β tanh(θ/2)/|β| with θ = t|x||β|.
 
 If β = (v·x)w with w along v, the cotangent of the angle between x and v decays exponentially. Then x moves to the
 direction of u = x + T(x − 2x_v), with x_v the component along v and T = tanh(t|x|²(v·w)/2), and e = −|x|T(x −
@@ -24,7 +24,7 @@ BOOSTED, DRAWN = "moved on a sphere, as by a boost", "moved on a sphere along me
 
 
 def solve(ring: Ring, field: Sequence[Poly]) -> tuple[dict[int, Expression], str] | None:
-    """Return the increments by the index of the coordinate, with a description; None for other motions."""
+    """Return the increments by index of the coordinate, and a description; None for other motions."""
     moving = [i for i, f in enumerate(field) if f != 0]
     if len(moving) < 2:
         return None
@@ -40,7 +40,7 @@ def solve(ring: Ring, field: Sequence[Poly]) -> tuple[dict[int, Expression], str
 
 
 class _Sphere:
-    """Coordinates on a sphere; ``variables`` are their variables in the ring, and rates are polynomials in these."""
+    """Coordinates on a sphere; ``variables`` are their indices among the variables of the ring."""
 
     def __init__(self, ring: Ring, variables: Sequence[int]) -> None:
         self.ring, self.variables, self.size = ring, variables, len(variables)
@@ -60,11 +60,11 @@ class _Sphere:
     def drawn(self, rates: Sequence[dict[Monomial, Poly]]) -> list[Expression] | None:
         """Return the increments if β = (v·x)w, else None.
 
-        Then β = Ax with A = M + g, where M = v wᵀ has rank 1, and the number g causes no motion.
+        Then β = Ax with A = M + g, where M = v wᵀ has rank 1. The number g has no effect on the motion.
         """
         zero, n = self.ring.tower.zero, range(self.size)
         a = [[zero if i == j else zero - rates[i].get(self._monomial(j, j, j), zero) for j in n] for i in n]
-        for i in n[1:]:  # relative to the first, whose entry is set to 0
+        for i in n[1:]:  # diagonal entries are relative to the first one, which is set to 0
             a[i][i] = rates[0].get(self._monomial(0, i, i), zero)
         if any(a[i][j] != a[j][i] for i in n for j in n) or not self._moves(rates, a, [(j,) for j in n]):
             return None
@@ -73,7 +73,7 @@ class _Sphere:
             minors = (m[i][j] * m[k][h] - m[i][h] * m[k][j] for i in n for k in n[:i] for j in n for h in n[:j])
             pivot = next((k for k in n if m[k][k] != 0), None)
             if pivot is not None and all(e == 0 for e in minors):
-                common = reduce(lambda p, q: p.gcd(q), m[pivot])  # a factor such as a strength may be 0
+                common = reduce(lambda p, q: p.gcd(q), m[pivot])  # a common factor, such as a strength, may be 0
                 v = [self.ring.expression(e / common) for e in m[pivot]]
                 return self._drawn(v, total(self.ring.expression(m[i][i]) for i in n))
         return None
@@ -89,16 +89,16 @@ class _Sphere:
         return self._mirrored([scale * e for e in reflected])
 
     def _mirrored(self, e: Sequence[Expression]) -> list[Expression]:
-        """Return 2(y(y·e)/|y|² − e), which is −2x where y = 0.
+        """Return the increment 2(y(y·e)/|y|² − e); it is −2x where y = 0.
 
-        There x is opposite to β, and rounding leaves no direction.
+        At y = 0, x is opposite to β, and its direction is lost by rounding.
         """
         y = [c - d for c, d in zip(self.x, e, strict=True)]
         projection = dot(y, e) * call("inv0", dot(y, y))
         return [2 * (c * projection - d) for c, d in zip(y, e, strict=True)]
 
     def _shifts(self, a: Sequence[Sequence[Poly]]) -> Iterator[Poly]:
-        """Yield the candidates for the number g that A has on the diagonal in addition to a matrix of rank 1."""
+        """Yield the candidates for the number g on the diagonal of A = M + g, where M has rank 1."""
         yield from (a[i][i] for i in range(self.size))
         for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)) if self.size == 3 else ():
             quotient, remainder = divmod(a[i][j] * a[i][k], a[j][k]) if a[j][k] != 0 else (0, 1)
@@ -106,7 +106,8 @@ class _Sphere:
                 yield a[i][i] - quotient
 
     def _monomial(self, *factors: int) -> Monomial:
-        """Return the product of coordinates, by their places in ``variables``; negative places count from the end."""
+        """Return the product of the coordinates with these places in ``variables``; negative places count from the
+        end."""
         exponents = [0] * len(self.ring.tower.gens)
         for k in factors:
             exponents[self.variables[k]] += 1
@@ -115,7 +116,7 @@ class _Sphere:
     def _moves(
         self, rates: Sequence[dict[Monomial, Poly]], beta: Sequence[Sequence[Poly]], factors: Sequence[tuple[int, ...]]
     ) -> bool:
-        """Whether the rates are those of β_i = Σ_j beta[i][j] times the product of ``factors[j]``."""
+        """Whether the rates are those of β_i = Σ_j beta[i][j] times the product of the coordinates ``factors[j]``."""
         ring, n = self.ring, range(self.size)
         product = [
             ring.tower.combine(c * ring.monomial(self._monomial(*f)) for c, f in zip(row, factors, strict=True))

@@ -1,4 +1,4 @@
-"""Proofs that a splitting is correct, for each build: the parts sum to H, and each flow solves its equation.
+"""Proofs that a splitting is correct, repeated for each build: the parts sum to H, and each flow solves its equation.
 
 With exact flows, composed as in `phigen.scheme.alternation`, a step is a Poisson map, preserves all Casimirs, and has
 the order of the composition, for any parts.
@@ -31,9 +31,10 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 
 def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str, Flow]] = ()) -> Iterator[Statement]:
-    """Yield the statements, those on flows in the order of the parts; H includes the gauge.
+    """Yield the statements on a splitting; statements on single flows follow the order of the parts. H includes the
+    gauge.
 
-    ``noise`` are flows of sources by their names.
+    ``noise`` are pairs of the name of a source and its flow.
     """
     flows = splitting.flows
     hamiltonians = substitute([f.hamiltonian for f in flows], {KICK: ZERO})
@@ -57,18 +58,18 @@ def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str
 
 
 def _exponential_statements(system: System, splitting: SplitHamiltonian) -> Iterator[Statement]:
-    """Yield the comparison of matrix exponentials with enclosures of the exact values."""
+    """Yield the statements that compare matrix exponentials with enclosures of the exact values."""
     values = {p.name: float(p.value) for p in system.parameters}
     for k, flow in enumerate(splitting.flows, 1):
         for exponential in flow.exponentials:
-            from phigen.splitting.enclosures import enclosed  # imports NumPy, only where it is needed
+            from phigen.splitting.enclosures import enclosed  # imports NumPy
 
             name = f"exp(tA) of {flow.letter}_{k} to round-off, A with {exponential.size} rows"
             yield enclosed(name, exponential, values)
 
 
 def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> Statement:
-    """Decide that the force parts sum to πζ + f."""
+    """Return the statement that the force parts sum to πζ + f."""
     slope = gradient(system.hamiltonian, system.coordinates)
     force_field = [
         a - b for a, b in zip(system.vector_field(), hamiltonian_vector_field(system.poisson, slope), strict=True)
@@ -80,7 +81,7 @@ def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> St
 
 
 def _kick_statements(system: System, splitting: SplitHamiltonian, plain: Sequence[Expression]) -> Iterator[Statement]:
-    """Yield {V, {V, {V, T}}} = 0, and that {V, {V, T}} is the factor of κ."""
+    """Yield the statements {V, {V, {V, T}}} = 0, and that {V, {V, T}} is the factor of κ in the modified potential."""
     assert splitting.kick is not None
     v, t = plain[splitting.kick], plain[1 - splitting.kick]
     name_v, name_t = f"H_{1 + splitting.kick}", f"H_{2 - splitting.kick}"
@@ -101,7 +102,7 @@ def bracket(system: System, f: Expression, g: Expression) -> Expression:
 
 
 def angles_added(e: Expression) -> Expression:
-    """Return the expression with the addition theorems applied to sin, cos, 1 − cos and exp of sums.
+    """Return an expression with the addition theorems applied to sin, cos, 1 − cos and exp of sums.
 
     The ring does not contain these relations.
     """
@@ -134,14 +135,14 @@ def _sine_and_cosine_of_sum(e: Expression) -> tuple[Expression, Expression]:
 
 
 def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
-    """Decide Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t; for a force its field replaces π∇H_k."""
+    """Return the statement Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t; for a force, its field replaces π∇H_k."""
     part, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
     name = f"the flow Φ of {part}: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t" + ", for exp(tA)" * bool(flow.exponentials)
     return decide_zero(name, list(_residuals(system, flow)), system.positive, flow.manner)
 
 
 def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals that vanish if a flow is that of its vector field, with labels."""
+    """Yield the residuals, with labels, that vanish if a flow is that of its vector field."""
     if any(part_flow.motion for part_flow in flow.pieces):
         yield from _composition_residuals(system, flow)
     elif flow.motion:
@@ -151,7 +152,10 @@ def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
 
 
 def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of a composition: pieces are flows, sum to the whole, commute, and are composed."""
+    """Yield the residuals of a composition.
+
+    They vanish if the pieces are flows, sum to the whole, commute, and are composed in the increments.
+    """
     part_flows = flow.pieces
     for part_flow in part_flows:
         yield from _residuals(system, part_flow)
@@ -167,7 +171,7 @@ def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Ex
 def _motion_residuals(system: System, flow: Flow, motion: Motion) -> Iterator[tuple[str, Expression]]:
     """Yield the residuals of Kepler motions or of a rigid body.
 
-    π∇H is their field, and the increments are those proved by identities of the motion.
+    They vanish if π∇H is the field of the motion, and the increments are those that are proved by identities.
     """
     names = system.coordinates
     field = flow.vector_field(system)
@@ -193,7 +197,7 @@ def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expre
 
 
 def _rates(increments: Sequence[Expression], slopes: Mapping[str, Expression]) -> list[Expression]:
-    """Return the derivatives along the time, including those of the entries of matrix exponentials."""
+    """Return the time derivatives of the increments, including those of the entries of matrix exponentials."""
     rates = derivatives(increments, TIME)
     if not slopes:
         return rates

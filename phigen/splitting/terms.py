@@ -12,7 +12,7 @@ from phigen.symbolic.tower import Poly
 
 
 def summands(e: Expression, coordinates: Collection[str], factor: Expression = ONE) -> Iterator[Expression]:
-    """Yield the terms of a sum, with nested sums and constant factors of sums resolved."""
+    """Yield the additive terms of an expression; a constant factor of a sum is multiplied into each term."""
     if e.op in ("add", "sub"):
         yield from summands(e.args[0], coordinates, factor)
         yield from summands(e.args[1], coordinates, factor if e.op == "add" else neg(factor))
@@ -35,9 +35,9 @@ def hamiltonian_terms(system: System) -> list[Expression]:
 
 
 def terms_of(ring: Ring, listed: Iterable[Expression]) -> list[Term]:
-    """Return the terms of H, one for each set of coordinates.
+    """Return the terms of H; terms that depend on the same set of coordinates are summed.
 
-    A summand of coordinates that do not commute is expanded in the ring, and its monomials are separate terms.
+    A summand whose coordinates do not commute is expanded in the ring, and its monomials are separate terms.
     """
     terms: list[Term] = []
     for e in listed:
@@ -57,7 +57,8 @@ def monomial_terms(ring: Ring, element: Poly) -> list[Term]:
 
 
 def joined(ring: Ring, terms: Iterable[Term]) -> list[Term]:
-    """Return one term for each set of coordinates; constants are added to the first of them."""
+    """Return the terms with those summed that depend on the same set of coordinates; constants are added to the
+    first."""
     groups: dict[tuple[int, ...], list[Term]] = {}
     for term in terms:
         groups.setdefault(ring.support(term.element), []).append(term)

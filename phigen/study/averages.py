@@ -22,10 +22,10 @@ from phigen.spec.model import Run
 #: Default number of blocks for the standard error. With 20 blocks, the standard error itself has a
 #: relative standard deviation of 1/sqrt(2·19) = 0.16.
 BLOCKS = 20
-#: Least length of blocks in correlation times τ. The variance of means of blocks of length L is estimated too small by
-#: the factor 1 − τ/L, which is 10 % here.
+#: Least length of blocks in correlation times τ. For blocks of length L, the variance of their means is underestimated
+#: by the factor 1 − τ/L, 10 % here.
 LEAST_LENGTH = 10.0
-#: Observables with a smaller relative range are conserved but for the error of the method: their means need no blocks.
+#: Relative range of an observable below which it is conserved up to the error of the method; its mean needs no blocks.
 CONSERVED = 1e-6
 
 
@@ -34,8 +34,8 @@ class Average:
     """Statistics of one observable over the rows of a run.
 
     ``error`` is the standard error of the mean, NaN with fewer than two blocks. ``correlation_time`` is the integrated
-    autocorrelation time in the time unit of the run. Both are estimated from blocks, and are ``resolved`` if blocks are
-    much longer than that time; else they are too small.
+    autocorrelation time in the time unit of the run. Both are estimated from blocks. ``resolved`` says that blocks are
+    much longer than the correlation time; otherwise both estimates are too small.
     """
 
     mean: float
@@ -73,7 +73,7 @@ class Averages:
 
     @property
     def count(self) -> int:
-        """Number of rows accumulated."""
+        """Number of rows so far."""
         return int(self.state["count"])
 
     @property
@@ -83,7 +83,7 @@ class Averages:
         return first, last
 
     def see(self, t: Floats, rows: Floats) -> None:
-        """Accumulate rows (rows, width) at the times t (rows,), in the order of the run."""
+        """Add rows (rows, width) at the times t (rows,), in the order of the run."""
         selected = self._sign * t >= self._sign * self._after if math.isfinite(self._after) else np.full(len(t), True)
         t, rows = t[selected], rows[selected]
         if not len(rows) or not rows.shape[1]:
@@ -94,7 +94,7 @@ class Averages:
         self._block(rows, self.count - len(rows))
 
     def _moments(self, rows: Floats) -> None:
-        """Merge mean and variance of new rows into the accumulated ones (Chan, Golub and LeVeque, 1979)."""
+        """Merge the mean and the variance of new rows into those of all rows (Chan, Golub and LeVeque, 1979)."""
         state, count_before = self.state, self.count
         count_after = count_before + len(rows)
         mean = rows.mean(axis=0)
@@ -124,7 +124,7 @@ class Averages:
                 self.state["size"] = np.asarray(2 * size)
 
     def results(self) -> list[Average]:
-        """Return the statistics of each observable; NaN where there are too few rows."""
+        """Return the statistics of each observable; NaN if there are too few rows."""
         state, n = self.state, self.count
         if not n:
             return [Average(*(math.nan,) * 6) for _ in state["mean"]]
@@ -153,8 +153,8 @@ def averages(
     """Return the averages over time of the observables of a trajectory, or of the columns of a series, by name.
 
     The averages are over the rows from the time ``after`` on, with standard errors from at least ``blocks`` blocks. A
-    trajectory does not hold ``average:`` of its run: for the numbers of ``phigen run`` and of sweeps, repeat its
-    ``after`` and ``blocks`` here. Fields of lattices, with a value at each site, are left out.
+    trajectory does not contain the setting ``average:`` of its run: to reproduce the numbers of ``phigen run`` and of
+    sweeps, pass its ``after`` and ``blocks``. Fields of lattices, with a value at each site, are left out.
     """
     column_values = trajectory.columns if isinstance(trajectory, LatticeSeries) else trajectory.observables
     columns = {name: values for name, values in column_values.items() if np.ndim(values) == 1}

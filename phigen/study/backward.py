@@ -27,21 +27,20 @@ CORRECTIONS, MOST_ORDER = 2, 6
 #: Steps made at the largest step size; number of doublings of the run's step and of halvings of the largest step that
 #: are tried.
 STEPS, DOUBLINGS, HALVINGS = 16, 8, 6
-#: Changes of H̃ below the first fraction of the terms of H are rounding errors. Changes of H above the second fraction
-#: show that the steps are too large to determine an order.
+#: ROUNDING: changes of H̃ below this fraction of the terms of H are rounding errors. ASYMPTOTIC: changes of H above
+#: this fraction show that the steps are too large to determine an order.
 ROUNDING, ASYMPTOTIC = 1e-13, 1e-3
 
 
 class NotOfferedError(ValueError):
-    """Refusal: no modified Hamiltonian is offered for this method; the message says why."""
+    """No modified Hamiltonian is available for the method; the message says why."""
 
 
 @dataclass(frozen=True)
 class ModifiedHamiltonian:
     """Terms of H̃ = Σ h^j terms[j], in which all symbols except the coordinates have numerical values.
 
-    With m corrections, H̃ consists of the first powers[m] terms. ``hamiltonian`` is H, whose unit is that of the
-    errors.
+    With m corrections, H̃ consists of the first powers[m] terms. ``hamiltonian`` is H; errors are in units of H.
     """
 
     terms: tuple[Expression, ...]
@@ -90,7 +89,7 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
         raise NotOfferedError("with forces a step is not the flow of a Hamiltonian")
     if order.order > MOST_ORDER:
         raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
-    # Numerical parameters give fewer terms, but the series may not be able to represent their roots.
+    # Numerical parameters make the terms shorter, but the series may not be able to represent roots of them.
     chart = compilation.by_series().realisation
     exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
     for exact_values in (exact, {}):
@@ -114,7 +113,7 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
 
 
 def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> list[float]:
-    """Return the powers of h by which the changes of H̃ with 0, 1, … corrections shrink; infinity at rounding level.
+    """Return the powers of h with which the changes of H̃ with 0, 1, … corrections decrease; infinity at rounding level.
 
     The run's step ``h`` is doubled until the changes exceed the rounding errors.
     """
@@ -156,7 +155,7 @@ class Constancy:
 
 
 def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> Constancy:
-    """Measure the changes of H̃ at the largest steps that show an order. These steps may be larger than the run's step.
+    """Measure the changes of H̃ at the largest steps that show an order; these may be larger than the run's step.
 
     Raises `StepError`, and `NotOfferedError` if H itself changes only by rounding errors.
     """
@@ -173,7 +172,7 @@ def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: fl
         raise NotOfferedError("H itself changes by no more than rounding")
     sizes: Floats = largest / 2.0 ** np.arange(HALVINGS + 1, dtype=np.float64)
     changes = np.array([hamiltonian.changes(method, x, size, STEPS * 2**k) for k, size in enumerate(sizes.tolist())])
-    # The finest step at which the change of H̃ with all corrections still exceeds the rounding errors.
+    # Indices of steps at which the change of H̃ with all corrections exceeds the rounding errors.
     telling = np.flatnonzero(changes[:, -1] > rounding)
     shown_step = float(sizes[telling[-1] if len(telling) else 0])
     rows = method.rows(x, shown_step, round(STEPS * largest / shown_step), 1)

@@ -1,9 +1,9 @@
-"""Energy balance where H depends on the time or forces act: H − ∫ P dt is constant along the motion, H is not.
+"""Energy balance if H depends on the time or forces act: H − ∫ P dt is constant along the motion, H is not.
 
 P = ∂_tH + ∇H·(πζ + f) is the power supplied by the explicit time dependence and by the forces. The integral is
 evaluated between successive stored states by Hermite's rule of order 8. The rule needs only P and its first three
-derivatives along the motion at both ends of an interval, so the integral accumulates as states arrive, at any spacing.
-The difference from the rule of order 6 estimates the error.
+derivatives along the motion at both ends of an interval, so the integral can be continued state by state, at any
+spacing. The difference from the rule of order 6 estimates the error.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ FINE, COARSE = (1 / 2, 3 / 28, 1 / 84, 1 / 1680), (1 / 2, 1 / 10, 1 / 120, 0.0)
 
 
 def powers(system: System) -> list[Expression]:
-    """Return P and its derivatives along the motion; empty where H is an invariant or noise changes H as well."""
+    """Return P and its derivatives along the motion; no expressions if H is an invariant, or if noise changes H as
+    well."""
     if not system.driven or system.noise:
         return []
     time_derivatives, field = [], [*system.vector_field(), *(ONE for _ in system.times)]
@@ -32,8 +33,9 @@ def powers(system: System) -> list[Expression]:
 
 
 def works(t: Floats, f: Floats) -> tuple[Floats, Floats]:
-    """Return ∫ f dt over each interval between times (rows,), from f and its derivatives (4, rows), and the estimated
-    error.
+    """Return ∫ f dt over each interval between times (rows,), and the estimated errors.
+
+    ``f`` (4, rows) has the values of f and of its first three derivatives.
     """
     h = np.diff(t)
 

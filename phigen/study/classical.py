@@ -11,7 +11,7 @@ from phigen.runtime.interface import row_steps
 from phigen.study import dop853
 
 Floats = NDArray[np.float64]
-#: The methods that a solver is compared with if the run names none.
+#: The methods with which a solver is compared if the run names none.
 COMPARED = ("rk4",)
 
 Field = Callable[[Floats], Floats]
@@ -20,22 +20,22 @@ Step = Callable[[Field, Floats, float], Floats]
 #: Largest number of fixed-point iterations of the implicit midpoint rule; each reduces the error by a factor O(h).
 _ITERATIONS = 100
 _TOLERANCE = 4e-16
-#: Steps in one part of a long run.
+#: Number of steps in one part of a long run.
 _PIECE = 500
 
 
 def euler(f: Field, x: Floats, h: float) -> Floats:
-    """Explicit Euler, order 1."""
+    """Return the state after a step of explicit Euler, order 1."""
     return x + h * f(x)
 
 
 def rk2(f: Field, x: Floats, h: float) -> Floats:
-    """The explicit midpoint rule of Runge, order 2."""
+    """Return the state after a step of the explicit midpoint rule of Runge, order 2."""
     return x + h * f(x + h / 2 * f(x))
 
 
 def rk4(f: Field, x: Floats, h: float) -> Floats:
-    """The classical method of Runge and Kutta, order 4."""
+    """Return the state after a step of the classical method of Runge and Kutta, order 4."""
     a = f(x)
     b = f(x + h / 2 * a)
     c = f(x + h / 2 * b)
@@ -44,7 +44,8 @@ def rk4(f: Field, x: Floats, h: float) -> Floats:
 
 
 def implicit_midpoint(f: Field, x: Floats, h: float) -> Floats:
-    """The implicit midpoint rule, order 2; NaN where its fixed-point iteration does not converge."""
+    """Return the state after a step of the implicit midpoint rule, order 2; NaN if its fixed-point iteration does
+    not converge."""
     change, size = h * f(x), np.inf
     for _ in range(_ITERATIONS):
         following = h * f(x + change / 2)
@@ -60,7 +61,7 @@ def implicit_midpoint(f: Field, x: Floats, h: float) -> Floats:
 
 
 def dormand_prince(f: Field, x: Floats, h: float) -> Floats:
-    """DOP853 with fixed step size, order 8."""
+    """Return the state after a step of DOP853 with fixed step size, order 8."""
     stages: list[Floats] = []
     for row in dop853.A:
         stages.append(f(x + h * _combination(stages, row)))
@@ -83,8 +84,7 @@ METHODS: Mapping[str, tuple[Step, int]] = {
 
 def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, stride: int = 1) -> Floats:
     """Return the states (rows, DIM) after 0, stride, 2·stride, … steps and after the last; rows after a failure are
-    NaN.
-    """
+    NaN."""
     rows = row_steps(steps, stride)
     row_parts = [x for _, x in pieces_of(method, field, x0, h, rows.tolist())]
     states = np.full((len(rows), len(x0)), np.nan)
@@ -98,8 +98,8 @@ def pieces_of(
 ) -> Iterator[tuple[Floats, Floats]]:
     """Yield parts of a run: increasing step numbers (rows,), from 0 on, and the states (rows, DIM) at these.
 
-    A fractional step number is reached from the step before it by a shorter step, from which the run does not continue.
-    The run ends with the last finite row if the method fails.
+    A fractional step number is reached from the step before it by a shorter step; the run does not continue from there.
+    If the method fails, the run ends with the last finite row.
     """
     step, _ = METHODS[method]
     x = np.array(x0, dtype=np.float64)

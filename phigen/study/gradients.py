@@ -15,13 +15,14 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 
-#: Length and stride of the runs: rows lie within a block of eight steps, at its end, and after a shorter last stride.
+#: Number of steps and stride of the runs: rows lie within a block of eight steps, at its end, and after a shorter last
+#: stride.
 STEPS, STRIDE = 11, 4
-#: Limit for the difference between a gradient and the transposed tangent maps, relative to their terms: both are exact
-#: to rounding.
+#: Largest difference between a gradient and the transposed tangent maps, relative to their terms: both are exact to
+#: rounding.
 TRANSPOSED = 1e-12
-#: Limit for the difference between a gradient and finite differences of order 6: the error of the latter. They are
-#: taken at two displacements, in units of the displaced quantity.
+#: Largest difference between a gradient and finite differences of order 6, which is the error of the differences. They
+#: are taken at two displacements, in units of the displaced quantity.
 DIFFERENCES = 1e-7
 _DISTANCES = (2e-3, 2e-3 / 256)
 _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60), (-1, -3 / 4), (-2, 3 / 20), (-3, -1 / 60))
@@ -33,7 +34,7 @@ _LEAST = 1e-3
 #: its own tangent vector.
 _DIRECTIONS, _MOST_COLUMNS = 3, 64
 
-#: Name, value, limit, and the cause where the value exceeds the limit.
+#: Name, value, limit, and the cause if the value exceeds the limit.
 Measured = tuple[str, float, float, str]
 
 
@@ -154,7 +155,7 @@ def difference_error(run: GradedRun) -> float:
     """Return the error of the gradient against finite differences of the run, in random directions and for each
     parameter.
 
-    The error of each derivative is relative to the derivative or, where it is small, to a fraction of the function
+    The error of each derivative is relative to the derivative or, if that is small, to a fraction of the function
     value.
     """
     x_bar, parameters_bar = run.pullback(run.bars)
@@ -166,12 +167,13 @@ def difference_error(run: GradedRun) -> float:
     return worst
 
 
-#: Displaced start and parameters as a function of the displacement.
+#: Function from a displacement to the displaced initial state and parameters.
 _Moved = Callable[[float], tuple[Floats, Mapping[str, Any]]]
 
 
 def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any]) -> Iterator[tuple[float, _Moved]]:
-    """Yield the directional derivatives that the gradient implies, each with its displacement."""
+    """Yield the directional derivatives according to the gradient, each with the function that makes its
+    displacement."""
     for v in _directions(len(run.x), _DIRECTIONS) * run.units:
         yield float(x_bar @ v), lambda e, v=v: (run.x + e * v, run.parameters)  # type: ignore[misc]
     for name, bar in parameters_bar.items():
@@ -190,14 +192,14 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
 def _differences(run: GradedRun, displaced: _Moved) -> Iterator[float]:
     """Yield the derivative along a displacement by finite differences, for each distance at which all runs succeed.
 
-    Differences are central, or one-sided where runs on the other side fail.
+    Differences are central, or one-sided if runs on one side fail.
     """
     middle = run.rows(run.x, run.parameters)
     for apart in _DISTANCES:
         for weights in (_WEIGHTS, _FORWARD_WEIGHTS):
             try:
                 changes = [(w, run.rows(*displaced(k * apart)) - middle) for k, w in weights]
-            except (StepError, ValueError):  # beyond a singularity or the bound of a parameter
+            except (StepError, ValueError):  # beyond a singularity, or outside the bounds of a parameter
                 continue
             yield float(sum(w * np.sum(run.bars * change) for w, change in changes)) / apart
             break
@@ -225,5 +227,5 @@ def _directions(size: int, count: int) -> Floats:
 
 
 def _as_number(value: Floats) -> Any:
-    """Return a number as a number, an array as it is."""
+    """Return a 0-dimensional array as a number, other arrays unchanged."""
     return value if value.ndim else float(value)

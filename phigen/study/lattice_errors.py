@@ -89,7 +89,7 @@ def summed(cell: Cell, density: Expression, x: Floats, parameters: Mapping[str, 
 
 
 def _term(cell: Cell, term: Expression, x: Floats, parameters: Mapping[str, Any]) -> Floats:
-    """Return the values of a term at all sites, 0 where its stencil reaches beyond an open end."""
+    """Return the values of a term at all sites; 0 if the term reaches beyond an open end."""
     sizes = x.shape[1:]
     values: dict[str, Any] = {n: v for n, v in parameters.items() if np.ndim(v) == 0}
     for name, (base, offset) in cell.places(term).items():

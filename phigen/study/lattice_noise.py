@@ -20,7 +20,7 @@ from phigen.study.stochastic import BEYOND, LEVELS, SEED, SIGNS
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import ZERO
 
-#: Number of the coarsest steps along a path.
+#: Number of coarsest steps along a path.
 STEPS = 2
 
 
@@ -36,7 +36,7 @@ def strong_order(
     paths.
 
     Reference solutions follow the piecewise linear interpolation of each path and use only the vector fields. ``x0``
-    has the shape (fields, *sizes), ``parameters`` are those of a solver. NaN where a step fails.
+    has the shape (fields, *sizes), ``parameters`` are those of a solver. NaN if a step fails.
     """
     solver = lattice_solver_of(compilation, "numpy")
     noise = compilation.program.noise
@@ -98,8 +98,9 @@ def _along_lines(
     path: Floats,
     parts: int,
 ) -> Floats:
-    """Return the end of a path with increments (steps·parts, sources, *sizes) from x, by one RK4 step for each
-    increment.
+    """Return the end of a path from x, by one RK4 step for each increment.
+
+    ``path`` are the increments (steps·parts, sources, *sizes).
     """
     drift, *spread = (_slope(s, x, parameters, t0) for s in (solver, *sources))
     begin = t0 or 0.0

@@ -1,7 +1,7 @@
 """Verification of lattices: properties of their solvers, measured on a run and on small lattices.
 
-The Poisson identity is measured on a lattice of a few sites, which start with states of sites of the run. For all sizes
-the identity is proved; the measurement detects errors of the generated code.
+The Poisson identity is measured on a lattice of a few sites, whose initial states are those of sites of the run. For
+all sizes the identity is proved; the measurement detects errors of the generated code.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY, MAX_BALANCED_SI
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification, order_limit
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Largest number of steps times sites of a run, without and with ``quick``; longer runs are shortened. Number of
-#: frames.
+#: Largest numbers of steps times sites of a run, without and with ``quick``; longer runs are shortened. FRAMES is the
+#: number of frames.
 MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
 #: Limit for the ratio of the largest energy error in the last quarter of a run to that in the first three quarters.
 GROWTH = 4.0
@@ -139,7 +139,7 @@ def verify_lattice(
 
 
 def _sampled(stride: int) -> str:
-    """Sentence about the states at which conserved quantities are evaluated; "" if these are all."""
+    """Return a sentence about the states at which conserved quantities are evaluated; "" if these are all states."""
     every = f"at the start, after every {stride} steps and at the end"
     return f"Energy, Casimirs and invariants are evaluated {every}." if stride > 1 else ""
 
@@ -182,9 +182,8 @@ def _order(subject: _Subject, *, quiet: bool = False) -> Check:
 
 
 def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) -> Iterator[Check]:
-    """Yield the checks of Casimirs and invariants along the run, and of the energy; ``coarser`` scales the rounding
-    unit.
-    """
+    """Yield the checks of Casimirs, invariants and the energy along the run; ``coarser`` multiplies the rounding
+    unit."""
     errors = errors_of(cell, trajectory)
     least = coarser * rounding(trajectory.steps)
     yield from _energy(cell, trajectory, errors, least)
@@ -207,7 +206,7 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
 
 
 def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
-    """Return the check that the energy, or the energy balance, does not drift."""
+    """Yield the check that the energy, or the energy balance, does not drift."""
     quantity = next(name for name in (ENERGY, BALANCE, CHANGE) if name in errors)
     energy = errors[quantity]
     if quantity == CHANGE:
@@ -218,7 +217,7 @@ def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floa
     quarter = max(1, 3 * len(energy) // 4)
     early_error, late_error = float(energy[:quarter].max()), float(energy[quarter:].max())
     grown = late_error / early_error if early_error > 10 * least else math.nan
-    judged = not cell.forces  # with forces a step is not a Poisson map
+    judged = not cell.forces  # with forces a step is not a Poisson map, and its energy error may grow
     is_passed = not (judged and grown > GROWTH)
     limit = f"≤ {GROWTH:g}" if judged else ""
     yield Check(f"{quantity}: last quarter/before", grown, limit, is_passed, f"grows by a factor of {grown:.1f}")
@@ -233,7 +232,7 @@ def _reversal(subject: _Subject, trajectory: LatticeTrajectory) -> Check:
         forward_state = subject.stepped(x, subject.h, 1, t0, held_level)
         returned_state = subject.stepped(forward_state, -subject.h, 1, time_after, held_level)
         worst = max(worst, float(np.abs(returned_state - x).max()) / _size(x))
-    if subject.compilation.program.step.corrected:  # such a step has an inverse close to that of −h
+    if subject.compilation.program.step.corrected:  # a step with corrector is not exactly the inverse of the step −h
         return Check("reversibility", worst, "", True, "")
     return Check("reversibility", worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
 
@@ -331,9 +330,8 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
 
 
 def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Yield the checks of gradients of all targets on a few sites, and of the first target on the run's lattice if
-    small.
-    """
+    """Yield the checks of gradients: of all targets on a few sites, and of the first target on the run's lattice if
+    it is small."""
     sizes, start, step_and_time = _few_sizes(subject), subject.start, (subject.h, subject.t0)
     x, parameters = _on_few(cell, start, sizes, ring(sizes[0]) if subject.solver.interface.graph else ())
     usual = _units(np.abs(trajectory.x).max(axis=tuple(i for i in range(trajectory.x.ndim) if i != 1)))
@@ -364,8 +362,9 @@ def _few_sizes(subject: _Subject) -> list[int]:
 
 
 def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
-    """Increase sizes until the boundary seams are those of the run; with one or two axes some sites lie away from the
-    seams.
+    """Return sizes increased until the boundary seams are those of the run.
+
+    With one or two axes, some sites then lie away from the seams.
     """
     seams = subject.compilation.sweeps.colouring.seams
     for axis, (seam, size) in enumerate(zip(seams, subject.start.sizes, strict=False)):
@@ -385,7 +384,7 @@ class _SmallLattice:
 
     @property
     def given(self) -> dict[str, Any]:
-        """Keyword arguments of the steps."""
+        """Keyword arguments of the steps: time, seed of the noise, parameters and bonds, and a fixed energy level."""
         held_level = _level_argument(self.subject.solver, self.x, self.parameters)
         return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters, **held_level}
 
@@ -408,6 +407,8 @@ class _SmallLattice:
     def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
         """Return the error of the tangent map against differences of order 6, relative to its largest entry, in these
         units.
+
+        ``apart`` is the displacement of the differences.
         """
 
         def step(y: Floats) -> Floats:
@@ -420,9 +421,8 @@ class _SmallLattice:
 
 
 def _with_finite_brackets(cell: Cell, small_lattice: _SmallLattice) -> tuple[_SmallLattice, str]:
-    """Return the lattice with non-zero values for parameters whose value 0 makes π infinite, and a note on these
-    values.
-    """
+    """Return the lattice with nonzero values for parameters whose value 0 makes π infinite, and a note on these
+    values."""
     with np.errstate(all="ignore"):
         if np.isfinite(_poisson(small_lattice.whole, small_lattice.x, small_lattice.parameters)).all():
             return small_lattice, ""

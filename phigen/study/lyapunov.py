@@ -27,10 +27,10 @@ _SPACING = 2 ** (1 / 8)
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Exponents of a trajectory after the time ``t``, in descending order, with the history of their convergence.
+    """Exponents of a trajectory over the time ``t``, in descending order, with the history of their convergence.
 
-    ``history`` (rows, DIM) holds the exponents at the times ``times`` (rows,), which grow geometrically. The ``clock``
-    is the variable in which steps are uniform: τ for monitored systems.
+    ``history`` (rows, DIM) has the exponents at the times ``times`` (rows,), which grow geometrically. The ``clock`` is
+    the variable in which steps are uniform: τ for monitored systems.
     """
 
     exponents: Floats
@@ -50,13 +50,14 @@ class Spectrum:
 
     @property
     def total(self) -> float:
-        """The sum of all exponents: the growth of volume, 0 where π is constant or the structure unimodular."""
+        """The sum of all exponents: the growth of volume. It is 0 if π is constant or the structure unimodular."""
         return float(np.sum(self.exponents))
 
     @property
     def pairing(self) -> float:
-        """The largest |λ_i + λ_{n+1−i}|: 0 for symplectic maps, also on symplectic leaves, where Casimirs contribute
-        zeros.
+        """The largest |λ_i + λ_{n+1−i}|.
+
+        It is 0 for symplectic maps, also on symplectic leaves, where Casimirs contribute zeros.
         """
         return float(np.max(np.abs(self.exponents + self.exponents[::-1])))
 
@@ -68,7 +69,7 @@ class Spectrum:
 
 
 class FrameGrowth:
-    """Growth of a frame of tangent vectors, step by step; ``state`` is the complete state, as arrays.
+    """Growth of a frame of tangent vectors, step by step. ``state`` is the complete state, as arrays.
 
     The initial frame consists of all unit vectors, or of the columns of ``frame``.
     """
@@ -91,11 +92,11 @@ class FrameGrowth:
         return frame
 
     def see(self, tangent: Floats) -> None:
-        """Propagate the frame through one step with the given tangent map."""
+        """Propagate the frame through one step with this tangent map."""
         self.take(tangent @ self.frame)
 
     def take(self, propagated: Floats, steps: int = 1) -> None:
-        """Accept the columns of the frame propagated through some steps, and make them orthonormal."""
+        """Replace the frame by its columns ``propagated`` through some steps, and make them orthonormal."""
         state = self.state
         state["frame"], r = np.linalg.qr(propagated)
         state["logs"] = state["logs"] + np.log(np.abs(np.diagonal(r)))
@@ -104,7 +105,7 @@ class FrameGrowth:
             state["times"], state["history"] = self._noted()
 
     def spectrum(self) -> Spectrum:
-        """Return the exponents so far; raises `ValueError` if no step was made."""
+        """Return the exponents so far. Raises `ValueError` if no step was made."""
         if not self.state["steps"]:
             raise ValueError("there are no exponents without a step")
         times, history = self._noted()

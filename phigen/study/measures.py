@@ -13,19 +13,18 @@ from phigen.geometry.system import System
 from phigen.study.methods import Method, by_differences
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Errors below this value, relative to the size of a quantity, are rounding errors and say nothing about the method.
+#: Error, relative to the size of a quantity, below which errors are rounding errors and not those of the method.
 ROUNDING = 4e-16
 
 #: Factors by which the displacements of finite differences are reduced.
 DISTANCES = (1.0, 256.0)
-#: Error, relative to the largest derivative, above which displacements in proportion to each coordinate are tried as
-#: well.
+#: Error, relative to the largest derivative, above which displacements in proportion to each coordinate are also tried.
 ROUGH = 1e-8
 
 #: Relative displacement of a coordinate for estimating the effect of its rounding on π.
 _SHARE = 1e-6
 
-#: Refinements of the step, as factors: pairs two apart halve the step.
+#: Factors by which the step is refined; pairs two apart halve the step.
 _REFINEMENTS = tuple(f * 2**k for k in range(9) for f in (4, 6))
 
 
@@ -44,7 +43,8 @@ class Observed:
 
 
 def observed_order(method: Method, reference: Callable[[float], tuple[Floats, float]], x: Floats, t: float) -> Observed:
-    """Measure the order from errors at time t with steps t/4, t/6, …; ``reference(t)`` is a state with its error."""
+    """Return the order observed from errors at time t with steps t/4, t/6, …; ``reference(t)`` returns a state and
+    its error."""
     solution, uncertainty = reference(t)
     size = float(np.max(np.abs(solution)))
     floor = max(uncertainty, 4 * ROUNDING)
@@ -74,10 +74,10 @@ def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -
 
 
 def poisson_defect(system: System, parameters: Mapping[str, float], method: Method, x: Floats, h: float) -> float:
-    """Return max |DΦ π DΦᵀ − π∘Φ| relative to |DΦ| |π| |DΦ|ᵀ; DΦ by finite differences if the code has no tangent map.
+    """Return max |DΦ π DΦᵀ − π∘Φ| relative to |DΦ| |π| |DΦ|ᵀ.
 
-    Where terms of π nearly cancel, rounding of the state limits the accuracy of π; there the defect is relative to
-    Σ |x_i ∂_i π|.
+    DΦ is computed by finite differences if the code has no tangent map. If terms of π nearly cancel, rounding of the
+    state limits the accuracy of π; then the defect is relative to Σ |x_i ∂_i π|.
     """
     tangent, image = method.tangent(x, h) if method.tangent else by_differences(method, x, h), method.step(x, h)
     start_tensor, end_tensor = (poisson_matrix(system, parameters, state) for state in (x, image))
@@ -95,8 +95,8 @@ def poisson_defect(system: System, parameters: Mapping[str, float], method: Meth
 def tangent_error(method: Method, x: Floats, h: float) -> float:
     """Return the difference between the tangent map and finite differences of the step, relative to the largest entry.
 
-    The best of several displacements counts: near a singularity a large one leads beyond it, and coordinates may differ
-    widely in size.
+    The smallest difference for several displacements is returned: near a singularity a large displacement leads beyond
+    it, and coordinates may differ widely in size.
     """
     if method.tangent is None:
         return 0.0
@@ -114,8 +114,7 @@ def reversal(method: Method, x: Floats, h: float) -> float:
 
 def largest_step(method: Method, states: Sequence[Floats], h: float, max_factor: float = 256.0) -> float:
     """Return the largest factor f, to 5 %, for which a step of size f·h succeeds from all states; 0 if a step h/64
-    fails.
-    """
+    fails."""
 
     def works(factor: float) -> bool:
         try:

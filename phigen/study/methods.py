@@ -22,8 +22,8 @@ class Method:
     """One-step method: ``step(x, h)`` maps states (DIM,), ``rows(x, h, steps, stride)`` returns (rows, DIM).
 
     Both raise `StepError`. ``tangent(x, h)`` is the tangent map (DIM, DIM) that the code provides, None if there is
-    none. All steps begin at the same time; ``later(h)`` is the method with a time later by h. ``together`` makes one
-    step of many members.
+    none. All steps begin at the same time; ``later(h)`` is the method whose steps begin at a time later by h.
+    ``together`` makes one step of many members.
     """
 
     name: str
@@ -56,7 +56,7 @@ def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | N
         lambda x, h, steps, stride: fixed_gauge.integrate(x, h, steps, stride, t0=begin, parameters=parameters).x,
         lambda x, h: fixed_gauge.step_tangent(x, h, t0=begin, parameters=parameters)[1],
         (lambda h: of_solver(solver, parameters, gauge, t0 + h)) if solver.interface.time else None,
-        # members of an ensemble draw their own noise
+        # the members of an ensemble have different noise
         together if solver.target == "numpy" and not solver.interface.noise else None,
     )
 

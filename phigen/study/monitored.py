@@ -12,9 +12,8 @@ from phigen.symbolic.arrays import Floats
 
 
 def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
-    """Return the field g π∇H, the motion in τ where K = 0; dt/dτ is appended for states with the time as last
-    coordinate.
-    """
+    """Return the field g π∇H, the motion in τ for K = 0; dt/dτ is appended for states with the time as last
+    coordinate."""
     n, backend = solver.interface.dimension, solver.backend
 
     def field(x: Floats) -> Floats:

@@ -14,15 +14,15 @@ from phigen.study import classical
 from phigen.study.race import OWN, Race, Runner
 from phigen.symbolic.arrays import Floats
 
-#: Number of doublings and of halvings of the run's step.
+#: Numbers of doublings and of halvings of the run's step.
 COARSER, FINER = 6, 7
-#: Repetitions of a measurement, of which the fastest counts; least duration of each in seconds; longest duration of one
-#: run.
+#: Number of repetitions of a measurement, of which the fastest counts; least duration of each and longest duration of
+#: one run, in seconds.
 ROUNDS, LEAST_SECONDS, MOST_SECONDS = 5, 2e-3, 0.05
-#: Numbers of steps of the studied part of the run, tried in this order; too fast error growth hides the order of long
-#: parts.
+#: Numbers of steps of the studied part of the run, tried in this order. In long parts the errors may grow so fast that
+#: the order is not visible.
 SPANS = (4096, 256, 16)
-#: The order is determined from errors between the floor, times the first factor, and the second value.
+#: Range of errors from which the order is determined: from the floor times ABOVE_FLOOR to ASYMPTOTIC.
 ABOVE_FLOOR, ASYMPTOTIC = 30.0, 0.02
 #: Smallest measurable error relative to the solution, and the error below which rounding may dominate.
 ROUNDING, SMALL = 2.0**-52, 1e-6
@@ -58,8 +58,8 @@ class Study:
     """Measurements from 0 to ``time`` of the ``clock``, t or τ.
 
     Errors below ``floor`` are errors of the ``reference``. ``set_up`` is the time in seconds that the solver needs once
-    per trajectory; the times of the points do not contain it. All methods are implemented in ``language``; ``rounds``
-    is the number of repetitions.
+    for each trajectory; it is not included in the times of the points. All methods are implemented in ``language``;
+    ``rounds`` is the number of repetitions.
     """
 
     time: float
@@ -123,7 +123,7 @@ def error_of(state: Floats, target: Floats) -> float:
 
 def slope(errors: Mapping[int, float], floor: float) -> float:
     """Return the median slope of the last three halvings of the step in the asymptotic range; NaN if there are none."""
-    # Where a smaller step has a larger error, rounding dominates.
+    # If a smaller step has a larger error, rounding dominates.
     floor = max([floor, *(b for a, b in pairwise(errors.values()) if a < b and a < SMALL)])
     usable = {n: e for n, e in errors.items() if ABOVE_FLOOR * floor < e < ASYMPTOTIC}
     slopes = [math.log2(e / usable[2 * n]) for n, e in usable.items() if 2 * n in usable]
@@ -131,15 +131,16 @@ def slope(errors: Mapping[int, float], floor: float) -> float:
 
 
 def _states(run: Runner, end: float, span: int, target: Floats, floor: float) -> dict[int, Floats]:
-    """Return the final state for increasing numbers of steps, until rounding dominates the error or a run takes too
-    long.
+    """Return the final state for increasing numbers of steps.
+
+    The numbers end when rounding dominates the error or a run takes too long.
     """
     states: dict[int, Floats] = {}
     least, count = math.inf, 0
     for n in sorted({round(span * f * 2.0**k) for k in range(-COARSER, FINER + 1) for f in (1.0, 1.5)} - {0}):
         start = time.perf_counter()
         state = run(end / n, n, 1)
-        # The negated comparison also skips NaN, from a missing solution.
+        # This form of the comparison is also true for NaN, from a missing solution.
         if state is None or not (error := error_of(state, target)) < 1:
             continue
         states[n] = state

@@ -1,6 +1,6 @@
 """The solver and classical methods in one compiled C file, for a fair comparison of times.
 
-In Python a classical method would spend its time in the interpreter. Here all methods are one C file, compiled with
+In Python a classical method would spend its time in the interpreter. Here all methods are in one C file, compiled with
 the same flags, in which the vector field can be inlined.
 """
 
@@ -33,13 +33,13 @@ TABLEAUX: Mapping[str, tuple[Sequence[Mapping[int, float]], Mapping[int, float]]
     "dop853": (dop853.A[1:], dop853.B),
 }
 
-#: Function that makes a run of steps of size h several times; returns the final state, None if a step fails.
+#: Function (h, steps, repetitions) that makes a run several times; it returns the final state, None if a step fails.
 Runner = Callable[[float, int, int], Floats | None]
 
 
 @dataclass(frozen=True)
 class Race:
-    """Runners by label, and ``set_up``, which repeats the work that the solver does once per trajectory.
+    """Runners by label, and ``set_up``, which repeats the work that the solver does once for each trajectory.
 
     All of them are written in ``language``, ``C`` or ``Python``. The ``clock`` is the variable in which steps are
     uniform.
@@ -54,9 +54,9 @@ class Race:
 def compiled(
     compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """Return the solver and the explicit methods in C, in double precision; for monitored systems all step in τ.
+    """Return the runners of the solver and of explicit methods, compiled C in double precision.
 
-    Raises `ToolchainError`.
+    For monitored systems all methods step in τ. Raises `ToolchainError`.
     """
     from phigen.targets.rendering import render
 
@@ -102,7 +102,7 @@ def compiled(
 def interpreted(
     solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """Return the solver and the methods as run from Python; for monitored systems all step in τ."""
+    """Return the runners of the solver and of the methods in Python; for monitored systems all methods step in τ."""
 
     begin = t0 if solver.interface.time else None
 

@@ -1,4 +1,4 @@
-"""Errors of single precision for a method that is examined in double precision."""
+"""Errors of single precision, by comparison with a solver in double precision."""
 
 from __future__ import annotations
 
@@ -48,7 +48,8 @@ def measured(
 
 
 def farthest(single: Step, double: Step, states: Sequence[Floats], h: float) -> float:
-    """Return the largest relative difference of single steps from the same states, rounded to single precision."""
+    """Return the largest relative difference of steps in single precision from the same states, rounded to single
+    precision."""
     worst = 0.0
     for x in states:
         rounded = x.astype(np.float32).astype(np.float64)

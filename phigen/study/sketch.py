@@ -13,14 +13,14 @@ from phigen.symbolic.arrays import Floats
 
 Numbers = NDArray[np.int64]
 
-#: Largest number of stored rows of a run, and number of windows whose row with the largest error is stored as well.
+#: Largest number of stored rows of a run, and number of windows of which the row with the largest error is also stored.
 ROWS, WINDOWS = 8000, 400
 #: Largest number of stored points of a section.
 POINTS = 20_000
 
 
 class Thinned:
-    """Subset of at most ``most`` successive rows: every row, every second, every fourth, …
+    """Subset of at most ``max_rows`` of successive rows: every row, every second, every fourth, …
 
     The choice depends only on the number of rows. ``state`` is the complete state, as arrays.
     """
@@ -45,7 +45,7 @@ class Thinned:
         return int(self.state["seen"])
 
     def see(self, rows: Floats) -> None:
-        """Accept the next rows (rows, width)."""
+        """Receive the next rows (rows, width)."""
         interval, row_count = int(self.state["every"]), self.seen
         thinned = np.concatenate([self.rows, rows[-row_count % interval :: interval]])
         while len(thinned) > self._most:
@@ -84,7 +84,7 @@ class Sketch:
         self._peaks = {name: arrays[name] for name in self._peaks}
 
     def see(self, rows: Floats) -> None:
-        """Accept the next rows (rows, 2 + DIM + Casimirs + observables): t, x, energy, Casimirs, observables."""
+        """Receive the next rows (rows, 2 + DIM + Casimirs + observables): t, x, energy, Casimirs, observables."""
         if not len(rows):
             return
         numbered = np.column_stack([np.arange(self._thinned.seen, self._thinned.seen + len(rows)), rows])
@@ -95,7 +95,7 @@ class Sketch:
         first = self._peaks["first"]
         windows = (numbered[:, 0] * WINDOWS // max(self._of, 1)).astype(np.int64).clip(0, WINDOWS - 1)
         for k, values in enumerate(numbered[:, self._quantities].T):
-            with np.errstate(invalid="ignore"):  # ∞ − ∞
+            with np.errstate(invalid="ignore"):  # ∞ − ∞ is NaN
                 errors = np.abs(values - first[self._quantities][k])
             for window in np.unique(windows):
                 part = np.flatnonzero(windows == window)
@@ -114,7 +114,7 @@ class Sketch:
         broken: bool = False,
         observables: tuple[str, ...] = (),
     ) -> Trajectory:
-        """Return the stored rows in order; if the run is ``broken`` off, a row of NaN follows."""
+        """Return the stored rows in order. If the run was ``broken`` off, a row of NaN follows."""
         peaks = self._peaks["peaks"].reshape(-1, self._peaks["peaks"].shape[-1])
         stored_rows = np.concatenate(
             [self._thinned.rows, peaks[self._peaks["errors"].ravel() >= 0], self._peaks["last"][None]]

@@ -23,9 +23,9 @@ def strong_order(
 ) -> float:
     """Return the strong order: the slope of the errors of steps of h, h/2, h/4, … along the same Wiener paths.
 
-    An increment of a coarse step is the sum of the increments of the fine steps within. Reference solutions follow the
-    piecewise linear interpolation of the same path and use only the vector fields; they converge to the Stratonovich
-    solution.
+    An increment of a coarse step is the sum of the increments of the fine steps inside it. Reference solutions follow
+    the piecewise linear interpolation of the same path and use only the vector fields; they converge to the
+    Stratonovich solution.
     """
     draws, finest = solver.interface.draws, steps << (LEVELS + BEYOND)
     begin = t0 if solver.interface.time else None

@@ -17,23 +17,24 @@ from phigen.study.balance import powers, works
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.symbols import ELAPSED, initial
 
-#: Number of windows of equal length; comparing the largest energy errors of windows distinguishes drift from
-#: oscillation.
+#: Number of windows of equal length. Drift is distinguished from oscillation by the largest energy errors in the
+#: windows.
 WINDOWS = 10
 
 #: Value that marks a window without rows.
 _NOTHING = -1.0
-#: Windows are compared if each coordinate with turning points in the run has at least this number of them in the first
-#: window: one oscillation.
+#: Least number of turning points in the first window, for each coordinate with turning points in the run: one
+#: oscillation. Otherwise windows are not compared.
 _TURNS = 2
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Largest error of a conserved quantity, in its own unit.
+    """Largest error of a conserved quantity, in the unit of the quantity.
 
-    ``growth`` is the largest error in the last tenth of the run over that in the first; 1 without drift. It is NaN if
-    that says nothing: where the error is one of rounding, and where the first tenth has not seen the motion.
+    ``growth`` is the largest error in the last tenth of the run, divided by that in the first tenth; it is about 1
+    without drift. It is NaN if it would be meaningless: if the errors are rounding errors, or if the first tenth of the
+    run contains no full oscillation.
     """
 
     error: float
@@ -45,9 +46,9 @@ class Drift:
 class Summary:
     """Errors of one method; ``exact`` is the largest error against the closed form, None if there is none.
 
-    ``good`` rows of the states are finite; the numbers are about these. The errors of a method that breaks down at once
-    are infinite. Where H is no invariant, ``energy`` is about H − ``work``, where ``work`` is an integral with an error
-    of about ``off`` in the same unit, and ``change`` is the largest change of H itself.
+    The first ``good`` rows of the states are finite, and the numbers are about these rows. If a method fails at once,
+    its errors are infinite. If H is not an invariant, ``energy`` is about H − ``work``, where ``work`` is an integral
+    with an error of about ``off`` in the same unit, and ``change`` is the largest change of H itself.
     """
 
     method: str
@@ -76,17 +77,17 @@ class Summary:
 def summarise(
     method: str, system: System, run: Run | None, parameters: Mapping[str, float], t: Floats, x: Floats
 ) -> Summary:
-    """Return the summary of states ``x`` (rows, DIM) at times ``t``; all quantities are evaluated from formulas."""
+    """Return the summary of states ``x`` (rows, DIM) at times ``t``. All quantities are evaluated from formulas."""
     watch = Watch(method, system, run, parameters, len(x))
     watch.see(t, x)
     return watch.summary()
 
 
 class Watch:
-    """Running summary of the states of one method, in memory that does not grow with their number.
+    """Running summary of the states of one method, with memory that does not grow with the number of states.
 
-    ``rows`` is how many there will be, for the windows in which drift is told from oscillation. ``state`` is all that
-    was seen, as arrays.
+    ``rows`` is the expected number of rows; it determines the windows by which drift is distinguished from oscillation.
+    ``state`` is the complete state of the summary, as arrays.
     """
 
     def __init__(
@@ -114,7 +115,7 @@ class Watch:
             "broken": np.zeros((), dtype=bool),
         }
         self._powers = powers(system)
-        if self._powers:  # last time and its powers; work since the start and its estimated error
+        if self._powers:  # last time and power with its derivatives; work since the start and its estimated error
             self.state |= {"instant": np.full(1 + len(self._powers), np.nan), "work": np.zeros(2)}
             self.state |= {"change": np.zeros(())}
         if system.driven:
@@ -131,12 +132,13 @@ class Watch:
         return int(self.state["good"])
 
     def break_down(self) -> None:
-        """Accept that the method fails: there are no further rows."""
+        """Record that the method failed: no further rows follow."""
         self.state["broken"] = np.asarray(True)
 
     def see(self, t: Floats, x: Floats) -> None:
-        """Accept the next rows, times (rows,) and states (rows, DIM); rows from the first non-finite one on are
-        ignored.
+        """Receive the next rows, times (rows,) and states (rows, DIM).
+
+        The first non-finite row and all rows after it are ignored.
         """
         state, good_rows = self.state, int(self.state["good"])
         finite = np.isfinite(x).all(axis=1)
@@ -158,7 +160,7 @@ class Watch:
         state["good"] = np.asarray(good_rows + count)
         windows = _windows(np.arange(good_rows, good_rows + count), self._about[1])
         for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
-            with np.errstate(invalid="ignore"):  # errors are undefined where the initial value is
+            with np.errstate(invalid="ignore"):  # errors are undefined if the initial value is
                 np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
         if self._powers:  # the balance starts at the initial energy
             changes = self._units()[0].errors(energies, float(state["start"][0]))
@@ -170,8 +172,9 @@ class Watch:
         state["final"] = x[-1].copy()
 
     def _work(self, t: Floats, slopes: Sequence[Floats]) -> Floats:
-        """Return the work done up to each of the times, which follow those received before, from the powers at these
-        times.
+        """Return the work done up to each of the times, from the power and its derivatives at these times.
+
+        The times follow those received before.
         """
         state = self.state
         if not self.begun:
@@ -188,7 +191,7 @@ class Watch:
         (method, rows), state = self._about, self.state
         steps = self._run.steps if self._run else rows
         telling = rows >= 2 * WINDOWS and _is_telling(state["turns"])
-        failed = bool(state["broken"]) and self.good <= 1  # at the first row after the start
+        failed = bool(state["broken"]) and self.good <= 1  # the method failed in the first row after the start
         maxima = np.full_like(state["maxima"], math.inf) if failed else state["maxima"]
         drifts = [_drift(m, unit, steps, telling) for m, unit in zip(maxima, self._units(), strict=True)]
         drift_of = iter(drifts)
@@ -232,13 +235,13 @@ class Watch:
 
 
 def _is_telling(turns: NDArray[np.int64]) -> bool:
-    """Return whether the first window contains an oscillation, from the turning points in it and in the whole run."""
+    """Whether the first window contains an oscillation, from the turning points in it and in the whole run."""
     turning = turns[1] > 0
     return bool(turning.any() and (turns[0, turning] >= _TURNS).all())
 
 
 def _windows(rows: NDArray[np.int64], row_count: int) -> NDArray[np.int64]:
-    """Return the window of each row of a run: one of `WINDOWS` parts, or an extra window for the first row."""
+    """Return the window of each row of a run: one of `WINDOWS` windows, or an additional window for the first row."""
     share, remainder = divmod(row_count - 1, WINDOWS)
     window_ends = np.cumsum([share + (k < remainder) for k in range(WINDOWS)])
     return np.where(rows == 0, WINDOWS, np.searchsorted(window_ends, rows - 1, side="right"))
@@ -254,7 +257,7 @@ def _drift(maxima: Floats, unit: Unit, steps: int, telling: bool) -> Drift:
 def exact_solution(
     system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats
 ) -> dict[str, Floats]:
-    """Return the closed form of a run by coordinate, for the coordinates that the run states."""
+    """Return the closed form of a run at the times ``t``, for the coordinates with a closed form in the run."""
     values: dict[str, Any] = {ELAPSED: t, **parameters}
     values |= {initial(c): float(v) for c, v in zip(system.coordinates, x0, strict=True)}
     arrays = evaluate(list(run.exact.values()), values)

@@ -1,8 +1,8 @@
-"""Verification: properties of a generated solver, measured on a run and judged against stated limits.
+"""Verification: properties of a generated solver, measured on a run and judged by limits.
 
 Exact properties must hold to round-off: Casimirs, the Poisson identity, reversibility, agreement of the targets. The
-order must be the stated one, and the energy must not drift. Solvers from approximate bi-realisations are Poisson only
-up to a stated power of h, and that power is checked.
+order must be the stated one, and the energy must not drift. Steps of solvers from approximate bi-realisations are
+Poisson maps only up to a stated power of h, and that power is checked.
 """
 
 from __future__ import annotations
@@ -48,15 +48,16 @@ STATES = 4
 
 
 def order_limit(stated: float, slack: float = ORDER_SLACK) -> str:
-    """The limit for an observed order: ``at least 3.7, stated 4``."""
+    """Return the limit of an observed order as text: ``at least 3.7, stated 4``."""
     return f"at least {stated - slack:.1f}, stated {stated:g}"
 
 
 @dataclass(frozen=True)
 class Check:
-    """One property: the measured ``value``, ``passed``, and the ``limit`` in words, empty if the value is not judged.
+    """One property: the measured ``value``, whether it ``passed``, and the ``limit`` as text; "" if the value is not
+    judged.
 
-    ``reason`` says why it failed. ``others`` holds the values of the methods to compare with.
+    ``reason`` says why it failed. ``others`` has the values of the methods for comparison.
     """
 
     name: str
@@ -69,7 +70,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of one spec on one run; ``label`` states the claim of the solver, ``units`` the units of errors.
+    """All checks of one spec on one run. ``label`` states the claim of the solver, ``units`` the units of errors.
 
     For lattices the text ``said`` states the units. ``clock`` is the variable in which steps are uniform, t or τ.
     """
@@ -88,7 +89,7 @@ class Verification:
 
     @property
     def made(self) -> str:
-        """Number and size of the steps, in words."""
+        """The number and the size of the steps, as text."""
         return f"{self.steps} steps of {self.step:.9g}" + " in τ" * (self.clock == "τ")
 
     @property
@@ -99,7 +100,8 @@ class Verification:
 
 @dataclass(frozen=True)
 class Subject:
-    """Subject of a verification: methods of all targets (``own``), methods for comparison, numbers of the run."""
+    """Subject of a verification: methods of all targets (``own``), methods for comparison, and the settings of the
+    run."""
 
     compilation: Compilation
     solvers: Mapping[str, Solver]
@@ -110,7 +112,7 @@ class Subject:
     h: float
     steps: int
     t0: float
-    field: Callable[[Floats], Floats]  # the motion in the variable in which steps are uniform
+    field: Callable[[Floats], Floats]  # vector field in the variable in which steps are uniform, t or τ
 
     @property
     def solver(self) -> Solver:
@@ -142,12 +144,10 @@ def verify(
     quick: bool = False,
     single: Solver | None = None,
 ) -> Verification:
-    """Measure and judge the solvers of a compilation (by target, with their tangent maps) on the numbers of a run.
+    """Measure and judge the solvers of a compilation (by target, with their tangent maps) on the settings of a run.
 
     All steps begin at the time ``t0``, also those from states along the run. ``single`` is the same solver in single
-    precision, if there is one: it is measured against the others.
-
-    Raises `StepError` if the run itself cannot be made.
+    precision, if there is one: it is compared with the others. Raises `StepError` if a step of the run fails.
     """
     x = np.array(start, dtype=np.float64)
     gauge = gauge_at(compilation, x, parameters)
@@ -159,7 +159,7 @@ def verify(
     step_count = min(steps, FEW_STEPS if quick else MOST_STEPS)
     subject = Subject(compilation, solvers, methods, classical, parameters, x, h, step_count, t0, field)
     rows = subject.main.rows(x, h, step_count, 1)
-    # With noise, trajectories may start where relative errors of single steps have no scale: at rest, at the origin.
+    # With noise, trajectories may start at rest or at the origin, where relative errors of single steps have no scale.
     first = step_count // STATES if noisy else 0
     states = [rows[i] for i in np.linspace(first, step_count, STATES, dtype=int)] if step_count >= STATES else [x]
     symmetry = "symmetric" if compilation.symmetric else "not symmetric"
@@ -192,7 +192,7 @@ def verify(
 
 
 def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) -> tuple[Check, ...]:
-    """Yield the checks of all groups, each group as a stage of the progress display."""
+    """Return the checks of all groups; each group is a stage of the progress display."""
     results: list[Check] = []
     with progress.stage(f"{name}: measurements", len(groups)) as running:
         for title, checks in groups.items():
@@ -203,7 +203,7 @@ def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) ->
 
 
 def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float]) -> Floats | None:
-    """Return the gauge that a solver chooses for the trajectory from x; None for solvers without gauge."""
+    """Return the gauge that a solver chooses for the trajectory from x; None for solvers without a gauge."""
     if not compilation.program.held:
         return None
     from phigen.api import solver_of
@@ -213,7 +213,8 @@ def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float
 
 
 def order_check(subject: Subject, state: Floats, *, quick: bool = False) -> Check:
-    """Return the check of the observed order; systems with noise are measured without it, from a state of the run."""
+    """Return the check of the observed order. For systems with noise, the order without noise is measured, from a
+    state of the run."""
     if not subject.compilation.system.noise:
         return _order_check("observed order", subject, quick=quick)
     noiseless = without_noise(subject.solver, subject.parameters, subject.t0)
@@ -276,7 +277,10 @@ def _order_check(title: str, subject: Subject, *, quick: bool) -> Check:
 
 
 def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
-    """Return the solution at a time with its uncertainty, by DOP853 with halved steps until two results agree."""
+    """Return a function from a time to the solution and its uncertainty.
+
+    The solution is computed by DOP853, with steps halved until two results agree.
+    """
     solver = of_classical("dop853", subject.solver, subject.parameters, subject.t0, subject.field)
     solutions: dict[float, tuple[Floats, float]] = {}
 
@@ -308,7 +312,7 @@ def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
     system, steps = subject.compilation.system, subject.steps
     compared = subject.others
     times: Floats = subject.t0 + subject.h * np.arange(len(rows), dtype=np.float64)
-    if system.forces and subject.compilation.monitor:  # work needs the physical time, which the other methods lack
+    if system.forces and subject.compilation.monitor:  # the work needs the physical time, which the other methods lack
         trajectory = subject.solver.integrate(subject.start, subject.h, len(rows) - 1, 1, parameters=subject.parameters)
         times, compared = trajectory.t, {}
     summary = _summary(subject, subject.main.name, rows, times)
@@ -361,9 +365,8 @@ def _summary_of(subject: Subject, method: Method, times: Floats) -> Summary | No
 
 
 def _recurrent(rows: Floats) -> bool:
-    """Return whether the second half of the states stays within the range of the first, plus 20 %: windows are
-    comparable.
-    """
+    """Whether the second half of the states stays within the range of the first half, plus 20 %. Then windows can be
+    compared."""
     half_count = len(rows) // 2
     low, high = rows[:half_count].min(axis=0), rows[:half_count].max(axis=0)
     margin = 0.2 * np.max(high - low)
@@ -406,11 +409,11 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
 
 
 def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Floats]) -> Iterator[Check]:
-    """Yield the checks of gradients of short runs, against tangent maps and differences, and of batched against single
+    """Yield the checks of gradients of short runs: against tangent maps and differences, and of batched against single
     runs.
 
-    The multiples of a gauge are held fixed, as gradients treat them as constants. In monitored systems e = −H(x₀)
-    varies with the start, except in tangent maps, which keep e constant.
+    The multiples of a gauge are held fixed, since gradients treat them as constants. In monitored systems e = −H(x₀)
+    depends on the initial state, except in tangent maps, which treat e as a constant.
     """
     program = subject.compilation.program
     if not program.extras.adjoint:
@@ -434,7 +437,7 @@ def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Flo
 def _approximate(
     subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], largest: float
 ) -> tuple[str, bool, str]:
-    """Return limit, verdict and reason for a truncation of degree d: the defect is O(h^(d+1))."""
+    """Return limit, verdict and reason for a truncation of degree d, whose defect must be O(h^(d+1))."""
     degree = subject.compilation.degree
     if degree is None:
         return "", True, ""
@@ -471,7 +474,7 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
 def single_checks(
     subject: Subject, solver: Solver | None, gauge: Floats | None, states: Sequence[Floats]
 ) -> Iterator[Check]:
-    """Yield the checks of single precision, where the spec requests it."""
+    """Yield the checks of single precision, if the spec requests it."""
     if solver is None:
         return
     method = of_solver(solver, subject.parameters, gauge, subject.t0)
@@ -490,7 +493,7 @@ def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
         return
     observed = backward.observed_powers(series, subject.main, subject.start, subject.h)
     for m, (power, observed_power) in enumerate(zip(series.powers[1:], observed[1:], strict=True), 1):
-        # With a wrong correction, the power is that without the correction.
+        # With a wrong last correction, the observed power is that without this correction.
         limit = power - MODIFIED_SLACK * (power - series.powers[m - 1])
         reason = f"shrinks like h^{observed_power:.2f} instead of h^{power}"
         name = f"modified H, {m} correction{'s' * (m > 1)}: order"

@@ -1,1 +1,1 @@
-"""Sweeps: ensembles of any size, computed in chunks by processes on one machine or on many."""
+"""Sweeps: ensembles of any size, computed in chunks by processes on one or several machines."""

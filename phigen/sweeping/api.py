@@ -49,19 +49,22 @@ def sweep(
     profile: str | None = None,
     progress: Callable[[int, int], Any] | None = None,
 ) -> xr.Dataset:
-    """Make a run for many parameters, initial values or steps; return results with the dimensions of ``over``.
+    """Make a run for many parameters, initial values or steps, and return results with the dimensions of ``over``.
 
-    The sweep is the one with this ``name`` in the spec, the first by default; other arguments replace its settings. A
-    spec without sweeps needs ``over``, and one without runs needs ``initial``, ``h`` and ``steps``. ``over`` maps names
-    of parameters, coordinates, ``step`` or ``start`` to arrays, or to ``{"from": a, "to": b, "count": n, "scale":
-    "log"}``; without a count the values are random, and ``over`` also contains ``random: n`` and ``seed: k``. The
-    result lies in the Zarr store ``output``, from which data are loaded on demand; an existing store of the same sweep
-    is continued. Without ``output`` the result is in memory. ``scheduler`` is the address of a Dask cluster; the
-    default are ``workers`` processes of this machine, one for each core, or for each device of the target. ``target``,
-    ``order``, ``scheme`` and ``profile`` are those of `phigen.compile`. ``progress`` receives the numbers of computed
-    and of failed members after each chunk. Scripts that call this function need the guard ``if __name__ ==
-    "__main__":``, as it starts processes. Raises `SpecError`, `MissingPackageError` without dask, distributed, xarray
-    or zarr, ``phigen.errors.FileError`` and `PhigenError`.
+    The sweep is the one called ``name`` in the spec, the first by default; other arguments replace its settings. A spec
+    without sweeps needs ``over``, and one without runs needs ``initial``, ``h`` and ``steps``. ``over`` maps names of
+    parameters, coordinates, ``step`` or ``start`` to arrays, or to ``{"from": a, "to": b, "count": n, "scale":
+    "log"}``. Without a count the values are random, and ``over`` must also contain ``random: n`` and ``seed: k``.
+
+    The result is in the Zarr store ``output``, from which data are loaded on demand; an existing store of the same
+    sweep is continued. Without ``output`` the result is in memory. ``scheduler`` is the address of a Dask cluster.
+    Without it, ``workers`` processes of this machine are used, by default one for each core, or for each device of the
+    target. ``target``, ``order``, ``scheme`` and ``profile`` are those of `phigen.compile`. ``progress`` receives the
+    numbers of computed and of failed members after each chunk.
+
+    The function starts processes, so scripts that call it need the guard ``if __name__ == "__main__":``. Raises
+    `SpecError`, `MissingPackageError` without dask, distributed, xarray or zarr, ``phigen.errors.FileError`` and
+    `PhigenError`.
     """
     from phigen.sweeping.store import imported
     from phigen.sweeping.sweep import SweepSetting, made
@@ -102,7 +105,7 @@ def _run_of(
     steps: int | None,
     parameters: Mapping[str, float] | None,
 ) -> Run:
-    """Return the run to repeat: that of the spec with the arguments of the call in place of its settings."""
+    """Return the run to repeat: that of the spec, with its settings replaced by arguments of the call."""
     sweep = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()), None)
     run = run or (sweep.run if sweep else next(iter(spec.runs), None))
     if run is not None and run not in spec.runs:
@@ -192,7 +195,10 @@ def _sweep_of(
 
 
 def _plain_entries(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
-    """Return the entries of ``over`` that are not ranges; a range under the same name belongs to a parameter."""
+    """Return the entries of ``over`` that are not ranges.
+
+    A range under such a name belongs to a parameter of that name.
+    """
     if not isinstance(over, Mapping):
         raise TypeError(f"over must map names to ranges or lists, not {over!r}")
     parameters = {p.name for p in spec.parameters}
@@ -221,7 +227,7 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
 
 
 def _draws(value: Mapping[str, Any]) -> Axis:
-    """Return the numbers of random draws as a dimension of the sweep."""
+    """Return the axis of the random draws, a dimension of the sweep."""
     if set(value) != {"count"}:
         raise ValueError(f"over: seed has a count, and no other key, not {dict(value)!r}")
     return Axis("seed", count=arguments.count(value["count"], "over: seed: count", 1, limits.SWEPT))

@@ -1,6 +1,6 @@
-"""Work of a sweep worker on one chunk: integrate the members, measure, store.
+"""Work of a sweep worker on one chunk: integrate its members, measure, and store the results.
 
-A worker receives the path of the store and the number of a chunk; solver and plan are in the store.
+A worker receives the path of the store and the number of a chunk. The store contains the solver and the plan.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from phigen.sweeping.devices import own_device
 from phigen.sweeping.statistics import MOST_BYTES, statistics_of
 from phigen.sweeping.store import Job, open_job
 
-#: Status of members that were not run because their parameters or initial values are refused.
+#: Status of members that were not integrated because their parameters or initial values are refused.
 _REFUSED = STATUSES.index("BAD_ARGUMENT")
 
 
@@ -43,14 +43,17 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
     for name, values in results.items():
         if name != "status":
             job.root[name][region] = values.reshape(sizes + values.shape[1:])
-    # The status is written last, so that members with a status are complete.
+    # The status is written last: members that have a status are complete.
     job.root["status"][region] = results["status"].reshape(sizes)
     return count, int(np.count_nonzero(results["status"]))
 
 
 @lru_cache(maxsize=4)
 def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
-    """Return the job and its solver, loaded once per process; one process of a machine compiles, the others wait."""
+    """Return the job and its solver, which are loaded once per process.
+
+    One process of a machine compiles the solver; the others wait.
+    """
     job = open_job(store)
     device = own_device(job.plan.about["target"])
     with _exclusive_lock(job.interface.name):
@@ -61,10 +64,10 @@ def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
 
 @contextlib.contextmanager
 def _exclusive_lock(name: str) -> Iterator[None]:
-    """Exclude all other processes of this machine from the block."""
+    """Return a context in which no other process of this machine is at the same time."""
     try:
         import fcntl
-    except ImportError:  # Windows has no such lock, and several processes may compile
+    except ImportError:  # Windows has no such lock; several processes may then compile
         yield
         return
     folder = cache.directory()
@@ -82,9 +85,10 @@ def _exclusive_lock(name: str) -> Iterator[None]:
 
 
 def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Floats]:
-    """Return results and statuses of the members with these numbers. Each member has its own path of the noise."""
+    """Return the results and statuses of the members with these numbers. Each member has a different path of the
+    noise."""
     plan, count = job.plan, len(numbers)
-    # Numbers common to all members have the shape (): solvers then share the coefficients of steps.
+    # Numbers common to all members have the shape (); solvers then share the coefficients of steps.
     parameters = {name: varied.get(name, np.asarray(value)) for name, value in plan.parameters.items()}
     x0 = np.stack([varied.get(c, np.full(count, v)) for c, v in zip(plan.coordinates, plan.initial, strict=True)], 1)
     h, t0 = varied.get("step", np.asarray(plan.h)), varied.get("start", np.asarray(plan.t0))
@@ -127,14 +131,14 @@ def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: A
 
 
 def _spread(values: Floats, allowed: Any, count: int) -> Floats:
-    """Distribute the values of allowed members over all members; NaN elsewhere."""
+    """Return an array for all members with the values of the ``allowed`` ones, and NaN for the others."""
     spread = np.full((count, *values.shape[1:]), np.nan)
     spread[allowed] = values
     return spread
 
 
 def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str]]:
-    """Return states (rows, members, DIM), of which the last row is final, and the status of each failed member."""
+    """Return states (rows, members, DIM), whose last row is the final one, and the status of each failed member."""
     failures: dict[int, str] = {}
     try:
         states = solver.backend.ensemble(members, 1)
@@ -144,7 +148,7 @@ def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str
 
 
 def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
-    """Return the number of crossings of the section in the direction of the run, counted from step to step."""
+    """Return for each member the number of crossings of the section, in the direction that the run states."""
     section, time, signs = job.section()
     room = max(1, MOST_BYTES // (8 * members.x0.shape[1] * (members.steps + 1)))
     counts = np.zeros(len(members))

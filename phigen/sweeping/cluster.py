@@ -11,10 +11,10 @@ from phigen.errors import PhigenError
 from phigen.sweeping.chunk import make
 from phigen.sweeping.store import imported
 
-#: Number of attempts at a chunk whose worker died.
+#: Number of attempts at a chunk during which workers died.
 TRIES = 4
 
-#: Number of chunks submitted at a time for each thread of the workers.
+#: Number of chunks submitted at a time, for each thread of the workers.
 _AHEAD = 4
 
 #: Time limit for the answer of a scheduler.
@@ -25,15 +25,16 @@ Tell = Callable[[int, int], None]
 
 
 class SweepError(PhigenError):
-    """A sweep stopped; finished chunks are in its store, and the same call continues from there."""
+    """A sweep stopped. Finished chunks are in its store; the same call continues the sweep."""
 
     exit_code = 2
 
 
 @contextlib.contextmanager
 def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
-    """Return a client of the cluster at an address, or of local processes, and the number of chunks submitted at a
-    time.
+    """Return a context with a client of the cluster at an address, or of local processes.
+
+    It yields the client and the number of chunks submitted at a time.
     """
     distributed, dask = imported("distributed"), imported("dask")
     if scheduler is not None:
@@ -45,7 +46,7 @@ def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
             yield client, max(1, sum(client.nthreads().values()))
         return
     with (
-        # A dying worker may have held several chunks; a chunk counts as the cause only after TRIES attempts.
+        # A dying worker may have had several chunks; a chunk counts as the cause only after TRIES attempts.
         dask.config.set({"distributed.scheduler.allowed-failures": TRIES, "distributed.worker.profile.enabled": False}),
         distributed.LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=logging.ERROR
@@ -56,7 +57,7 @@ def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
 
 
 def make_all(client: Any, slots: int, store: str, digest: str, chunks: Sequence[int], tell: Tell) -> None:
-    """Compute the chunks with these numbers. Raises `SweepError`, and passes on the exceptions of chunks."""
+    """Compute the chunks with these numbers. Raises `SweepError`, and the exceptions of chunks."""
     distributed = imported("distributed")
     tries = dict.fromkeys(chunks, 0)
     left = iter(chunks)

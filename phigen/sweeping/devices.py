@@ -12,7 +12,7 @@ from phigen.sweeping.store import imported
 
 
 def workers_of(target: str) -> int:
-    """Return the number of workers on this machine: one for each device of a target, or for each core."""
+    """Return the default number of workers on this machine: one for each device of a target, or for each core."""
     if target not in registry.DEVICES:
         return cores()
     return 1 if os.environ.get(CHOICE) else devices_of(target)
@@ -21,7 +21,7 @@ def workers_of(target: str) -> int:
 def own_device(target: str) -> int | None:
     """Return the device number of this worker; None for the default device or the one that `CHOICE` selects.
 
-    Dask numbers the workers of a machine; successive workers use successive devices.
+    Dask numbers the workers of a machine; consecutive workers use consecutive devices.
     """
     if target not in registry.DEVICES or os.environ.get(CHOICE):
         return None

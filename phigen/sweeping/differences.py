@@ -1,4 +1,4 @@
-"""Differences between the sweep in a store and a requested one, in what determines the results."""
+"""Differences between the sweep in a store and a requested one, in the settings that determine the results."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from phigen.sweeping import store
 from phigen.sweeping.plan import Plan
 from phigen.targets import header
 
-#: Names of the entries of a plan in messages. Names of sweeps and runs, and the division into chunks, are left out: no
-#: result depends on them.
+#: Names of the entries of a plan in messages. The names of sweeps and runs and the division into chunks are not among
+#: them, since results do not depend on them.
 _ENTRIES = {
     "coordinates": "coordinates",
     "sizes": "sizes of the lattice",
@@ -35,20 +35,20 @@ _ENTRIES = {
     "frames": "frames:",
 }
 
-#: Entries on which only statistics of observables over a run depend.
+#: Entries that affect only the statistics of observables over a run.
 _AVERAGED = {"after": "average: after:", "blocks": "average: blocks:", "stride": "stride:"}
 
-#: Further facts about a plan, by their names in messages.
+#: Additional properties of a plan, with their names in messages.
 _FACTS = {"target": "target", "phigen": "version of phigen", "folder": "folder of the spec", "contents": "data files"}
 
-#: Longest value that a message shows.
+#: Largest number of characters of a value in a message.
 _SHORT = 40
 
 
 def differences(
     job: store.Job, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> list[str]:
-    """Return how the sweep in a store differs from a plan: one phrase for each entry that determines results.
+    """Return the differences of the sweep in a store from a plan: one phrase for each entry that determines results.
 
     ``solver`` describes the solver (see `store.solver_data`), ``listed`` the values from a file of members.
     """
@@ -66,12 +66,13 @@ def differences(
 
 
 def _facts(about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the further facts about a plan, with the folder of the spec in place of its file."""
+    """Return the additional properties of a plan, with the folder of the spec in place of its file."""
     return {**about, "folder": str(Path(about["file"]).parent) if "file" in about else None}
 
 
 def _phrases(name: str, stored: Any, requested: Any) -> list[str]:
-    """Return ``number of steps 60, not 61``, or ``other initial values``; for mappings, one phrase for each entry."""
+    """Return phrases such as ``number of steps 60, not 61`` or ``other initial values``; for mappings, one for each
+    entry."""
     if stored == requested:
         return []
     if isinstance(stored, dict) and isinstance(requested, dict) and stored.keys() == requested.keys():
@@ -83,7 +84,7 @@ def _phrases(name: str, stored: Any, requested: Any) -> list[str]:
 
 
 def _differences_of_solver(job: store.Job, solver: Mapping[str, Any]) -> list[str]:
-    """Return differences of the solver, apart from the comments and the digest of the spec in its files."""
+    """Return differences of the solver; comments and the digest of the spec in its files are ignored."""
     stored = store.solver_data(job.interface, job.files, job.functions, job.spec)
     stored_texts, texts = ([*about["files"].values(), about["functions"]] for about in (stored, solver))
     same = stored["interface"] == solver["interface"] and [*map(_body, stored_texts)] == [*map(_body, texts)]
@@ -91,17 +92,18 @@ def _differences_of_solver(job: store.Job, solver: Mapping[str, Any]) -> list[st
 
 
 def _body(text: str) -> str:
-    """Return a generated file without its header and the digest of its spec."""
+    """Return a generated file without its header and without the digest of its spec."""
     return re.sub(r'(SPEC_SHA256\W+)"[0-9a-f]{64}"', r"\1", header.split(text)[1])
 
 
 def _differences_of_run(job: store.Job, plan: Plan, spec: Spec) -> list[str]:
-    """Return differences of what workers read from the run in the spec: sections, and the starts of lattices."""
+    """Return differences in the settings of the run that workers read from the spec: sections, and initial states of
+    lattices."""
     if "crossings" not in plan.keep and not plan.sizes:
         return []
     stored_spec = specs.loads(job.spec)
     stored, run = stored_spec.runs.get(job.plan.about["run"]), spec.runs.get(plan.about["run"])
-    if stored is None or run is None:  # a run that was built in Python
+    if stored is None or run is None:  # the run was built in Python
         return []
     phrases = []
     if "crossings" in plan.keep and (stored.section, stored.direction) != (run.section, run.direction):
@@ -112,7 +114,7 @@ def _differences_of_run(job: store.Job, plan: Plan, spec: Spec) -> list[str]:
 
 
 def _start(spec: Spec, run: Run) -> Iterator[Any]:
-    """Yield the settings that determine the start of a lattice and its arrays."""
+    """Yield the settings that determine the initial state of a lattice and its arrays."""
     if run.lattice is not None:
         yield from (run.lattice.state, run.lattice.bonds, run.lattice.arrays, run.initial)
     yield from ((p.name, p.values) for p in spec.parameters)

@@ -1,4 +1,4 @@
-"""Lattice members of sweeps: starts and parameters, runs, and stored results."""
+"""Lattice members of sweeps: initial states and parameters, runs, and stored results."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _REFUSED = STATUSES.index("BAD_ARGUMENT")
 
 
 def begun(spec: Spec, run: Run, draw: int) -> Start:
-    """Return the start of a member; its draw number is added to the seeds of the run's random values."""
+    """Return the initial state of a member; its draw number is added to the seeds of the run's random values."""
     if not draw or run.lattice is None:
         return start_of(spec, run)
 
@@ -59,7 +59,8 @@ def _start(job: Job, draw: int) -> Start:
 
 
 def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Any]:
-    """Return results and statuses of the members with these numbers. Each member has its own path of the noise."""
+    """Return the results and statuses of the members with these numbers. Each member has a different path of the
+    noise."""
     plan, count, shape = job.plan, len(numbers), (len(job.plan.coordinates), *job.plan.sizes)
     results: dict[str, Any] = {"status": np.full(count, _REFUSED, dtype=np.uint8)}
     results |= {name: np.full(count, np.nan) for name in plan.keep if name != "final"}
@@ -79,7 +80,7 @@ def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numb
 
 
 class _Member:
-    """One integrated lattice: its status, and its results if the status is 0."""
+    """One integrated lattice: its status, and its results if the status is 0 (success)."""
 
     def __init__(
         self, plan: Plan, solver: LatticeSolver, start: Start, member_values: dict[str, float], number: int
@@ -99,7 +100,7 @@ class _Member:
                 results["lyapunov"] = exponent(again, h, plan.steps)
         except BackendError as error:
             self.status = STATUSES.index(error.status)
-        except ValueError:  # numbers that are refused
+        except ValueError:  # the parameters or initial values are refused
             self.status = _REFUSED
         else:
             self.kept = results
@@ -152,14 +153,14 @@ class _Member:
         return self.session.hamiltonian(), [np.asarray(reduced(kind, densities)) for kind, densities in pairs]
 
     def _changes(self, before: tuple[float, list[Floats]]) -> dict[str, float]:
-        """Return the largest changes of energy and Casimirs from their values at the start."""
+        """Return the largest changes of energy and Casimirs from their initial values."""
         energy, casimirs = self._conserved_values()
         changes = [float(np.abs(a - b).max()) for a, b in zip(casimirs, before[1], strict=True)]
         return {"energy_error": abs(energy - before[0]), "casimir_error": max(changes, default=0.0)}
 
 
 def _values(plan: Plan, solver: LatticeSolver, start: Start, member_values: Mapping[str, float]) -> dict[str, Any]:
-    """Return the parameters of a member. Raises `ValueError` for refused values."""
+    """Return the parameters of a member. Raises `ValueError` for values that are refused."""
     numbers = {name: value for name, value in plan.parameters.items() if np.ndim(start.parameters[name]) == 0}
     return solver.values({**start.arguments, **numbers, **member_values}, {}, start.sizes)
 
@@ -174,7 +175,7 @@ def energies_at_start(
         start, t0 = _start(job, int(member_values.pop("seed", 0))), member_values.pop("start", job.plan.t0)
         try:
             session = solver.backend.start(start.state, _values(job.plan, solver, start, member_values), t0)
-        except (BackendError, ValueError):  # numbers that are refused
+        except (BackendError, ValueError):  # the parameters or initial values are refused
             continue
         energies[:, m] = session.hamiltonian(), np.abs(session.density()).sum()
     return energies[0], energies[1]
@@ -183,7 +184,7 @@ def energies_at_start(
 def exponent(session: LatticeSession, h: float, steps: int) -> float:
     """Return the largest Lyapunov exponent, by propagating a tangent vector through all steps.
 
-    ``session`` is at the start of the run. Raises `BackendError`.
+    ``session`` must be at the start of the run. Raises `BackendError`.
     """
     vector, grown = np.random.default_rng(0).normal(size=(1, *session.state().shape)), 0.0
     vector = vector / np.linalg.norm(vector)
@@ -207,5 +208,5 @@ def seconds_of_a_member(job: Job) -> float:
             session.advance(plan.h, ahead)
             done, ahead = done + ahead, 2 * ahead
     except (BackendError, ValueError):
-        return 1.0  # default where the trial fails
+        return 1.0  # default if the trial fails
     return (time.process_time() - began) / max(done, 1) * plan.steps + 1e-4

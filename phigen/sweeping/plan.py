@@ -1,8 +1,8 @@
 """Plan of a sweep: dimensions, chunks, and the values of each member, computed on demand.
 
-A plan is plain data, stored with the result as JSON: it documents the result, and it is all that a worker needs.
-Members are numbered in the order of the dimensions, with the last dimension the fastest. A chunk is a box of members
-with consecutive numbers.
+A plan is plain data, stored with the result as JSON. It documents the result, and contains all settings that a worker
+needs. Members are numbered in the order of the dimensions, with the last dimension the fastest. A chunk is a box of
+members with consecutive numbers.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ _MOST_BYTES = 256 * 2**20
 
 @dataclass(frozen=True)
 class Plan:
-    """Numerical description of a sweep; ``initial``, ``h``, ``t0`` and ``parameters`` are the values of what is not
-    varied.
+    """Numerical description of a sweep.
 
-    ``axes`` are the varied quantities; values along axes without a size are drawn with ``seed``. ``noise`` is the seed
-    of the noise, from which each member number has its own path. ``members`` is the number of members in a file or of
-    random members, whose only dimension is ``member``; ``listed`` names the columns of the file. Lattices of
-    ``sizes`` have no ``initial``: workers compute the start from the spec.
+    ``initial``, ``h``, ``t0`` and ``parameters`` are the values of quantities that are not varied. ``axes`` are the
+    varied quantities; values along axes without a size are drawn with ``seed``. ``noise`` is the seed of the noise;
+    each member number has a different path. ``members`` is the number of members in a file or of random members, whose
+    only dimension is ``member``; ``listed`` names the columns of the file. Lattices of ``sizes`` have no ``initial``:
+    workers compute the initial state from the spec.
     """
 
     name: str
@@ -53,7 +53,8 @@ class Plan:
     stride: int = 1  # steps between averaged rows, for lattices without frames
     chunk: tuple[int, ...] = ()
     sizes: tuple[int, ...] = ()
-    about: Mapping[str, Any] = field(default_factory=dict)  # further facts that determine the result: target, version
+    # additional properties that determine the result: target, version
+    about: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def grid(self) -> tuple[Axis, ...]:
@@ -62,7 +63,7 @@ class Plan:
 
     @property
     def drawn(self) -> tuple[Axis, ...]:
-        """The axes that are drawn."""
+        """The axes whose values are drawn at random."""
         return tuple(axis for axis in self.axes if not axis.size)
 
     @property
@@ -111,7 +112,7 @@ class Plan:
         return int(np.ravel_multi_index([part.start for part in region], self.shape))
 
     def varied(self, region: Sequence[slice], listed: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Return the varied values of the members of a region, (members,) each; ``listed`` are those from a file."""
+        """Return the varied values of the members of a region, (members,) each; ``listed`` are values from a file."""
         sizes = tuple(part.stop - part.start for part in region)
         first = self.first(region)
         columns: dict[str, Floats] = dict(listed)
@@ -159,9 +160,12 @@ def _spaced(axis: Axis, share: Floats) -> Floats:
 
 
 def _uniform(seed: int, column: int, first: int, count: int) -> Floats:
-    """Return random numbers of a column from position ``first`` on; they do not depend on the division into chunks."""
+    """Return random numbers of a column from position ``first`` on.
+
+    They do not depend on the division into chunks.
+    """
     stream = np.random.Philox(key=[seed, column])
-    stream.advance(first // 4)  # one round yields four numbers
+    stream.advance(first // 4)  # one round of the generator yields four numbers
     return np.random.Generator(stream).random(first % 4 + count)[first % 4 :]
 
 

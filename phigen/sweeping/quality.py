@@ -1,4 +1,4 @@
-"""Detection of sweep members whose energy error is too large for meaningful results."""
+"""Detection of sweep members whose energy error is so large that their results are meaningless."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class EnergyErrors:
 def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
     """Return the stored energy errors of a sweep of an ordinary system, in the units of `phigen.geometry.conservation`.
 
-    Failed and waiting members do not count. Nothing counts where time, forces or noise change the energy.
+    Failed and waiting members are not counted. If time, forces or noise change the energy, no member is counted.
     """
 
     def at_start(varied: Mapping[str, Floats], count: int) -> tuple[Floats, Floats]:
@@ -38,7 +38,8 @@ def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
 
 
 def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
-    """Return the stored energy errors of a sweep of a lattice; the units need the recomputed starts of members."""
+    """Return the stored energy errors of a sweep of a lattice; for the units, initial states of members are
+    recomputed."""
     if cell.driven or "energy_error" not in job.plan.keep:
         return EnergyErrors()
     from phigen.runtime.lattice import LatticeSolver
@@ -51,7 +52,8 @@ def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
 def _count_large_errors(
     job: Job, at_start: Callable[[Mapping[str, Floats], int], tuple[Floats, Floats]], limit: float
 ) -> EnergyErrors:
-    """Count the large errors; ``at_start`` returns initial energies of members and the magnitudes of their terms."""
+    """Return the number of large errors; ``at_start`` returns initial energies of members and the magnitudes of
+    their terms."""
     if "energy_error" not in job.plan.keep:
         return EnergyErrors()
     count, largest = 0, 0.0

@@ -16,7 +16,7 @@ from phigen.spec.names import STATISTICS
 from phigen.study.averages import Averages
 from phigen.sweeping.store import Job
 
-#: Largest size in bytes of states in memory at a time where statistics include every step.
+#: Largest size in bytes of states in memory at a time, if statistics include every step.
 MOST_BYTES = 64 * 2**20
 
 
@@ -25,9 +25,9 @@ def statistics_of(
 ) -> dict[str, Floats]:
     """Return the statistics by their keywords, (members,) each.
 
-    ``states`` (rows, members, DIM) are the frames of the sweep, or the final states alone. Statistics are over the
-    frames; without frames they are over every ``stride``-th step of the run, with start and end, as those of
-    ``phigen run``. Rows before ``plan.after`` do not count.
+    ``states`` (rows, members, DIM) are the frames of the sweep, or only the final states. Statistics are over the
+    frames; without frames they are over every ``stride``-th step of the run, including start and end, as those of
+    ``phigen run``. Rows before ``plan.after`` are not counted.
     """
     names = list(solver.interface.observables)
     values: dict[str, Floats] = {}
@@ -54,7 +54,7 @@ def _values(job: Job, solver: Solver, members: Members, states: Floats, numbers:
 
 
 def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: Floats) -> tuple[Floats, Floats]:
-    """Return means and standard deviations (members, observables) over rows, NaN where no row counts."""
+    """Return means and standard deviations (members, observables) over rows; NaN if no row is counted."""
     values = _values(job, solver, members, rows, numbers)
     after = job.plan.after
     if after is not None:
@@ -74,7 +74,7 @@ def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: F
     errors = np.empty(values.shape[1:])
     clock = np.stack(np.broadcast_arrays(members.t0, members.h, np.empty(len(members)))[:2], axis=1)
     clocks, which = np.unique(clock, axis=0, return_inverse=True)
-    for k, (t0, h) in enumerate(clocks.tolist()):  # members with the same times of rows are averaged together
+    for k, (t0, h) in enumerate(clocks.tolist()):  # members whose rows have the same times are averaged together
         alike = np.flatnonzero(which.reshape(-1) == k)
         columns = values[:, alike].reshape(len(values), -1)
         averages = Averages(columns.shape[1], after=job.plan.after, backwards=h < 0, blocks=job.plan.blocks)
@@ -86,7 +86,7 @@ def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: F
 def _member_groups(
     job: Job, solver: Solver, members: Members, states: Floats
 ) -> Iterator[tuple[slice, Members, Floats, Floats]]:
-    """Yield groups of members that fit into memory, with the states that count and their step numbers."""
+    """Yield groups of members that fit into memory, with the states that are counted and their step numbers."""
     if job.plan.frames:
         numbers = np.array(job.plan.rows, dtype=np.float64)
         yield slice(None), members, states[: len(numbers)], numbers

@@ -1,8 +1,8 @@
 """Store of a sweep: a Zarr group that xarray opens, with plan and solver in its attributes.
 
-The group contains an array for each result, in the chunks of the sweep, and the values along the dimensions. The
-array ``status`` is written last: a chunk whose members have a status is complete. The subgroup ``made_by`` has the plan
-and the source of the solver in its attributes.
+The group contains an array for each result, in the chunks of the sweep, and the values along the dimensions. The array
+``status`` is written last: a chunk whose members have a status is complete. The subgroup ``made_by`` has the plan and
+the source of the solver in its attributes.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ WAITING = 255
 
 _SOLVER_DATA = "made_by"
 
-#: Reserved names of a store, in addition to results and varied quantities.
+#: Reserved names of a store, in addition to those of results and varied quantities.
 OWN = ("status", "coordinate", "frame", "frames", _SOLVER_DATA)
 
 
 def imported(name: str) -> Any:
-    """Import and return a package that sweeps need. Raises `MissingPackageError`."""
+    """Return a package that sweeps need. Raises `MissingPackageError`."""
     return packages.imported(name, "sweeps", "dask distributed xarray zarr")
 
 
 @dataclass(frozen=True)
 class Job:
-    """Opened store: plan, interface, source of the solver, and NumPy source of the functions of states."""
+    """Opened store: the plan, the interface, the source of the solver, and the NumPy source of functions of states."""
 
     root: Any
     plan: Plan
@@ -86,21 +86,21 @@ class Job:
 
 
 def digest_of(plan: Plan, solver: Mapping[str, Any]) -> str:
-    """Return a hash of all that determines the results; the division into chunks does not count."""
+    """Return a hash of all data that determine the results, without the division into chunks."""
     facts = {**plan.as_json(), "chunk": None}
     return hashlib.sha256(json.dumps([facts, solver], sort_keys=True).encode()).hexdigest()[:16]
 
 
 def solver_data(interface: Interface, files: Mapping[str, str], functions: str, spec: str) -> dict[str, Any]:
-    """Return what a store says of its solver: the interface, generated files, the NumPy functions and the spec."""
+    """Return the description of a solver in a store: interface, generated files, NumPy functions and spec."""
     about = {key: sorted(v) if isinstance(v, frozenset) else v for key, v in asdict(interface).items()}
     return json.loads(json.dumps({"interface": about, "files": dict(files), "functions": functions, "spec": spec}))  # type: ignore[no-any-return]
 
 
 def create(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str, Floats]) -> bool:
-    """Create a store without members; return false if another process has created one meanwhile. Raises `OSError`.
+    """Create a store without results; return false if another process has created it meanwhile. Raises `OSError`.
 
-    The store is written to a temporary path and renamed, so that an existing store is always complete.
+    The store is written to a temporary path and renamed, so an existing store is always complete.
     """
     temporary = path.with_name(f".phigen-{uuid.uuid4().hex}.zarr")
     try:
@@ -128,7 +128,7 @@ def _fill(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str
 
     def along(name: str, values: Any) -> None:
         about = {"_ARRAY_DIMENSIONS": [name]}
-        # Without a fill value 0 is a valid value, not a mark of missing data.
+        # Without a fill value, 0 is a valid value and not a mark of missing data.
         root.create_array(name, data=np.asarray(values), fill_value=None, attributes=about)
 
     for axis in plan.grid if not plan.members else ():
@@ -158,7 +158,7 @@ def _fill(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str
 
 
 def open_job(path: str) -> Job:
-    """Return the job in a store. Raises `FileError` where there is none."""
+    """Return the job in a store. Raises `FileError` if there is none."""
     zarr = imported("zarr")
     try:
         root = zarr.open_group(path, mode="r+")
@@ -176,7 +176,7 @@ def interface_of(about: Mapping[str, Any]) -> Interface:
 
 
 def _restored(kind: Any, value: Any) -> Any:
-    """Return a value of a type from the data that JSON has of it: records, tuples, sets and mappings."""
+    """Return a value of a type (record, tuple, set, mapping) from its data in JSON."""
     if is_dataclass(kind):
         hints = get_type_hints(kind)
         return kind(**{name: _restored(hints[name], each) for name, each in value.items()})  # type: ignore[operator]

@@ -1,4 +1,4 @@
-"""Computation of a sweep of a spec into a store."""
+"""Computation of the missing members of a sweep into a store."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_
 #: Intended duration of a chunk in seconds: long compared with scheduling and storing, short for a waiting user.
 _SECONDS = 4.0
 
-#: Seconds of a step with its tangent map, including its processing in Python.
+#: Seconds of a step with its tangent map, including the processing of the map in Python.
 _TANGENT = 40e-6
 
 #: Smallest and largest number of members of a chunk.
@@ -77,12 +77,12 @@ def made(
 ) -> Outcome:
     """Compute the missing members of a sweep; ``started`` receives their number.
 
-    Raises `SpecError`, `FileError` where the store contains another sweep, `LimitError` where the members computed at a
-    time do not fit into memory, and `SweepError`.
+    Raises `SpecError`, `FileError` if the store contains another sweep, `LimitError` if the members computed at a time
+    do not fit into memory, and `SweepError`.
     """
     store.imported("zarr")
     target = chosen_target(setting.target or sweep.target)
-    # On this machine a target without a device is refused first of all, also if the number of workers is given.
+    # On this machine a target without a device is refused first, even if the number of workers is given.
     default = 0 if setting.scheduler else _workers(target, spec, sweep, setting)
     workers = setting.workers or default
     compilation = compilation_of(
@@ -135,7 +135,7 @@ def _workers(target: str, spec: Spec, sweep: SweepSettings, setting: SweepSettin
 
 
 def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> None:
-    """Raise `SpecError` for a name that the store uses for other data."""
+    """Raise `SpecError` for a varied name that is reserved in the store."""
     for name in varied:
         if name in (*store.OWN, *KEPT, *sweep.stored):
             message = f"{spec.file}: a sweep over {name!r}, under which its store has something else"
@@ -148,7 +148,7 @@ def _with_ensembles(spec: Spec) -> Spec:
 
 
 def _expect_room_for_axes(sweep: SweepSettings, spec: Spec) -> None:
-    """Raise `LimitError` where the values along a dimension, with one copy of them, do not fit into memory."""
+    """Raise `LimitError` if the values along a dimension, with one copy of them, do not fit into memory."""
     for axis in sweep.over:
         place = spec.diagnostic(("sweeps", sweep.name, "over", axis.name), "").location
         expect_room(f"{axis.size} values of {axis.name}", 2 * 8 * axis.size, place, "random members have no axes")
@@ -184,7 +184,8 @@ def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int]
 
 
 def _files(spec: Spec, run: Run) -> dict[str, Any]:
-    """Return the path of the spec and the digests of the files that a run of a lattice reads; empty without files."""
+    """Return the path of the spec and the digests of the files that a run of a lattice reads; no entries without
+    files."""
     if run.lattice is None:
         return {}
     values = [*run.lattice.state.values(), *run.lattice.arrays.values(), *(p.values for p in spec.parameters)]
@@ -208,7 +209,7 @@ def _solver_data(compilation: Compilation, target: str, spec: Spec) -> dict[str,
 def _gone_on_with(
     output: Path, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> store.Job:
-    """Return the store of an earlier call if it belongs to this sweep. Raises `FileError`."""
+    """Return the store of an earlier call. Raises `FileError` if it contains another sweep."""
     job = store.open_job(str(output))
     if phrases := differences(job, plan, solver, spec, listed):
         message = f"{output} holds another sweep: {'; '.join(phrases)}"
@@ -219,8 +220,9 @@ def _gone_on_with(
 def _created(
     output: Path, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats], slots: int
 ) -> store.Job:
-    """Return a new store with chunks that keep all workers busy, or the store that another process has created
-    meanwhile.
+    """Return a new store with chunks that keep all workers busy.
+
+    If another process has created the store meanwhile, return that one.
     """
     job = store.Job(
         None, plan, store.interface_of(solver["interface"]), solver["files"], solver["functions"], solver["spec"]
@@ -243,11 +245,11 @@ def _seconds_of_a_member(job: store.Job) -> float:
     h, t0 = np.asarray(plan.h), np.asarray(plan.t0)
     trial = Members(x0, h, steps, values, t0, draws=Draws(plan.noise), paths=np.arange(len(x0)))
     backend = job.backend()
-    began = time.process_time()  # processor time: a busy machine should not get smaller chunks
+    began = time.process_time()  # processor time: other load on the machine must not lead to smaller chunks
     try:
         backend.ensemble(trial, 1)
     except BackendError:
-        return _SECONDS / 4096  # default where the trial fails
+        return _SECONDS / 4096  # default if the trial fails
     seconds = (time.process_time() - began) / len(x0) * (plan.steps / steps) + 1e-7
     counted = ("crossings" in plan.keep) + any("(" in word for word in plan.keep)
     return seconds * (1 + counted) + ("lyapunov" in plan.keep) * _TANGENT * plan.steps

@@ -1,1 +1,1 @@
-"""Formulas: the expression graph, the differential ring over it, and truncated power series."""
+"""Formulas: the expression graph, the differential ring of expressions, and truncated power series."""

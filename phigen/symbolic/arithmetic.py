@@ -12,35 +12,36 @@ from phigen.symbolic.expression import Expression, topological
 
 T = TypeVar("T")
 
-#: No value is known.
+#: Values of nodes that are known before an evaluation: none.
 NOTHING: Mapping[int, Any] = MappingProxyType({})
 
 
 class Arithmetic(Generic[T]):
-    """A kind of arithmetic in which expressions have values of type T; sums use ``+`` and ``-`` of these values."""
+    """A kind of arithmetic in which expressions have values of type T. Sums use ``+`` and ``-`` of these values."""
 
     def constant(self, value: Fraction) -> T:
-        """Convert a rational number to a value."""
+        """Return the value of a rational number."""
         raise NotImplementedError
 
     def variable(self, name: str) -> T:
-        """The value of the symbol ``name``."""
+        """Return the value of the symbol ``name``."""
         raise NotImplementedError
 
     def product(self, a: T, b: T) -> T:
-        """Multiply two values."""
+        """Return the product of two values."""
         return a * b  # type: ignore[operator, no-any-return]
 
     def power(self, base: T, exponent: Fraction) -> T:
-        """Raise a value to a rational power."""
+        """Return a rational power of a value."""
         raise NotImplementedError
 
     def function(self, name: str, args: list[T]) -> T:
-        """Apply a function of `phigen.symbolic.functions.FUNCTIONS`; ``pi`` and ``E`` have no arguments."""
+        """Return the value of a function of `phigen.symbolic.functions.FUNCTIONS`; ``pi`` and ``E`` have no
+        arguments."""
         raise NotImplementedError
 
     def visit(self, node: Expression, args: list[Any]) -> T:
-        """The value of a node from those of its arguments."""
+        """Return the value of a node from those of its arguments."""
         match node.op:
             case "number":
                 return self.constant(node.value)
@@ -59,9 +60,9 @@ class Arithmetic(Generic[T]):
         return self.function(node.op, args)
 
     def values(self, roots: Sequence[Expression], computed: Mapping[int, T] = NOTHING) -> list[T]:
-        """The values of expressions. A shared node is computed once; its value is dropped after its last use.
+        """Return the values of expressions. A shared node is computed once; its value is dropped after its last use.
 
-        ``computed`` maps the ``id`` of nodes to values that are known already: nodes below them are not visited.
+        ``computed`` maps the ``id`` of nodes to known values; the nodes below these are not visited.
         """
         order = topological(roots, computed)
         uses = Counter(id(a) for node in order for a in node.args)

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 
 class Arrays(Arithmetic[Any]):
-    """Arrays, with the functions of NumPy, or of another ``library`` that has the same ones."""
+    """Arithmetic of arrays, with the functions of NumPy or of another ``library`` with the same function names."""
 
     def __init__(self, values: Mapping[str, Any], library: Any = np) -> None:
         self._values, self._library = values, library
@@ -27,15 +27,15 @@ class Arrays(Arithmetic[Any]):
         return float(value)
 
     def variable(self, name: str) -> Any:
-        """The array given for a symbol."""
+        """Return the array of a symbol."""
         return self._values[name]
 
     def power(self, base: Any, exponent: Fraction) -> Any:
-        """An array to a rational power."""
+        """Return a rational power of an array."""
         return self._library.power(base, float(exponent))
 
     def function(self, name: str, args: list[Any]) -> Any:
-        """A function that the library has."""
+        """Return a function of arrays, by the function of the library."""
         if not args:
             return np.pi if name == "pi" else np.e
         if name == "choose":
@@ -44,9 +44,9 @@ class Arrays(Arithmetic[Any]):
 
 
 def evaluate(roots: Sequence[Expression], values: Mapping[str, Any]) -> list[Floats]:
-    """The roots for arrays (or numbers) of the symbols; NaN or infinity outside the domain.
+    """Return the values of the roots for arrays (or numbers) of the symbols; NaN or infinity outside the domain.
 
-    Raises `KeyError` for a symbol without value.
+    Raises `KeyError` for a symbol without a value.
     """
     with np.errstate(all="ignore"):
         return [np.asarray(v, dtype=np.float64) for v in Arrays(values).values(roots)]

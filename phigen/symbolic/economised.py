@@ -9,10 +9,11 @@ from fractions import Fraction
 def economised(
     coefficients: Sequence[Fraction], radius: Fraction, terms: int, *, symmetric: bool = False
 ) -> list[Fraction]:
-    """Σ c_k z^k for 0 ≤ z ≤ radius, or −radius ≤ z ≤ radius if ``symmetric``, with ``terms`` coefficients.
+    """Return ``terms`` coefficients whose power series approximates Σ c_k z^k.
 
-    By Lanczos' method (C. Lanczos, Applied Analysis, 1956): the highest power is replaced by the lower terms of the
-    Chebyshev polynomial of its degree, one power after the other.
+    The approximation is for 0 ≤ z ≤ radius or, if ``symmetric``, for −radius ≤ z ≤ radius. By Lanczos' method (C.
+    Lanczos, Applied Analysis, 1956), the highest power is replaced by the lower terms of the Chebyshev polynomial of
+    its degree, again and again.
     """
     scaled = [c * radius**k for k, c in enumerate(coefficients)]
     while len(scaled) > terms:
@@ -23,7 +24,7 @@ def economised(
 
 
 def _chebyshev(degree: int, twice: Sequence[int]) -> list[int]:
-    """The coefficients of T_n(y) in u, where 2y = ``twice[0]`` + ``twice[1]`` u: on −1 ≤ y ≤ 1."""
+    """Return the coefficients of the Chebyshev polynomial T_n(y) in u, where 2y = ``twice[0]`` + ``twice[1]`` u."""
     previous, last = [1], [twice[0] // 2, twice[1] // 2]
     if degree == 0:
         return previous

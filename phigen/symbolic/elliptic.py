@@ -1,21 +1,22 @@
-"""Jacobi's elliptic functions for the free rigid body, by one real number: the tangent of a quarter of the amplitude.
+"""Jacobi's elliptic functions for the free rigid body, in terms of one real number: the tangent of a quarter of the
+amplitude.
 
 For P ≥ Q ≥ 0 let φ be the amplitude, φ(0) = 0 with φ̇² = P − Q sin²φ. Then S = sin(φ)/√P, C = cos φ and D = √(1 − QS²)
-are sn, cn and dn of √P t with the modulus √(Q/P), and Ṡ = CD. With κ = tan(φ/4)/√P and z = Pκ²,
+are sn, cn and dn of √P t with the modulus √(Q/P) (sn divided by √P), and Ṡ = CD. With κ = tan(φ/4)/√P and z = Pκ²,
 
     S = 4κ(1 − z)/(1 + z)²,    C = (1 − 6z + z²)/(1 + z)²,    D² = C² + (P − Q)S².
 
-`AMPLITUDE` is κ of (t, P, R) with R = P − Q, for φ less full turns, so that |κ|√P ≤ 1. Near a separatrix R is small and
-has digits that a difference of P and Q has not. The derivatives have G = ∫ S² dt and I = ∫ S²/D² dt from 0 to t,
-`SQUARES` and `RATIOS`; none divides by P, Q or R:
+`AMPLITUDE` is κ as a function of (t, P, R) with R = P − Q, for φ modulo full turns, so that |κ|√P ≤ 1. Near a
+separatrix R is small, and more accurate than a difference of P and Q would be. The derivatives contain G = ∫ S² dt and
+I = ∫ S²/D² dt from 0 to t, `SQUARES` and `RATIOS`. None divides by P, Q or R:
 
     ∂κ/∂t = (1 + z)D/4,  ∂κ/∂R = (1 + z)DI/8,  ∂κ/∂P = (1 + z)DG/8 − κ³(5 − 2z + z²)/(1 + z)³.
 
-`THIRD` is ∫ S²/(1 − nS²) dt from 0 to t for (t, P, R, n) with n ≤ 0, an integral of the third kind.
+`THIRD` is ∫ S²/(1 − nS²) dt from 0 to t as a function of (t, P, R, n) with n ≤ 0, an integral of the third kind.
 
-Where Pt² ≤ 1, S is a power series at t/16, doubled four times; elsewhere φ follows from the arithmetic–geometric mean
-of √P and √R (M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 16.4 and 17.6), where arcsin is written
-as an arctangent whose denominator has no cancellation. The integrals are Carlson's R_D and R_J, by duplication (B. C.
+If Pt² ≤ 1, S is a power series at t/16, doubled four times. Otherwise φ is computed by the arithmetic–geometric mean of
+√P and √R (M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 16.4 and 17.6), with arcsin written as an
+arctangent whose denominator has no cancellation. The integrals are Carlson's R_D and R_J, by duplication (B. C.
 Carlson, Numerical computation of real or complex elliptic integrals, Numerical Algorithms 10, 1995).
 """
 
@@ -33,20 +34,22 @@ AMPLITUDE, SQUARES, RATIOS = ELLIPTIC = ("amplitude", "amplitude1", "amplitude2"
 #: The name of the integral of the third kind; its arguments are t, P, R and n.
 THIRD = "amplitude3"
 
-#: Doublings of the series, and its terms: at Pt² ≤ 1 and a 16th of t what is left out is below 10⁻¹⁸.
+#: Number of doublings of the argument of the series, and number of its terms. At a sixteenth of t with Pt² ≤ 1, the
+#: omitted terms are below 10⁻¹⁸.
 DOUBLINGS, TERMS = 4, 6
 
-#: c/a of the arithmetic–geometric mean where the next c/a, a quarter of its square, is below rounding.
+#: Ratio c/a of the arithmetic–geometric mean at which the iteration ends: the next c/a, a quarter of its square, is
+#: below rounding.
 MEAN_RATIO = 1e-8
 
-#: Duplications of R_D in code without branches; its arguments there differ by 0.71 at most.
+#: Number of duplications of R_D in code without branches, where its arguments differ by 0.71 at most.
 LANE_DUPLICATIONS = 5
 
 
 @cache
 def series() -> tuple[tuple[Fraction, ...], ...]:
     """Return the coefficients of S/t = Σ c[j][i] xⁱ yʲ with x = (P + Q)t² and y = PQt⁴: S̈ = −(P + Q)S + 2PQS³."""
-    terms = [{(0, 0): Fraction(1)}]  # of t⁰, t², …: coefficients by the powers of x and y
+    terms = [{(0, 0): Fraction(1)}]  # coefficients of t⁰, t², …, by the powers of x and y
     for n in range(TERMS - 1):
         following: dict[tuple[int, int], Fraction] = {}
         divisor = (2 * n + 2) * (2 * n + 3)
@@ -83,7 +86,7 @@ def functions_of(kappa: Any, p: Any, r: Any) -> tuple[Any, Any, Any]:
 
 
 def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tuple[Any, ...]:
-    """The partial derivatives of κ along t, P and R."""
+    """Return the partial derivatives of κ with respect to t, P and R."""
     z = p * kappa**2
     *_, square = functions_of(kappa, p, r)
     along_t = (1 + z) * square ** Fraction(1, 2) / 4
@@ -93,27 +96,27 @@ def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tupl
 
 
 def value(library: Any, t: Any, p: Any, r: Any) -> Any:
-    """κ, in double precision if the library is `math`, else to that of an mpmath context."""
+    """Return κ in the precision of the library: double for `math`, else that of an mpmath context."""
     return _reduced(library, t, p, r)[0]
 
 
 def squares(library: Any, t: Any, p: Any, r: Any) -> Any:
-    """∫ S² dt from 0 to t."""
+    """Return ∫ S² dt from 0 to t."""
     return _integral(library, t, p, r, lambda c, d, _: carlson(library, c, d, 1 + 0 * c))
 
 
 def ratios(library: Any, t: Any, p: Any, r: Any) -> Any:
-    """∫ S²/D² dt from 0 to t."""
+    """Return ∫ S²/D² dt from 0 to t."""
     return _integral(library, t, p, r, lambda c, d, _: carlson(library, c, 1 + 0 * c, d))
 
 
 def third(library: Any, t: Any, p: Any, r: Any, n: Any) -> Any:
-    """∫ S²/(1 − nS²) dt from 0 to t."""
+    """Return ∫ S²/(1 − nS²) dt from 0 to t."""
     return _integral(library, t, p, r, lambda c, d, e: carlson_third(library, c, d, 1 - n * e))
 
 
 def _reduced(library: Any, t: Any, p: Any, r: Any) -> tuple[Any, Any]:
-    """κ, and the number of full turns that the amplitude has made."""
+    """Return κ, and the number of full turns of the amplitude."""
     if p <= 0:
         return t / 4, 0
     root = library.sqrt(p)
@@ -123,7 +126,7 @@ def _reduced(library: Any, t: Any, p: Any, r: Any) -> tuple[Any, Any]:
 
 
 def _amplitude(library: Any, u: Any, k: Any) -> Any:
-    """The amplitude of u for the square k of the complementary modulus, by the arithmetic–geometric mean."""
+    """Return the amplitude of u by the arithmetic–geometric mean; k is the square of the complementary modulus."""
     a, b, c = 1 + 0 * u, library.sqrt(k), library.sqrt(1 - k)
     if b == 0:
         return 2 * library.atan(library.tanh(u / 2))
@@ -140,7 +143,7 @@ def _amplitude(library: Any, u: Any, k: Any) -> Any:
 
 
 def _integral(library: Any, t: Any, p: Any, r: Any, carlson_of: Callable[[Any, Any, Any], Any]) -> Any:
-    """An integral of S² over t; ``carlson_of`` returns Carlson's integral from C², D² and S²."""
+    """Return an integral of S² over t; ``carlson_of`` returns Carlson's integral from C², D² and S²."""
     if p <= 0:
         return t**3 / 3
     r = min(max(r, 0 * r), p)
@@ -156,7 +159,7 @@ def _integral(library: Any, t: Any, p: Any, r: Any, carlson_of: Callable[[Any, A
 
 
 def carlson_third(library: Any, x: Any, y: Any, w: Any) -> Any:
-    """Carlson's R_J(x, y, 1, w) for x, y ≤ 1 ≤ w."""
+    """Return Carlson's R_J(x, y, 1, w) for x, y ≤ 1 ≤ w."""
     rounding = 2.2e-16 if library is math else library.eps
     z, start = 1 + 0 * x, (x + y + 1 + 2 * w) / 5
     mean, factor, terms = start, 1 + 0 * x, 0 * x
@@ -175,7 +178,10 @@ def carlson_third(library: Any, x: Any, y: Any, w: Any) -> Any:
 
 
 def _third_series(a: Any, b: Any, c: Any) -> Any:
-    """R_J of arguments that differ from their mean by little, relative to the mean to the power -3/2."""
+    """Return R_J for arguments close to their mean, in units of the mean to the power -3/2, by a series.
+
+    ``a``, ``b`` and ``c`` are relative differences of arguments from the mean.
+    """
     d = -(a + b + c) / 2
     product, dd = a * b * c, d * d
     second = a * b + a * c + b * c - 3 * dd

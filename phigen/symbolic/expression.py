@@ -1,8 +1,8 @@
 """Expressions: an immutable, interned directed acyclic graph of real arithmetic.
 
-The one representation of formulas in phigen: the parser makes it, the geometry differentiates it, the
-scheme assembles the one-step map from it, and the targets print it. Equal formulas built in the same
-way are the same object, so a shared sub-expression is stored, differentiated and printed once.
+All formulas in phigen are expressions: the parser makes them, the geometry differentiates them, the scheme assembles
+the one-step map from them, and the targets print them. Equal formulas built in the same way are the same object, so a
+shared sub-expression is stored, differentiated and printed once.
 
 Node kinds (``op``):
 
@@ -20,8 +20,8 @@ op          value                   args
 a function  ``None``                its arguments, see `phigen.symbolic.functions`
 =========== ======================= =====================================
 
-A quotient is a product with a ``pow`` of exponent −1. Names of symbols that phigen makes itself contain
-a colon (``p:x1``, ``h:``), which no name in a spec can; they never clash with names of the user, see
+A quotient is a product with a ``pow`` of exponent −1. Names of symbols that phigen makes itself contain a colon
+(``p:x1``, ``h:``), which names in a spec cannot contain, so they never clash with names of the user; see
 `phigen.symbolic.symbols`.
 """
 
@@ -40,7 +40,7 @@ from phigen.symbolic.functions import FUNCTIONS
 
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
 
-#: Walking over this number of nodes takes a tenth of a second or more.
+#: Number of nodes above which walks report progress: they take a tenth of a second or more.
 MANY = 10_000
 
 Number = int | Fraction
@@ -48,7 +48,7 @@ T = TypeVar("T")
 
 
 class Expression:
-    """A node; make one with the functions of this module or with operators, never directly."""
+    """A node. Nodes are made by the functions of this module or by operators, never directly."""
 
     __slots__ = ("__weakref__", "_digest", "args", "depth", "op", "value")
 
@@ -56,7 +56,7 @@ class Expression:
     args: tuple[Expression, ...]
     value: Any
     depth: int
-    _digest: bytes  # computed on demand, empty before
+    _digest: bytes  # computed on demand; empty before
 
     def __add__(self, other: Expression | Number) -> Expression:
         return add(self, as_expression(other))
@@ -90,7 +90,7 @@ class Expression:
 
     @property
     def is_zero(self) -> bool:
-        """Whether this is the literal number 0 (not: whether it simplifies to 0)."""
+        """Whether this is the literal number 0; other expressions that would simplify to 0 do not count."""
         return self is ZERO
 
     @property
@@ -124,7 +124,7 @@ class Expression:
 
 
 class _Reference(ref[Expression]):
-    """Weak reference to a node, whose finaliser removes the node from the table."""
+    """Weak reference to a node; its finaliser removes the node from the table."""
 
     __slots__ = ("key",)
 
@@ -140,7 +140,8 @@ def _forget(dead: _Reference, nodes: dict[tuple[Any, ...], _Reference] = _NODES)
 
 
 def _node(op: str, args: tuple[Expression, ...] = (), value: Any = None) -> Expression:
-    # Plain integers: the keys of dying nodes are compared at interpreter exit, when Fraction no longer can be.
+    # The keys contain plain integers: at interpreter exit, keys of dying nodes are compared when Fraction no longer
+    # works.
     key = (op, (value.numerator, value.denominator) if type(value) is Fraction else value, args)
     weak = _NODES.get(key)
     node = weak() if weak else None
@@ -158,12 +159,12 @@ def _node(op: str, args: tuple[Expression, ...] = (), value: Any = None) -> Expr
 
 @lru_cache(maxsize=4096)
 def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
-    """Sort key that puts ``x2`` before ``x10``."""
+    """Return a sort key for names by which ``x2`` precedes ``x10``."""
     return tuple((0, int(t)) if t.isdigit() else (1, t) for t in re.findall(r"\d+|\D+", name))
 
 
 def _ordered(a: Expression, b: Expression) -> tuple[Expression, Expression]:
-    """Two terms or factors in canonical order, which is the same in every process."""
+    """Return two terms or factors in canonical order, which is the same in every process."""
     first, second = _place(a), _place(b)
     if first == second:
         first, second = a.digest, b.digest
@@ -176,7 +177,7 @@ def _place(e: Expression) -> Any:
 
 
 def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
-    """A node without simplification, for lowering passes that have chosen its form."""
+    """Return a node without simplification, for lowering passes that have chosen its form."""
     return _node(op, args, value)
 
 
@@ -186,14 +187,14 @@ def number(value: Number) -> Expression:
 
 
 def symbol(name: str) -> Expression:
-    """The symbol of that name; two symbols are the same if and only if their names are."""
+    """Return the symbol of that name; two symbols are the same object if and only if their names are equal."""
     if type(name) is str and ":" in name:
         raise ValueError(f"{name!r} is no name of a spec; phigen's own are of the type Symbol")
     return _node("symbol", (), name)
 
 
 def as_expression(value: Expression | Number) -> Expression:
-    """``value`` itself, or the number it is."""
+    """Return an expression unchanged, and a number as a literal."""
     return value if isinstance(value, Expression) else number(value)
 
 
@@ -280,7 +281,7 @@ def mul(a: Expression, b: Expression) -> Expression:
         return neg(mul(a.args[0], b))
     if b.op == "neg":
         return neg(mul(a, b.args[0]))
-    # A number is the outermost factor, so that it is combined with the numbers of later factors.
+    # A number becomes the outermost factor, so that it is combined with the numbers of later factors.
     if a.op == "mul" and a.args[0].is_number:
         return mul(a.args[0], mul(a.args[1], b))
     if b.op == "mul" and b.args[0].is_number:
@@ -297,7 +298,7 @@ def mul(a: Expression, b: Expression) -> Expression:
 
 
 def power(base: Expression, exponent: Expression | Number) -> Expression:
-    """base ** exponent; an exponent that is not a rational number makes a ``power`` call."""
+    """Return base ** exponent, simplified. An exponent that is not a rational number results in a call of ``power``."""
     if isinstance(exponent, Expression):
         if not exponent.is_number:
             return call("power", base, exponent)
@@ -327,12 +328,12 @@ def power(base: Expression, exponent: Expression | Number) -> Expression:
 
 
 def sqrt(a: Expression) -> Expression:
-    """The square root, as a power of exponent ½."""
+    """Return the square root, as a power of exponent ½."""
     return power(a, Fraction(1, 2))
 
 
 def call(function: str, *args: Expression) -> Expression:
-    """function(args), for a name in `FUNCTIONS`; values that are rational at 0 and 1 are folded."""
+    """Return function(args) for a name in `FUNCTIONS`; rational values at 0 and 1 are computed at once."""
     record = FUNCTIONS[function]
     if record.arity != len(args):
         raise ValueError(f"{function} takes {record.arity} argument(s), not {len(args)}")
@@ -347,12 +348,16 @@ def call(function: str, *args: Expression) -> Expression:
 
 
 def total(terms: Iterable[Expression]) -> Expression:
-    """The sum of the terms, as a balanced tree: less rounding error and more parallelism than a chain."""
+    """Return the sum of the terms as a balanced tree, which has less rounding error and more parallelism than a
+    chain."""
     return _balanced(add, list(terms), ZERO)
 
 
 def total_at(terms: Mapping[int, Expression]) -> Expression:
-    """`total` of a list that has these terms at their positions and 0 elsewhere: the same tree, without the zeros."""
+    """Return the `total` of a list that has these terms at their positions and 0 elsewhere.
+
+    The tree is the same, without the zeros.
+    """
     items = dict(sorted(terms.items()))
     while len(items) > 1 or any(items):
         sums: dict[int, Expression] = {}
@@ -364,7 +369,7 @@ def total_at(terms: Mapping[int, Expression]) -> Expression:
 
 
 def product(factors: Iterable[Expression]) -> Expression:
-    """The product of the factors, as a balanced tree."""
+    """Return the product of the factors, as a balanced tree."""
     return _balanced(mul, list(factors), ONE)
 
 
@@ -380,9 +385,10 @@ def _balanced(
 
 
 def topological(roots: Iterable[Expression], excluded: Container[int] = ()) -> list[Expression]:
-    """All nodes below the roots, arguments before the nodes that use them; the order depends on the content only.
+    """Return all nodes below the roots, arguments before the nodes that use them. The order depends on the content
+    only.
 
-    Nodes whose ``id`` is in ``excluded`` are left out, with everything below them.
+    Nodes whose ``id`` is in ``excluded`` are left out, with all nodes below them.
     """
     order: list[Expression] = []
     visited: set[Expression] = set()
@@ -405,15 +411,15 @@ def topological(roots: Iterable[Expression], excluded: Container[int] = ()) -> l
 
 
 def symbols_of(*roots: Expression) -> list[str]:
-    """The names of the symbols below the roots, sorted."""
+    """Return the names of the symbols below the roots, sorted."""
     return sorted({e.value for e in topological(roots) if e.op == "symbol"}, key=natural_key)
 
 
 def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T]) -> list[T]:
-    """Values of the roots, where ``visit(node, values_of_its_arguments)`` gives the value of a node.
+    """Return the values of the roots, where ``visit(node, values_of_its_arguments)`` returns the value of a node.
 
-    Every walk over expressions (substitution, evaluation, conversion, printing) is a call of this one;
-    a shared node is visited once.
+    Every walk over expressions (substitution, evaluation, conversion, printing) is a call of this function. A shared
+    node is visited once.
     """
     values: dict[Expression, T] = {}
     for node in _with_progress(topological(roots)):
@@ -422,7 +428,7 @@ def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T])
 
 
 def _with_progress(order: Sequence[Expression]) -> Iterable[Expression]:
-    """The nodes in turn; a stage reports progress if there are very many."""
+    """Return the nodes as an iterable that reports progress if there are very many."""
     if len(order) < MANY:
         return order
 
@@ -439,7 +445,7 @@ _BUILDERS: dict[str, Callable[..., Expression]] = {"add": add, "sub": sub, "neg"
 
 
 def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
-    """The node with other arguments, simplified anew."""
+    """Return the node with other arguments, simplified anew."""
     if not node.args:
         return node
     if node.op == "pow":
@@ -449,7 +455,7 @@ def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
 
 
 def familiar(roots: Sequence[Expression]) -> list[Expression]:
-    """The roots with phigen's own functions replaced by well-known ones, for s > 0 if that matters."""
+    """Return the roots with internal functions of phigen replaced by well-known ones, for s > 0 if the sign matters."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         known_values = FUNCTIONS[node.op].known if node.op in FUNCTIONS else None
@@ -462,7 +468,7 @@ def familiar(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def substitute(roots: Sequence[Expression], values: Mapping[str, Expression]) -> list[Expression]:
-    """The roots with symbols replaced, all at once."""
+    """Return the roots with symbols replaced by ``values``, simultaneously."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         if node.op == "symbol":
@@ -473,7 +479,7 @@ def substitute(roots: Sequence[Expression], values: Mapping[str, Expression]) ->
 
 
 def partials(e: Expression) -> list[Expression]:
-    """Partial derivatives of a node with respect to its arguments."""
+    """Return the partial derivatives of a node with respect to its arguments."""
     if not e.args:
         return []
     a = e.args[0]
@@ -495,7 +501,7 @@ def partials(e: Expression) -> list[Expression]:
 
 
 def derivatives(roots: Sequence[Expression], name: str) -> list[Expression]:
-    """d root / d name for each root, by forward accumulation."""
+    """Return the derivative of each root with respect to the symbol ``name``, by forward accumulation."""
 
     def visit(node: Expression, args: list[tuple[Expression, Expression]]) -> tuple[Expression, Expression]:
         if node.op == "symbol":
@@ -509,7 +515,10 @@ def derivatives(roots: Sequence[Expression], name: str) -> list[Expression]:
 
 
 def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> list[dict[str, Expression]]:
-    """The derivatives of each root that are not 0, by name: those of `derivatives`, in one sweep for all names."""
+    """Return the nonzero derivatives of each root, by name.
+
+    They are those of `derivatives`, computed in one sweep for all names.
+    """
     variables = frozenset(names)
     slopes: dict[int, dict[str, Expression]] = {}
     for node in _with_progress(topological(roots)):
@@ -520,19 +529,20 @@ def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> lis
         if any(slopes[id(a)] for a in node.args):
             for partial, a in zip(partials(node), node.args, strict=True):
                 for name, d in slopes[id(a)].items():
-                    term = d if partial is ONE else mul(partial, d)  # as in sums, of which there are most
+                    # the factor is 1 in sums, which are the most frequent nodes
+                    term = d if partial is ONE else mul(partial, d)
                     row[name] = add(row[name], term) if name in row else term
         slopes[id(node)] = {name: d for name, d in row.items() if not d.is_zero}
     return [slopes[id(r)] for r in roots]
 
 
 def derivative(e: Expression, name: str) -> Expression:
-    """de / d name."""
+    """Return the derivative of an expression with respect to the symbol ``name``."""
     return derivatives([e], name)[0]
 
 
 def gradient(e: Expression, names: Sequence[str]) -> list[Expression]:
-    """Derivatives of one expression with respect to many symbols, by reverse accumulation."""
+    """Return the derivatives of one expression with respect to many symbols, by reverse accumulation."""
     order = topological([e])
     variables = set(names)
     active: set[int] = set()
@@ -558,9 +568,9 @@ _PRECEDENCE = {"add": 1, "sub": 1, "neg": 1, "mul": 2, "pow": 3}
 
 
 def text(e: Expression, longest: int = 2000) -> str:
-    """The expression in the syntax of a spec; parsing it gives an equal expression.
+    """Return the expression in the syntax of a spec; parsing the text yields an equal expression.
 
-    For messages: a shared sub-expression is repeated wherever it occurs, and long texts are cut with an ellipsis.
+    It is for messages: a shared sub-expression is repeated wherever it occurs, and long texts are cut with an ellipsis.
     """
 
     def wrap(part: tuple[str, int], level: int) -> str:

@@ -1,7 +1,7 @@
-"""The elementary functions: one record for each, with all facts about it.
+"""The elementary functions: one record for each, with all its properties.
 
-Rules are callables of plain arithmetic. They take ``call``, which applies a function by its name, so that one rule
-serves expressions, sympy, numbers and elements of a ring alike.
+Rules are functions of plain arithmetic. Their argument ``call`` applies a function by its name, so that the same rule
+can be used for expressions, sympy, numbers and elements of a ring.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from phigen.symbolic.special import SPECIAL
 
 HALF = Fraction(1, 2)
 
-#: Applies a function, given by its name, to arguments.
+#: Function that applies a function, given by its name, to arguments.
 Call = Callable[..., Any]
 
 
@@ -28,20 +28,20 @@ def _everywhere(*arguments: Fraction) -> bool:
 
 @dataclass(frozen=True)
 class Function:
-    """A function of an expression.
+    """A function that may occur in expressions.
 
     ``slopes(call, f, *arguments)`` are the partial derivatives of the function, with f its value; None if unknown.
-    ``known(call, *arguments)`` writes the function by functions that readers know. ``value(library, *arguments)``
-    computes the function with the functions of the library: `math`, or an mpmath context. Without this rule the
-    library has a function of the same name. ``at_zero`` is the value at 0, if it is rational. ``defined`` says whether
-    the function has a value at rational arguments, ``rational`` whether its values are rational there. ``cost`` is in
-    units of one addition. No spec can name a function that is phigen's ``own``.
+    ``known(call, *arguments)`` expresses the function by well-known functions. ``value(library, *arguments)`` computes
+    the function with the functions of the library, `math` or an mpmath context; without this rule the library must have
+    a function of the same name. ``at_zero`` is the value at 0, if it is rational. ``defined`` says whether the function
+    has a value at rational arguments, ``rational`` whether its values there are rational. ``cost`` is in units of one
+    addition. An ``own`` function is internal: a spec cannot use it.
 
-    ``written`` is the spelling of the function in a language: a name, or a text with ``{0}``, ``{1}`` for the
+    ``written`` maps a language to the spelling of the function: a name, or a text with ``{0}``, ``{1}`` for the
     arguments. In languages without an entry, the generated file defines the function. ``lanes`` is the spelling in
-    loops over lanes in C, by functions with a vectorised version; a function that has such a version itself has its
-    name there. An ``inline`` function is an instruction, or arithmetic. ``near`` says that flows call a polynomial for
-    small arguments. ``letters`` is the name in mathematics.
+    loops over lanes in C, by functions with a vectorised version; for a function that has a vectorised version itself,
+    it is the name. An ``inline`` function is an instruction, or arithmetic. ``near`` says that flows call a polynomial
+    for small arguments. ``letters`` is the name in mathematics.
     """
 
     name: str
@@ -68,7 +68,7 @@ _LIBRARIES = {"c": "{}", "numpy": "np.{}", "js": "Math.{}"}
 
 
 def _library(name: str, **other_names: str) -> dict[str, str]:
-    """Return the spellings of a function that the library of every language has, in some by ``other_names``."""
+    """Return ``written`` for a function in the libraries of all languages; ``other_names`` are by language."""
     return {language: call.format(other_names.get(language, name)) for language, call in _LIBRARIES.items()}
 
 
@@ -133,7 +133,7 @@ _LISTED = (
         known=lambda call, a: call("log", 1 + a),
         written=_library("log1p"),
     ),
-    Function(  # 1/a where a > 0, else not a number: beyond the pole of a flow there is no solution
+    Function(  # 1/a for a > 0, else NaN: beyond the pole of a flow there is no solution
         "inv",
         own=True,
         slopes=lambda call, f, a: (-(f**2),),
@@ -148,7 +148,7 @@ _LISTED = (
         },
         inline=True,
     ),
-    Function(  # 1/a where a > 0, else 0: its factor vanishes there, or need not change
+    Function(  # 1/a for a > 0, else 0: the value of its product with 0
         "inv0",
         own=True,
         slopes=lambda call, f, a: (-(f**2),),
@@ -316,7 +316,10 @@ _LISTED = (
 
 
 def _phi(order: int) -> Function:
-    """The derivative of φ of that order (`phigen.symbolic.special`), near 0 a series of nine terms, and a test."""
+    """Return the derivative of φ of that order (`phigen.symbolic.special`).
+
+    Its cost is that of a series of nine terms for small arguments, and a test.
+    """
     name, further = SPECIAL[order], SPECIAL[order + 1 : order + 2]
     return Function(
         name,
@@ -331,7 +334,7 @@ def _phi(order: int) -> Function:
 
 
 def _entire(name: str) -> Function:
-    """A function of `phigen.symbolic.entire`, near 0 a series."""
+    """Return the record of a function of `phigen.symbolic.entire`; for small arguments it is a series."""
     series = ENTIRE[name]
     return Function(
         name,
@@ -349,7 +352,7 @@ def _entire(name: str) -> Function:
 FUNCTIONS: dict[str, Function] = {f.name: f for f in _LISTED}
 FUNCTIONS |= {name: _phi(order) for order, name in enumerate(SPECIAL)}
 FUNCTIONS |= {name: _entire(name) for name in ENTIRE}
-FUNCTIONS[universal.ANOMALY] = Function(  # of Kepler motions, by an iteration: see `phigen.symbolic.universal`
+FUNCTIONS[universal.ANOMALY] = Function(  # for Kepler motions, by an iteration; see `phigen.symbolic.universal`
     universal.ANOMALY,
     arity=6,
     own=True,
@@ -359,7 +362,7 @@ FUNCTIONS[universal.ANOMALY] = Function(  # of Kepler motions, by an iteration: 
     cost=120,
     near=True,
 )
-#: Of free rigid bodies, by elliptic functions: see `phigen.symbolic.elliptic`.
+#: Functions for free rigid bodies, by elliptic functions; see `phigen.symbolic.elliptic`.
 FUNCTIONS |= {
     name: Function(
         name,
@@ -373,7 +376,7 @@ FUNCTIONS |= {
     for name, value in zip(elliptic.ELLIPTIC, (elliptic.value, elliptic.squares, elliptic.ratios), strict=True)
 }
 FUNCTIONS[elliptic.THIRD] = Function(elliptic.THIRD, arity=4, own=True, value=elliptic.third, cost=160)
-#: Of exponentials of matrices: see `phigen.symbolic.remainders`.
+#: Functions for exponentials of matrices; see `phigen.symbolic.remainders`.
 FUNCTIONS |= {
     name: Function(
         name,
@@ -388,11 +391,11 @@ FUNCTIONS |= {
     for k, name in enumerate(names)
 }
 
-#: Powers with exponents ½ and ⅓: expressions have no such functions, languages do.
+#: Powers with exponents ½ and ⅓ as functions: languages have them, expressions do not.
 ROOTS = {"sqrt": _library("sqrt"), "cbrt": _library("cbrt")}
 
 
 def written_in(language: str) -> dict[str, str]:
-    """The spelling of functions in a language, roots among them, without those that a generated file defines."""
+    """Return the spelling of functions and roots in a language, without those that a generated file defines."""
     spellings = {f.name: f.written[language] for f in FUNCTIONS.values() if language in f.written}
     return spellings | {name: forms[language] for name, forms in ROOTS.items()}

@@ -8,22 +8,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from phigen.symbolic.expression import ZERO, Expression, power, product, total
 
 Monomial = tuple[int, ...]
-#: The variables of a monomial, by index, with their exponents: few, in large systems.
+#: The variables of a monomial, by index, with their exponents. In large systems a monomial contains few variables.
 Powers = tuple[tuple[int, int], ...]
 
 
 def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]) -> Expression:
-    """Σ coefficient · Π variables[i]**exponent[i], nested.
+    """Return Σ coefficient · Π variables[i]**exponent[i] as a nested expression.
 
-    At each level the power that divides most terms is factored out. Even polynomials come out as
-    polynomials in the squares of the variables, since the least exponent of the terms that share a
-    variable is factored, and squares are shared nodes. Deterministic in the terms.
+    At each level the power that divides the most terms is factored out. Even polynomials become polynomials in the
+    squares of the variables, since the least exponent among the terms that share a variable is factored out, and
+    squares are shared nodes. The result depends on the terms only, not on their order.
     """
     return sparse_horner({_powers(m): c for m, c in terms.items()}, variables)
 
 
 def sparse_horner(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """`horner` of monomials that list the variables that they contain only, in the order of the index."""
+    """Return `horner` for monomials that list only the variables that they contain, in the order of the indices."""
     left = {m: c for m, c in terms.items() if not c.is_zero}
     return _nested(left, variables) if left else ZERO
 
@@ -33,7 +33,7 @@ def _powers(monomial: Monomial) -> Powers:
 
 
 def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """`horner` of terms that are not 0."""
+    """Return `horner` of nonzero terms."""
     if len(terms) == 1:
         ((monomial, coefficient),) = terms.items()
         return coefficient * _monomial(monomial, variables)
@@ -57,7 +57,7 @@ def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression])
 
 
 def _common(terms: Iterable[Powers]) -> dict[int, int]:
-    """The powers that divide all terms."""
+    """Return the powers that divide all terms, by variable."""
     first, *remaining = terms
     common = dict(first)
     for m in remaining:
@@ -69,7 +69,8 @@ def _common(terms: Iterable[Powers]) -> dict[int, int]:
 
 
 def _graded(monomial: Powers) -> tuple[int, list[tuple[int, int]]]:
-    """The key of the order by degree, and by the exponents of the first variables that differ, the larger first."""
+    """Return a sort key for monomials: by degree, then by the exponents of the first variables that differ, larger
+    ones first."""
     return sum(e for _, e in monomial), [(i, -e) for i, e in monomial]
 
 

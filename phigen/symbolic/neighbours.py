@@ -1,8 +1,8 @@
 """Symbols of values at sites of a lattice, with an offset: ``x[i+1]``, ``x[i-1,j+2]``, ``x[a]``.
 
-On a grid the offset is steps along axes, in their order, zeros left out; ``x`` alone is x at the site itself. Where
-there are no axes, it is an end, a or b, of a bond or a pair. These are ordinary symbols. Their
-brackets distinguish them: names of a spec have none.
+On a grid the offset consists of steps along axes, in the order of the axes, without zeros; ``x`` alone is x at the site
+itself. On lattices without axes the offset is an end, a or b, of a bond or a pair. The symbols are ordinary symbols;
+names in a spec contain no brackets, so they cannot be confused.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import Symbol
 
-#: Offset of a site from another: steps along the axes of a grid; an end, ``("a",)`` or ``("b",)``, of a bond or a pair;
-#: ``()`` for the site itself where there are no axes.
+#: Offset of a site from another site: steps along the axes of a grid, or an end, ``("a",)`` or ``("b",)``, of a bond or
+#: a pair; ``()`` is the site itself on lattices without axes.
 Offset = tuple[int, ...] | tuple[str, ...]
 #: The name of a field or other value at sites, and the offset of the site.
 Place = tuple[str, Offset]
@@ -38,7 +38,7 @@ class Neighbours:
         return (0,) * len(self.axes)
 
     def at(self, name: str, offset: Offset) -> str:
-        """The symbol of a name at an offset."""
+        """Return the symbol of a name at an offset."""
         if self.axes:
             index = [f"{a}{o:+d}" for a, o in zip(self.axes, steps(offset), strict=True) if o]
         else:
@@ -50,7 +50,7 @@ class Neighbours:
         return f"{name}[{','.join(index)}]"
 
     def place(self, symbol_name: str) -> Place:
-        """The name of a symbol, and its offset. `KeyError` for a symbol that has no value at sites."""
+        """Return the name and the offset of a symbol. Raises `KeyError` for a symbol without a value at sites."""
         match = _NEIGHBOUR.fullmatch(symbol_name)
         base = match["name"] if match else symbol_name
         if base not in self.names:
@@ -69,11 +69,11 @@ class Neighbours:
         return base, tuple(offsets.values())
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
-        """All symbols of expressions that have a value at sites, with their places."""
+        """Return all symbols of the expressions that have a value at sites, with their places."""
         return {n: self.place(n) for n in symbols_of(*expressions) if n.partition("[")[0] in self.names}
 
     def shifted(self, expressions: Sequence[Expression], offset: Offset) -> list[Expression]:
-        """The expressions at the site with an offset on a grid."""
+        """Return the expressions translated by an offset of a grid."""
         if not any(offset):
             return list(expressions)
         shifted_symbols = {
@@ -82,7 +82,7 @@ class Neighbours:
         return substitute(expressions, shifted_symbols)
 
     def on(self, expression: Expression, end: str) -> Expression:
-        """The density of a site at one end of a bond or a pair."""
+        """Return an expression of one site, written for the site at an ``end`` of a bond or a pair."""
         symbols_at_end = {name: symbol(self.at(base, (end,))) for name, (base, _) in self.places(expression).items()}
         return substitute([expression], symbols_at_end)[0]
 

@@ -22,31 +22,31 @@ class DomainError(ArithmeticError):
 
 
 def is_rational(*roots: Expression) -> bool:
-    """Whether rational values of the symbols give rational values of the roots, wherever they are defined."""
+    """Whether rational values of the symbols lead to rational values of the roots, wherever these are defined."""
     return all(
         node.op in _RATIONAL or (node.op == "pow" and node.value.denominator == 1) for node in topological(roots)
     )
 
 
 def evaluate(roots: Sequence[Expression], values: Mapping[str, float]) -> list[float]:
-    """Values of the roots in double precision.
+    """Return the values of the roots in double precision.
 
-    Raises `DomainError` outside the real domain, on overflow, and KeyError for a symbol without value.
+    Raises `DomainError` outside the real domain and on overflow, and `KeyError` for a symbol without a value.
     """
     with_floats = {name: float(v) for name, v in values.items()}
     return _guarded(lambda: Numbers(with_floats, float, math, math.pow).values(roots))
 
 
 def evaluate_exactly(roots: Sequence[Expression], values: Mapping[str, Fraction]) -> list[Fraction]:
-    """Exact values of roots for which `is_rational` holds; raises `DomainError` and KeyError as `evaluate`."""
+    """Return the exact values of roots for which `is_rational` holds. Raises the errors of `evaluate`."""
     exact = {name: Fraction(v) for name, v in values.items()}
     return _guarded(lambda: Numbers(exact, Fraction, None, _exact_power).values(roots))
 
 
 def evaluate_precisely(roots: Sequence[Expression], values: Mapping[str, Fraction], digits: int = 50) -> list[Any]:
-    """Values of the roots as mpmath numbers with that many digits; raises as `evaluate`.
+    """Return the values of the roots as mpmath numbers with that many digits. Raises the errors of `evaluate`.
 
-    The global precision of mpmath is left alone.
+    The global precision of mpmath is not changed.
     """
     return [value for value, _ in evaluate_with_scale(roots, values, digits)]
 
@@ -54,9 +54,10 @@ def evaluate_precisely(roots: Sequence[Expression], values: Mapping[str, Fractio
 def evaluate_with_scale(
     roots: Sequence[Expression], values: Mapping[str, Fraction], digits: int = 50
 ) -> list[tuple[Any, Any]]:
-    """Pairs (value, scale) of mpmath numbers; scale is the largest magnitude met below the root, at least 1.
+    """Return pairs (value, scale) of mpmath numbers.
 
-    A value far below its scale may be rounding error only.
+    The scale is the largest magnitude of a node below the root, at least 1. A value far below its scale may be rounding
+    error only.
     """
     context = _mpmath_context(digits)
 
@@ -98,7 +99,7 @@ def _precise_power(context: Any, base: Any, exponent: Any) -> Any:
 
 @cache
 def _mpmath_context(digits: int) -> Any:
-    from mpmath.ctx_mp import MPContext  # here: importing it takes 60 ms
+    from mpmath.ctx_mp import MPContext  # imported here, since the import takes 60 ms
 
     context = MPContext()
     context.dps = digits
@@ -106,7 +107,11 @@ def _mpmath_context(digits: int) -> Any:
 
 
 class Numbers(Arithmetic[Any]):
-    """Numbers of one kind, made by ``convert``; functions come from ``library`` (math or an mpmath context), if any."""
+    """Arithmetic of numbers of one kind, made by ``convert``, with the functions of ``library`` (math or an mpmath
+    context).
+
+    Without a library, only rational operations are possible.
+    """
 
     def __init__(
         self,
@@ -118,19 +123,19 @@ class Numbers(Arithmetic[Any]):
         self._values, self._convert, self._library, self._power = values, convert, library, power
 
     def constant(self, value: Fraction) -> Any:
-        """Convert a rational number to a value."""
+        """Return the number for a rational number."""
         return self._convert(value)
 
     def variable(self, name: str) -> Any:
-        """The value given for a symbol."""
+        """Return the number of a symbol."""
         return self._values[name]
 
     def power(self, base: Any, exponent: Fraction) -> Any:
-        """A number to a rational power."""
+        """Return a rational power of a number."""
         return self._power(base, exponent)
 
     def function(self, name: str, args: list[Any]) -> Any:
-        """A function, by the library or by its own rule."""
+        """Return the value of a function, by the library or by the function's own rule."""
         if name in ("pi", "E"):
             return +getattr(self._expected(name), name.lower())
         if name == "power":

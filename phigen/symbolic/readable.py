@@ -1,4 +1,4 @@
-"""Formulas for reading: polynomials term by term, other expressions with no more parentheses than needed."""
+"""Formulas as text: polynomials term by term, other expressions with no more parentheses than necessary."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SHOWN = 8
 #: Names of φ and its derivatives for readers, as text.
 _GREEK = {name: FUNCTIONS[name].letters.replace("′", "'").replace("″", "''") for name in SPECIAL}
 
-#: The internal functions in which flows are written, by functions that readers know.
+#: The internal functions in which flows are written, in terms of well-known functions.
 UNFAMILIAR = {
     "cosroot": "cosroot(s) = cos √s",
     "sinroot": "sinroot(s) = sin(√s)/√s",
@@ -46,20 +46,21 @@ UNFAMILIAR = {
     "inv0": "inv0(s) = 1/s for s > 0, else 0",
 }
 
-#: The longest formula in a message.
+#: Largest number of characters of a formula in a message.
 LONGEST = 160
 
-#: Formulas with more nodes than this are not expanded to look for a shorter form.
+#: Largest number of nodes of a formula that is expanded in search of a shorter form.
 _LARGE = 400
 
 
-#: Factors (base, exponent), exponents positive or negative rational numbers.
+#: A product of factors (base, exponent), with positive or negative rational exponents.
 Monomial = tuple[tuple[Expression, Fraction], ...]
 
 
 @dataclass(frozen=True)
 class Formula:
-    """Terms (coefficient, monomial) over a common divisor; ``hidden`` further terms are left out."""
+    """A sum of ``terms`` (coefficient, monomial), divided by ``divisor``; ``hidden`` is the number of terms that are
+    left out."""
 
     divisor: int
     terms: tuple[tuple[Fraction, Monomial], ...]
@@ -67,7 +68,7 @@ class Formula:
 
     @property
     def size(self) -> int:
-        """Number of terms, shown or not."""
+        """Number of terms, including hidden ones."""
         return len(self.terms) + self.hidden
 
     def __str__(self) -> str:
@@ -82,7 +83,7 @@ class Formula:
 
 
 def signed_sum(terms: Iterable[tuple[bool, str]]) -> str:
-    """Terms joined by their signs, each given by whether it is negative."""
+    """Return terms joined by their signs; each is a pair of whether it is negative, and its text."""
     printed_sum = "".join(f" {'-' if negative else '+'} {body}" for negative, body in terms)
     return printed_sum[3:] if printed_sum.startswith(" + ") else f"-{printed_sum[3:]}"
 
@@ -96,7 +97,7 @@ def _term(coefficient: Fraction, monomial: str) -> str:
 def of_polynomial(
     tower: Tower, element: Poly, max_terms: int | None = SHOWN, small_symbols: Collection[str] = ()
 ) -> Formula:
-    """The formula of an element of a tower; ``max_terms`` bounds the terms shown, None shows all.
+    """Return the formula of an element of a tower; ``max_terms`` bounds the terms shown, None shows all.
 
     If terms are left out, those of the lowest degree in the ``small_symbols`` come first, and are shown.
     """
@@ -116,9 +117,9 @@ def of_polynomial(
 def readable(
     expressions: Sequence[Expression], max_terms: int | None = SHOWN, small_symbols: Collection[str] = ()
 ) -> list[str]:
-    """The expressions as text, expanded where that is shorter; covectors are written ``p_NAME``.
+    """Return the expressions as text, expanded if that is shorter; covectors are written ``p_NAME``.
 
-    Covectors, and the symbols in ``small_symbols``, count as small where terms are left out: see `of_polynomial`.
+    If terms are left out, covectors and the symbols in ``small_symbols`` count as small; see `of_polynomial`.
     """
     covectors = (name for name in symbols_of(*expressions) if kind_of(name) == MOMENTUM)
     renamed = with_plain_names(expressions)
@@ -132,7 +133,10 @@ def _written(e: Expression) -> str:
 
 
 def infix(e: Expression) -> str:
-    """The expression as text of any length, with no more parentheses than mathematics needs; `text` keeps the tree."""
+    """Return the expression as text of any length, with no more parentheses than mathematics needs.
+
+    Unlike `text`, it does not preserve the tree of the expression.
+    """
 
     def wrap(part: tuple[str, int], level: int) -> str:
         return part[0] if part[1] >= level else f"({part[0]})"
@@ -175,27 +179,28 @@ def infix(e: Expression) -> str:
 
 
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
-    """The expressions with phigen's own symbols under their `plain` names."""
+    """Return the expressions with symbols of phigen replaced by their `plain` names."""
     internal = [n for n in symbols_of(*expressions) if isinstance(n, Symbol)]
     return substitute(expressions, {n: symbol(plain(n)) for n in internal})
 
 
 def shortened(expression: Expression) -> str:
-    """The expression as text of bounded length, for messages."""
+    """Return the expression as text of bounded length, for messages."""
     return cut(readable([expression])[0])
 
 
 def cut(text: str) -> str:
-    """Text of bounded length, for messages."""
+    """Return a text cut to a bounded length, for messages."""
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 
 
 def expanded(
     expressions: Sequence[Expression], max_terms: int | None, small_symbols: Collection[str] = ()
 ) -> Iterator[Formula | None]:
-    """The expressions multiplied out, common factors cancelled, with ``max_terms`` terms shown; see `readable`.
+    """Yield the expressions multiplied out, with common factors cancelled and ``max_terms`` terms shown; see
+    `readable`.
 
-    None for those that are too large to try.
+    None is yielded for expressions that are too large.
     """
     for e in expressions:
         if len(topological([e])) > _LARGE:
@@ -206,7 +211,10 @@ def expanded(
 
 
 def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monomial:
-    """Factors in the order of the variables; a variable that is a power itself contributes its base."""
+    """Return the factors of a monomial in the order of the variables.
+
+    For a variable that is itself a power, the factor is its base.
+    """
     factors = []
     for variable, k in zip(variables, exponents, strict=False):
         if k and variable.op == "pow":
@@ -217,7 +225,7 @@ def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monom
 
 
 def _monomial(factors: Monomial) -> str:
-    """A product as text, negative powers in one denominator."""
+    """Return a product as text, with negative powers in one denominator."""
     numerator = [_atom(power(b, e)) for b, e in factors if e > 0]
     denominator = [_atom(power(b, -e)) for b, e in factors if e < 0]
     top = "*".join(numerator) or "1"

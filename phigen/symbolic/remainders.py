@@ -1,14 +1,15 @@
-"""Exponentials of matrices with at most four rows, by Cayley and Hamilton: e^{tA} = 1 + Σ F_k A^k for k < 4.
+"""Exponentials of matrices with at most four rows, by the theorem of Cayley and Hamilton: e^{tA} = 1 + Σ F_k A^k for k
+< 4.
 
-If A⁴ = a_0 + a_1 A + a_2 A² + a_3 A³, the remainder of e^{tx} at division by p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0 is
-1 + Σ F_k x^k. `REMAINDERS` are the F_k, functions of t, a_0, …, a_3; matrices with three rows have a_0 = 0. They are
-entire: eigenvalues, which may be complex or coincide, do not occur. With g = Σ G_k x^k the remainder of the quotient
-(e^{tx} − 1 − Σ F_k x^k)/p at division by p, whose coefficients are `QUOTIENTS`,
+If A⁴ = a_0 + a_1 A + a_2 A² + a_3 A³, the remainder of e^{tx} on division by p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0 is
+1 + Σ F_k x^k. `REMAINDERS` are the F_k, functions of t, a_0, …, a_3; for matrices with three rows a_0 = 0. The
+functions are entire: eigenvalues, which may be complex or equal, do not occur. Let g = Σ G_k x^k be the remainder of
+the quotient (e^{tx} − 1 − Σ F_k x^k)/p on division by p, with the coefficients `QUOTIENTS`. Then
 
     ∂F_k/∂t = F_{k−1} + a_k F_3 (with F_{−1} = 0, and F_0 + 1 for F_0),   Σ ∂F_k/∂a_j x^k = x^j g mod p.
 
-With y = ux, where u is t halved until the roots of p in y are small, remainders of powers of y are a recurrence, their
-sums are those of e^y, and squares modulo p lead back to t: (1 + F)² − 1 = 2F + F².
+For the computation, t is halved until the roots of p in y = ux are small, where u is the halved t. Remainders of powers
+of y satisfy a recurrence, and their sums are those of e^y. Squares modulo p lead back to t: (1 + F)² − 1 = 2F + F².
 """
 
 from __future__ import annotations
@@ -21,19 +22,20 @@ from typing import Any
 REMAINDERS = tuple(f"exprem{k}" for k in range(4))
 QUOTIENTS = tuple(f"expquo{k}" for k in range(4))
 
-#: The largest bound of the roots, halved, for the series of e^y, and its terms: the rest is below 10⁻¹⁷.
+#: Largest bound of the roots after halving, for the series of e^y, and number of its terms: the omitted ones are below
+#: 10⁻¹⁷.
 MAX_ROOT, TERMS = 0.25, 18
 
-#: Doublings in code without branches: t is that of four times `MAX_ROOT`.
+#: Number of doublings in code without branches: the bound of the roots for t is then four times `MAX_ROOT`.
 LANE_DOUBLINGS = 2
 
 
 def slopes(k: int) -> Callable[..., tuple[Any, ...]]:
-    """Return the rule for the partial derivatives of F_k along t, a_0, …, a_3."""
+    """Return the rule for the partial derivatives of F_k with respect to t, a_0, …, a_3."""
 
     def rule(call: Callable[..., Any], f: Any, t: Any, *a: Any) -> tuple[Any, ...]:
         last = call(REMAINDERS[3], t, *a)
-        vanishing = k == 0 or (k == 1 and getattr(a[0], "is_zero", a[0] == 0))  # F_0 is 0 with a_0
+        vanishing = k == 0 or (k == 1 and getattr(a[0], "is_zero", a[0] == 0))  # F_0 is 0 if a_0 is 0
         previous = 0 if vanishing else call(REMAINDERS[k - 1], t, *a)
         slope = (previous + 1 if k == 1 else previous) + a[k] * last
         quotient = [call(name, t, *a) for name in QUOTIENTS]
@@ -53,17 +55,17 @@ def times_x(coefficients: Any, a: Any) -> list[Any]:
 
 
 def value(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """F_k, in double precision if the library is `math`, else to that of an mpmath context."""
+    """Return F_k in the precision of the library: double for `math`, else that of an mpmath context."""
     return _coefficients(library, t, a)[0][k]
 
 
 def quotient(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """Return G_k (module docstring), in the precision of the library as `value`."""
+    """Return the coefficient G_k of the quotient g, in the precision of the library as for `value`."""
     return _coefficients(library, t, a)[1][k]
 
 
 def _coefficients(library: Any, t: Any, a: Any) -> tuple[list[Any], list[Any]]:
-    """The F_k and the G_k."""
+    """Return the F_k and the G_k."""
     root_bound = max(abs(c * t ** (4 - j)) ** (1 / (4 - j) + 0 * t) for j, c in enumerate(a))
     halvings = 0
     while root_bound > MAX_ROOT:
@@ -92,7 +94,7 @@ def _product(a: Any, b: Any) -> list[Any]:
 
 
 def _divided_by_quadric(d: list[Any], c: Any) -> tuple[list[Any], list[Any]]:
-    """Return quotient and remainder of a polynomial of degree 6 at division by p."""
+    """Return the quotient and the remainder of a polynomial of degree 6 on division by p."""
     d = [*d]
     for k in (6, 5, 4):
         for j in range(4):

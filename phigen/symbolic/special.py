@@ -1,13 +1,13 @@
 """The function φ of the exponential bi-realisation, and its first two derivatives.
 
-φ(s) = (1 − w cot w)/s with w = √s/2, analytic at s = 0 and for s < 0 (where cot becomes coth); poles at
-s = 4π²n². It comes from the even part of z/(1 − e^{−z}): (z/2) coth(z/2) = 1 + z² φ(−z²).
+φ(s) = (1 − w cot w)/s with w = √s/2, analytic at s = 0 and for s < 0 (where cot becomes coth), with poles at s = 4π²n².
+It is defined by the even part of z/(1 − e^{−z}): (z/2) coth(z/2) = 1 + z² φ(−z²).
 
 - φ(s) = Σ a_n sⁿ with a_n = |B_{2n+2}|/(2n+2)!
 - sφ' = 1/8 − (3/2)φ + ½sφ² (Riccati), hence (n + 3/2) a_n = ½ Σ_{i+j=n−1} a_i a_j, a_0 = 1/12
 - φ(s) = Σ_{n≥1} 2/(4π²n² − s): without its nearest pole the series converges for |s| < 16π²
 
-The names of the derivatives as functions of expressions are ``phi0``, ``phi1``, ``phi2``.
+The names of φ and its derivatives as functions of expressions are ``phi0``, ``phi1``, ``phi2``.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from typing import Any
 #: φ, φ', φ''; further derivatives are not available.
 SPECIAL = ("phi0", "phi1", "phi2")
 
-#: Below these magnitudes of s: the plain series; the pole and the series of the rest; beyond, the closed form.
+#: Magnitudes of s that separate three methods: below NEAR the power series; below MIDDLE the nearest pole and a series
+#: of the rest; above it the closed form.
 NEAR, MIDDLE = 0.25, 16.0
 NEAR_TERMS, MIDDLE_TERMS = 9, 21
 POLE = 4 * math.pi**2
 
-#: Where the plain series with `LANE_TERMS` is used, in code without branches.
+#: Largest magnitude of s for the power series in code without branches, and its number of terms.
 LANE_REACH, LANE_TERMS = 4.0, 17
 
 _PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923078164062862089986, 10**82)
@@ -39,7 +40,7 @@ def _series(n: int) -> Fraction:
 
 
 def order_of(name: str) -> int:
-    """Order of the derivative of φ that a name of `SPECIAL` stands for."""
+    """Return the order of the derivative of φ that a name of `SPECIAL` stands for."""
     return SPECIAL.index(name)
 
 
@@ -80,7 +81,7 @@ def in_double(order: int, s: float) -> float:
 
 
 def precisely(context: Any, order: int, s: Any) -> Any:
-    """The value in an mpmath context, to its precision but for two digits."""
+    """Return the value in an mpmath context, to its precision except for two digits."""
     if abs(s) < 1:
         terms = int(context.dps / 1.5) + 6  # a_n decreases like (4π²)^{−n}
         value = context.zero
@@ -93,12 +94,12 @@ def precisely(context: Any, order: int, s: Any) -> Any:
 
 
 def value(library: Any, order: int, s: Any) -> Any:
-    """The value in double precision if the library is `math`, else to that of an mpmath context."""
+    """Return the value in the precision of the library: double for `math`, else that of an mpmath context."""
     return in_double(order, s) if library is math else precisely(library, order, s)
 
 
 def _closed(order: int, s: Any, c: Any) -> Any:
-    """The value from c = w cot w (w coth w for s < 0), by the Riccati equation."""
+    """Return the value from c = w cot w (w coth w for s < 0), by the Riccati equation."""
     phi0 = (1 - c) / s
     if order == 0:
         return phi0

@@ -1,29 +1,29 @@
-"""The names of symbols: plain text for the symbols of a spec, `Symbol` for the symbols that phigen adds."""
+"""The names of symbols: plain text for symbols of a spec, `Symbol` for the symbols that phigen adds."""
 
 from __future__ import annotations
 
 from typing import Any
 
-#: Kinds that several modules distinguish. A kind without keys has one symbol only, such as the step size.
+#: Kinds of symbols that several modules distinguish. A kind without keys has only one symbol, such as the step size.
 MOMENTUM, VARIATION, COTANGENT, INITIAL, GAUGE = "p", "v", "bar", "x0", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
-#: Entries of exp(tA) − 1, by the matrix and the place: coefficients of their own.
+#: Kind of the entries of exp(tA) − 1, by the matrix and the place; they are coefficients.
 EXPONENTIAL = "exponential"
 TEMPORARY, WORK, PART = "t", "w", "part"
-#: Of lattices: what bonds or pairs add to a component of the gradient at a site; 1 where a term reaches beyond no open
-#: end, else 0; 1 at sites of the colour that a part of a graph belongs to, else 0; 1 where the site at an offset has a
-#: colour, and lies on the side of a seam that a sweep is for, else 0.
+#: Kinds for lattices. GATHERED: contribution of bonds or pairs to a component of the gradient at a site. PRESENT: 1 if
+#: a term reaches beyond no open end, else 0. CHOSEN: 1 at sites of the colour that a part of a graph belongs to, else
+#: 0. BEGINS: 1 if the site at an offset has a colour, and lies on the side of a seam that a sweep is for, else 0.
 GATHERED, PRESENT, CHOSEN, BEGINS = "gathered", "present", "chosen", "begins"
-#: Of transposed lattices: the cotangents of the changes of fields at a neighbour, by the number of the field and the
-#: offset; those of sums over bonds or pairs, at the site and at the other end.
+#: Inputs of transposed kernels of lattices: cotangents of the changes of fields at a neighbour, by the number of the
+#: field and the offset; cotangents of sums over bonds or pairs, at the site and at the partner.
 AROUND, HERE, THERE = "change_bar_around", "sums_bar", "sums_bar_there"
 
 
 class Symbol(str):
-    """A name of phigen's own: a kind, and a key that tells it from others of that kind.
+    """A name that phigen adds, of a kind and with a key that distinguishes it from others of the kind.
 
-    Its text, such as ``p:x1``, ``c:3`` or ``h:``, orders symbols and shows them; nothing reads it back. The colon,
-    which no name of a spec can hold, keeps it apart from the names of the user.
+    Its text, such as ``p:x1``, ``c:3`` or ``h:``, is for sorting and display; it is never parsed. Names of a spec
+    cannot contain a colon, so they never clash with it.
     """
 
     __slots__ = ("key", "kind")
@@ -40,55 +40,57 @@ class Symbol(str):
         return (self.kind, *self.key)
 
 
-#: The size of a step, or the time of a flow; the time of an exact solution; a matrix Σ p_i E_i.
+#: Symbols: STEP, the size of a step or the duration of a flow; ELAPSED, the time of an exact solution; MATRIX, a matrix
+#: Σ p_i E_i.
 STEP, ELAPSED, MATRIX = Symbol("h"), Symbol("time"), Symbol("P")
 
-#: Increments of the Wiener processes in a step, by the number of the source.
+#: Kind of the increments of the Wiener processes in a step, by the number of the source.
 INCREMENT = "dw"
 
-#: e = −H(x₀), which a monitored step holds fixed.
+#: Symbol of the energy level e = −H(x₀), which a monitored step holds fixed.
 LEVEL = Symbol("e")
 
 
 def momentum(name: str) -> Symbol:
-    """The symbol of the covector component that belongs to a coordinate."""
+    """Return the symbol of the covector component that belongs to a coordinate."""
     return Symbol(MOMENTUM, name)
 
 
 def increment(k: int) -> Symbol:
-    """The symbol of the increment of a source of noise in a step."""
+    """Return the symbol of the increment of noise source ``k`` in a step."""
     return Symbol(INCREMENT, k)
 
 
 def initial(name: str) -> Symbol:
-    """The symbol of the value of a coordinate at the start."""
+    """Return the symbol of the initial value of a coordinate."""
     return Symbol(INITIAL, name)
 
 
 def variation(name: str) -> Symbol:
-    """The symbol of the variation of a coordinate."""
+    """Return the symbol of the variation of a coordinate."""
     return Symbol(VARIATION, name)
 
 
 def cotangent(name: str) -> Symbol:
-    """The symbol of a cotangent: the derivative of the final result by a value."""
+    """Return the symbol of a cotangent: the derivative of the final result with respect to a value."""
     return Symbol(COTANGENT, name)
 
 
 def coefficient(k: int) -> Symbol:
-    """The symbol of a value that does not depend on the state."""
+    """Return the symbol of a value that does not depend on the state."""
     return Symbol(COEFFICIENT, k)
 
 
 def kind_of(name: str) -> str | None:
-    """The kind of a symbol of phigen's own; None for a name of the user."""
+    """Return the kind of a symbol that phigen added; None for a name of the user."""
     return name.kind if isinstance(name, Symbol) else None
 
 
 def plain(name: str) -> str:
-    """A name for readers: ``p_x1`` for the momentum of x1, as in specs, λ_C for the gauge of C, ``h`` for the step.
+    """Return a name for display: ``p_x1`` for the momentum of x1, as in specs, λ_C for the gauge of C, ``h`` for the
+    step.
 
-    Shared sub-expressions are named σ_1, σ_2, …
+    Shared sub-expressions are called σ_1, σ_2, …
     """
     if not isinstance(name, Symbol):
         return name

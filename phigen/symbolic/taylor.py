@@ -1,10 +1,9 @@
 """Truncated power series in t of a composed expression, level by level.
 
-A `Taylor` holds the series of every node of an expression graph whose symbols are themselves series.
-Coefficients live in any ring that offers ``constant``, ``function`` and ``power``: a `Tower`
-(polynomials), or `ExpressionRing` (shared expression graphs). Levels are computed one at a time, so the
-coefficients of a symbol at level i may depend on the result at level i−1: that is what lets the
-Hamilton–Jacobi recursion compute each coefficient once.
+A `Taylor` contains the series of every node of an expression graph whose symbols are themselves series. The
+coefficients are elements of any ring with ``constant``, ``function`` and ``power``: a `Tower` (polynomials), or
+`ExpressionRing` (shared expression graphs). Levels are computed one at a time, so the coefficients of a symbol at level
+i may depend on the result at level i−1. Thus the Hamilton–Jacobi recursion computes each coefficient once.
 """
 
 from __future__ import annotations
@@ -33,36 +32,36 @@ from phigen.symbolic.special import SPECIAL, coefficient, order_of
 
 
 class RingOperations(Protocol):
-    """Operations of a ring of coefficients besides + and −."""
+    """Operations of a ring of coefficients other than + and −."""
 
     @property
     def bytes_per_term(self) -> int:
-        """Memory of one term of an element that has a length; 0 where elements do not grow."""
+        """Memory in bytes of one term of an element; 0 if elements have a fixed size."""
 
     def product(self, a: Any, b: Any) -> Any:
-        """a·b; raises `OverflowError` where that may be larger than memory."""
+        """Return a·b. Raises `OverflowError` if the product may be larger than memory."""
 
     def constant(self, value: int | Fraction) -> Any:
-        """A rational number as an element."""
+        """Return a rational number as an element."""
 
     def variable(self, name: str) -> Any:
-        """A symbol as an element."""
+        """Return a symbol as an element."""
 
     def function(self, name: str, args: list[Any]) -> Any:
-        """An elementary function (or ``pi``, ``E`` with no arguments)."""
+        """Return an elementary function of elements, or ``pi`` or ``E``, which have no arguments."""
 
     def power(self, base: Any, exponent: Fraction | int) -> Any:
         """Return a rational power of an element."""
 
     def combine(self, terms: list[Any]) -> Any:
-        """The sum of the terms."""
+        """Return the sum of the terms."""
 
     def vanishes(self, element: Any) -> bool:
-        """Whether the element is 0 in its own form (no relations used)."""
+        """Whether the element is 0 in its present form; relations are not used."""
 
 
 class ExpressionRing(Arithmetic[Expression]):
-    """The ring of expression graphs: no expansion, sub-expressions shared."""
+    """The ring of expression graphs: nothing is expanded, and sub-expressions are shared."""
 
     bytes_per_term = 0
 
@@ -79,7 +78,7 @@ class ExpressionRing(Arithmetic[Expression]):
         return symbol(name)
 
     def function(self, name: str, args: list[Expression]) -> Expression:
-        """A call, or one of the constants."""
+        """Return a function call, or one of the constants."""
         if not args:
             return PI if name == "pi" else EULER
         return power(*args) if name == "power" else call(name, *args)
@@ -93,12 +92,13 @@ class ExpressionRing(Arithmetic[Expression]):
         return total(terms)
 
     def vanishes(self, element: Expression) -> bool:
-        """Whether it is the literal 0."""
+        """Whether the element is the literal 0."""
         return element is ZERO
 
 
 def closure(roots: Sequence[Expression]) -> list[Expression]:
-    """Nodes in the order of evaluation: those of the roots, and the derivatives that function nodes need."""
+    """Return the nodes below the roots and below the derivatives that function nodes need, in the order of
+    evaluation."""
     closed = list(roots)
     while True:
         order = topological(closed)
@@ -114,9 +114,9 @@ def _by_derivative(e: Expression) -> bool:
 
 
 class Taylor:
-    """Series in t of the nodes of some expressions; ``series[id(node)]`` lists the coefficients so far.
+    """Series in t of the nodes of some expressions; ``series[id(node)]`` lists the coefficients computed so far.
 
-    Polynomials that become too large, one of them or all together, raise `OverflowError`.
+    Raises `OverflowError` if one polynomial, or all polynomials together, become too large.
     """
 
     def __init__(self, roots: Sequence[Expression], ring: RingOperations, variable_symbols: Sequence[str]) -> None:
@@ -129,11 +129,14 @@ class Taylor:
         self._bytes = 0
 
     def coefficients(self, e: Expression) -> list[Any]:
-        """The coefficients of a node, as far as they are known."""
+        """Return the coefficients of a node that have been computed."""
         return self.series[id(e)]
 
     def advance(self, inputs: dict[str, Any], running: progress.Stage | None = None) -> None:
-        """Compute the next level of all nodes; ``inputs`` gives that of the moving symbols, ``running`` counts them."""
+        """Compute the next level of all nodes.
+
+        ``inputs`` has the level of the symbols that are series. ``running`` counts the nodes, for the progress display.
+        """
         for count, e in enumerate(self.order, 1):
             coefficients = self.series[id(e)]
             coefficients.append(self._coefficient(e, len(coefficients), inputs))
@@ -148,7 +151,7 @@ class Taylor:
         return product
 
     def _count(self, element: Any) -> None:
-        """Add to the memory that is used; raises `OverflowError` beyond the budget."""
+        """Add the memory of an element to the total. Raises `OverflowError` beyond the budget."""
         if self.ring.bytes_per_term:
             self._bytes += len(element) * self.ring.bytes_per_term
             if self._bytes > budgets.TAYLOR_BYTES:
@@ -195,14 +198,14 @@ class Taylor:
             return self._integer_power(a, int(exponent), i)
         if i == 0:
             return self.ring.power(a[0], exponent)
-        # c = a**r satisfies a·c' = r·a'·c.
+        # The series c = a**r satisfies a·c' = r·a'·c.
         powers, zero = self.series[id(e)], self.ring.vanishes
         terms = [
             self._product(a[j], powers[i - j]) * self.ring.constant((exponent * j - (i - j)) / i)
             for j in range(1, i + 1)
             if not (zero(a[j]) or zero(powers[i - j]))
         ]
-        # For a constant base the ring may hold this power but not the reciprocal.
+        # For a constant base the ring may contain this power but not its reciprocal.
         return self.ring.combine(terms) * self.ring.power(a[0], -1) if terms else self._zero
 
     def _integer_power(self, a: list[Any], n: int, i: int) -> Any:
@@ -219,7 +222,7 @@ class Taylor:
     def _function(self, e: Expression, args: list[list[Any]], i: int) -> Any:
         if i == 0:
             return self.ring.function(e.op, [a[0] for a in args])
-        # c = f(a) satisfies c' = Σ ∂f/∂a_k(a) · a_k', and the partial derivatives are nodes themselves.
+        # The series c = f(a) satisfies c' = Σ ∂f/∂a_k(a) · a_k', where the partial derivatives are nodes too.
         zero = self.ring.vanishes
         terms = []
         for partial, a in zip(partials(e), args, strict=True):
@@ -232,7 +235,7 @@ class Taylor:
         return self.ring.combine(terms)
 
     def _analytic(self, e: Expression, a: list[Any], i: int) -> Any:
-        """The level of a function with a power series at 0, composed with a series that begins there."""
+        """Return a level of a function with a power series at 0, composed with a series that begins at 0."""
         order = order_of(e.op)
         if i == 0:
             if not self.ring.vanishes(a[0]):

@@ -1,9 +1,9 @@
 """The differential ring in which phigen computes: polynomials over Q in symbols and in function values.
 
-A non-polynomial function of the data (``exp(x)``, ``1/(x**2+1)``, ``sqrt(l)`` …) is one more variable of the
-ring, a *generator*, whose derivatives are again elements of the ring. Geometry and series thus stay in
-one fast polynomial arithmetic whatever the Hamiltonian is. The price is that generators satisfy
-relations (r·f = 1, w² = q, sin² + cos² = 1 …); `Tower.is_zero` eliminates them.
+A function value in the data that is not polynomial (``exp(x)``, ``1/(x**2+1)``, ``sqrt(l)`` …) is one more variable of
+the ring, a *generator*, whose derivatives are again elements of the ring. So geometry and series use one fast
+polynomial arithmetic for every Hamiltonian. Generators satisfy relations (r·f = 1, w² = q, sin² + cos² = 1 …), which
+`Tower.is_zero` eliminates.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 from phigen.symbolic.symbols import Symbol
 
-#: From `MANY_GENERATORS` on an element is first evaluated at a point: its numerator takes minutes for seven roots.
-#: What cancels leaves less than `ROUNDING` of the sum of the magnitudes of its terms.
+#: Number of generators from which on an element is first evaluated at a point: its numerator takes minutes for seven
+#: roots. ROUNDING is the largest relative size of a sum that may be 0, compared with the magnitudes of its terms.
 MANY_GENERATORS, ROUNDING = 5, 1e-9
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
@@ -48,10 +48,10 @@ Poly = Any
 
 @dataclass
 class Generator:
-    """A function value as a variable of the ring; ``derivative`` has those of its derivatives that are not 0.
+    """A function value as a variable of the ring; ``derivative`` has its nonzero derivatives.
 
-    ``kind`` is the function's name, ``constant`` (pi, E), ``reciprocal`` (1/argument, the argument
-    irreducible) or ``root`` (argument**(±1/degree)).
+    ``kind`` is the name of the function, ``constant`` (pi, E), ``reciprocal`` (1/argument, with an irreducible
+    argument) or ``root`` (argument**(±1/degree)).
     """
 
     name: str
@@ -64,19 +64,19 @@ class Generator:
 
 
 class _MissingError(Exception):
-    """A generator that the ring does not have yet."""
+    """The ring lacks a generator, which is added next."""
 
     def __init__(self, kind: str, arguments: list[Poly], degree: int = 1, inverse: bool = False) -> None:
         self.kind, self.arguments, self.degree, self.inverse = kind, arguments, degree, inverse
 
 
 class Tower(Arithmetic[Poly]):
-    """The ring Q[symbols, generators] that holds the given expressions and their derivatives.
+    """The ring Q[symbols, generators] that contains the given expressions and their derivatives.
 
-    ``symbols`` are the polynomial variables, ``expressions`` what must be representable, and
-    ``variables`` the symbols with respect to which the ring is closed under differentiation.
+    ``symbols`` are the polynomial variables, ``expressions`` must be elements of the ring, and ``variables`` are the
+    symbols with respect to which the ring is closed under differentiation.
 
-    Raises `OverflowError` if that takes polynomials that may be larger than memory.
+    Raises `OverflowError` if polynomials that may be larger than memory would be needed.
     """
 
     def __init__(
@@ -109,7 +109,7 @@ class Tower(Arithmetic[Poly]):
         return tuple(self._index)
 
     def _set_context(self, spare: int = 0) -> None:
-        """Make the ring of all names and ``spare`` further ones, and convert the generators to it."""
+        """Make the ring of all names and ``spare`` additional ones, and convert the generators to it."""
         self._room = max(len(self._index) + spare, 1)
         self.context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(self._room)], Ordering.degrevlex)
         self.gens = self.context.gens()
@@ -122,16 +122,16 @@ class Tower(Arithmetic[Poly]):
         """Drop cached values that depend on the generators."""
         self._pairs: list[tuple[int, int]] | None = None
         self._below: dict[str, frozenset[str]] = {}
-        self._known: dict[int, Poly] = {}  # of functions in what is absorbed, which `_kept` keeps alive
+        self._known: dict[int, Poly] = {}  # values of functions; `_kept` keeps their nodes alive
         self._kept: list[Expression] = []
 
     def constant(self, value: int | Fraction) -> Poly:
-        """The rational number as an element."""
+        """Return a rational number as an element."""
         value = Fraction(value)
         return self.context.constant(fmpq(value.numerator, value.denominator))
 
     def variable(self, name: str) -> Poly:
-        """The symbol or generator of that name."""
+        """Return the symbol or generator of that name as an element."""
         return self.gens[self._index[name]]
 
     @property
@@ -142,7 +142,8 @@ class Tower(Arithmetic[Poly]):
     # -- growing ----------------------------------------------------------------------------------
 
     def _absorb(self, e: Expression) -> Poly:
-        """The value of an expression; adds missing generators to the ring, and reuses known values of functions."""
+        """Return the value of an expression; missing generators are added to the ring, and known values of functions
+        reused."""
         while True:
             try:
                 for node in topological([e], self._known):
@@ -154,7 +155,7 @@ class Tower(Arithmetic[Poly]):
                 self._grow(missing)
 
     def _grow(self, missing: _MissingError) -> None:
-        # The root of q, found after 1/q, replaces 1/q from now on: elements with 1/q are converted again.
+        # The root of q, found after 1/q, replaces 1/q: elements with 1/q are converted again.
         is_inverse_root = missing.kind == "root" and missing.inverse
         if is_inverse_root and any(g.kind == "reciprocal" for g in self.generators):
             self._renamed = True
@@ -190,7 +191,7 @@ class Tower(Arithmetic[Poly]):
             (rules,) = sparse_derivatives([self.generators[closed_count].expression], self.variables)
             for v in self.variables:
                 if v in rules:
-                    value = self._absorb(rules[v])  # which may replace the generators by larger ones
+                    value = self._absorb(rules[v])  # may replace the generators by larger ones
                     self.generators[closed_count].derivative[v] = value
                     size += len(value) * self.bytes_per_term
                     if size > budgets.PRODUCT_BYTES:
@@ -201,18 +202,19 @@ class Tower(Arithmetic[Poly]):
     # -- conversion -------------------------------------------------------------------------------
 
     def convert(self, e: Expression) -> Poly:
-        """The expression as an element; ValueError if it needs a function that the tower does not have."""
+        """Return the expression as an element. Raises `ValueError` if it needs a function that the tower does not
+        have."""
         return self.convert_all([e])[0]
 
     def convert_all(self, expressions: Sequence[Expression]) -> list[Poly]:
-        """`convert` for several expressions that share parts."""
+        """Return `convert` for several expressions, which may share parts."""
         try:
             return self.values(expressions)
         except _MissingError as missing:
             raise ValueError(f"the ring has no generator for {missing.kind}") from None
 
     def function(self, name: str, args: list[Poly]) -> Poly:
-        """A function of elements, where the tower has it (used for constant terms of series)."""
+        """Return a function of elements, if the tower has it; this is used for constant terms of series."""
         if not args:
             return self._generator(name, [])
         args = [self.cancelled(a) for a in args]
@@ -233,7 +235,7 @@ class Tower(Arithmetic[Poly]):
         if name == "log" and first == 1:
             return self.zero
         if record.parity and rational(first.leading_coefficient()) < 0:
-            # One generator for f(q) and f(-q).
+            # f(q) and f(-q) share one generator.
             mirrored = self._generator(name, [-first])
             return mirrored if record.parity == "even" else -mirrored
         if name == "exp":
@@ -244,7 +246,10 @@ class Tower(Arithmetic[Poly]):
         return self._generator(name, args)
 
     def _entire(self, name: str, s: Poly) -> Poly:
-        """A function of `ENTIRE`, by cosroot, sinroot, exp and 1/s; the first two always come together."""
+        """Return a function of `ENTIRE`, in terms of cosroot, sinroot, exp and 1/s.
+
+        cosroot and sinroot are always added together.
+        """
         if s.is_constant() and s == 0:
             return self.constant(ENTIRE[name].coefficient(0))
         if name in ("exprel", "exprel1"):
@@ -255,7 +260,7 @@ class Tower(Arithmetic[Poly]):
             sine = self._entire("sinroot", s * self.constant(Fraction(1, 4)))
             numerator = sine**2 * self.constant(Fraction(1, 2)) - 3 * self._entire("arcroot", s)
             return numerator * self._reciprocal(s) * self.constant(Fraction(1, 2))
-        if name == "arcroot":  # by half angles, in which flows with it are written
+        if name == "arcroot":  # by half angles, in which flows are written
             quarter = s * self.constant(Fraction(1, 4))
             return (1 - self._entire("sinroot", quarter) * self._entire("cosroot", quarter)) * self._reciprocal(s)
         cos, sin = self._generator("cosroot", [s]), self._generator("sinroot", [s])
@@ -264,7 +269,7 @@ class Tower(Arithmetic[Poly]):
         return cos if name == "cosroot" else sin
 
     def _special(self, order: int, s: Poly) -> Poly:
-        """φ, φ' or φ'' of an element, written with φ(s) and 1/s alone by the Riccati equation of φ."""
+        """Return φ, φ' or φ'' of an element, in terms of φ(s) and 1/s only, by the Riccati equation of φ."""
         if s.is_constant() and s == 0:
             return self.constant(coefficient(order, 0))
         phi = self._generator("phi0", [s])
@@ -278,16 +283,16 @@ class Tower(Arithmetic[Poly]):
 
     @property
     def bytes_per_term(self) -> int:
-        """Memory of one term of an element, measured while products are made and added."""
+        """Memory in bytes of one term of an element, measured for products and sums."""
         return 60 + 3 * len(self._index)
 
     def product(self, a: Poly, b: Poly) -> Poly:
-        """a·b. Raises `OverflowError` rather than make one that may be larger than memory."""
+        """Return a·b. Raises `OverflowError` before a product is made that may be larger than memory."""
         self._expect_room(len(a) * len(b))
         return a * b
 
     def integer_power(self, base: Poly, n: int) -> Poly:
-        """base ** n for n ≥ 0. Raises `OverflowError` as `product`."""
+        """Return base ** n for n ≥ 0. Raises the errors of `product`."""
         if n > 1 and len(base) > 1:
             dense = math.prod(n * int(d) + 1 for d in base.degrees())
             self._expect_room(min(math.comb(len(base) + n - 1, n), dense))
@@ -298,7 +303,7 @@ class Tower(Arithmetic[Poly]):
             raise OverflowError(f"a polynomial of up to {terms} terms")
 
     def power(self, base: Poly, exponent: Fraction | int) -> Poly:
-        """base ** exponent for a rational exponent. Raises `OverflowError` as `product`."""
+        """Return base ** exponent for a rational exponent. Raises the errors of `product`."""
         base, exponent = self.cancelled(base), Fraction(exponent)
         if exponent.denominator == 1:
             n = int(exponent)
@@ -311,7 +316,7 @@ class Tower(Arithmetic[Poly]):
         return self.integer_power(base, k // n) * self._generator("root", [base], n, False) ** (k % n)
 
     def inverse(self, base: Poly) -> Poly | None:
-        """1/base, if the tower has it."""
+        """Return 1/base if the tower has it, else None."""
         try:
             return self._reciprocal(base)
         except (_MissingError, ZeroDivisionError):
@@ -348,11 +353,11 @@ class Tower(Arithmetic[Poly]):
         raise _MissingError(kind, args, degree, inverse)
 
     def expression(self, element: Poly) -> Expression:
-        """The element as an expression, in Horner form, generators written out."""
+        """Return the element as an expression in Horner form, with generators written as functions."""
         return self.expression_in(element, {})
 
     def expression_in(self, element: Poly, values: Mapping[str, Expression]) -> Expression:
-        """`expression` with some of the ring's variables replaced."""
+        """Return `expression` with some of the ring's variables replaced by ``values``."""
         variables = self._meanings
         if values:
             variables = [values.get(n, meaning) for n, meaning in zip(self.names, variables, strict=True)]
@@ -362,8 +367,9 @@ class Tower(Arithmetic[Poly]):
     # -- calculus ---------------------------------------------------------------------------------
 
     def derivative(self, element: Poly, name: str) -> Poly:
-        """Total derivative with respect to one of `variables`, through the generators."""
-        result = element.derivative(self._index[name]) + 0  # a copy, which frees the memory of terms that have gone
+        """Return the total derivative with respect to one of `variables`, including that of the generators."""
+        # a copy, which frees the memory of terms that were cancelled
+        result = element.derivative(self._index[name]) + 0
         degrees = element.degrees()
         for g in self.generators:
             k = self._index[g.name]
@@ -373,7 +379,10 @@ class Tower(Arithmetic[Poly]):
         return self.cancelled(result)
 
     def gradient(self, element: Poly, names: Iterable[str]) -> list[Poly]:
-        """The derivatives along some of `variables`. Raises `OverflowError` if together they are larger than memory."""
+        """Return the derivatives with respect to some of `variables`.
+
+        Raises `OverflowError` if all derivatives together are larger than memory.
+        """
         slopes, size = [], 0
         for name in names:
             slopes.append(self.derivative(element, name))
@@ -383,18 +392,18 @@ class Tower(Arithmetic[Poly]):
         return slopes
 
     def partial(self, element: Poly, name: str) -> Poly:
-        """Derivative along a symbol that no generator contains."""
+        """Return the derivative with respect to a symbol that no generator contains."""
         if any(self.depends_on(a, [name]) for g in self.generators for a in g.arguments):
             raise ValueError(f"{name} is in a function")
         return element.derivative(self._index[name])
 
     def depends_on(self, element: Poly, names: Iterable[str]) -> bool:
-        """Whether some of the symbols occur, directly or inside a generator."""
+        """Whether some of the symbols occur in the element, directly or inside a generator."""
         return not self.names_in(element).isdisjoint(names)
 
     def names_in(self, element: Poly) -> set[str]:
-        """The symbols and generators that occur, directly or inside a generator."""
-        if element == 0:  # whose degrees are −1
+        """Return the symbols and generators that occur in the element, directly or inside a generator."""
+        if element == 0:  # its degrees are −1
             return set()
         names: set[str] = set()
         for i, degree in enumerate(element.degrees()):
@@ -405,7 +414,7 @@ class Tower(Arithmetic[Poly]):
         return names
 
     def _names_below(self, g: Generator) -> frozenset[str]:
-        """A generator and what its arguments depend on."""
+        """Return the name of a generator and the names that its arguments depend on."""
         if g.name not in self._below:
             self._below[g.name] = frozenset({g.name}.union(*map(self.names_in, g.arguments)))
         return self._below[g.name]
@@ -413,13 +422,16 @@ class Tower(Arithmetic[Poly]):
     # -- deciding ---------------------------------------------------------------------------------
 
     def is_zero(self, element: Poly) -> bool:
-        """True proves that the element vanishes identically; False only that it did not reduce to 0."""
+        """Return whether the element is proved to vanish identically.
+
+        False says only that it was not reduced to 0.
+        """
         if element == 0 or self._is_nonzero_at_a_point(element):
             return bool(element == 0)
         return bool(self.numerator(element) == 0)
 
     def _is_nonzero_at_a_point(self, element: Poly) -> bool:
-        """Whether an element of many generators, whose numerator may be very long, has a value that is not 0."""
+        """Whether an element of many generators has a nonzero value at a point; its numerator may be very long."""
         degrees = element.degrees()
         if sum(degrees[self._index[g.name]] > 0 for g in self.generators) < MANY_GENERATORS:
             return False
@@ -431,7 +443,7 @@ class Tower(Arithmetic[Poly]):
         return abs(math.fsum(terms)) > ROUNDING * math.fsum(map(abs, terms))
 
     def _values_at_a_point(self) -> list[float]:
-        """The values of the ring's variables at one point, in floats; NaN for all where one is not defined."""
+        """Return the values of the ring's variables at one point, in floats; all are NaN if one is not defined."""
         if len(self._sampled) != len(self._meanings):
             point = {n: 0.5 + math.modf((k + 1) * (math.sqrt(5) - 1) / 2)[0] for k, n in enumerate(self.symbols)}
             try:
@@ -441,7 +453,8 @@ class Tower(Arithmetic[Poly]):
         return self._sampled
 
     def numerator(self, element: Poly) -> Poly:
-        """A multiple of the element by a non-vanishing function, with relations between generators used up."""
+        """Return a multiple of the element by a non-vanishing function, with relations between generators
+        eliminated."""
         degrees = element.degrees()
         for g in reversed(self.generators):
             if degrees[self._index[g.name]] > 0:
@@ -450,11 +463,12 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def simplified(self, element: Poly) -> Poly:
-        """The same function with fewer terms, by relations that keep its value: r·f = 1, w² = q, sin² + cos² = 1."""
+        """Return an equal function with fewer terms, by the relations r·f = 1, w² = q, sin² + cos² = 1."""
         return self._shortened(element, relations=True)
 
     def reduced(self, element: Poly) -> Poly:
-        """The same function with common factors of numerator and denominator cancelled, if fewer terms remain."""
+        """Return an equal function with common factors of numerator and denominator cancelled, if fewer terms
+        remain."""
         return self._shortened(self.cancelled(element), relations=False)
 
     def _shortened(self, element: Poly, *, relations: bool) -> Poly:
@@ -473,11 +487,13 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def _is_related(self, g: Generator) -> bool:
-        """Whether powers of a generator are polynomials in lower ones and in others: w² = q, sin² = 1 − cos²."""
+        """Whether powers of a generator are polynomials in lower powers and in other generators: w² = q, sin² = 1 −
+        cos²."""
         return g.kind in ("sin", "cosh", "cosroot", "sign") or (g.kind == "root" and not self._partner(g))
 
     def _divided(self, element: Poly, g: Generator) -> Poly:
-        """The element with lower powers of r, where terms are multiples of f = 1/r, or of f = r^-n."""
+        """Return the element with lower powers of a reciprocal r, for terms that are multiples of f = 1/r or f =
+        r^-n."""
         parts, generator, base = self._parts(element, g.name), self.variable(g.name), g.arguments[0]
         for e in range(max(parts, default=0), g.degree - 1, -1):
             quotient, parts[e] = divmod(parts.get(e, self.zero), base)
@@ -485,7 +501,7 @@ class Tower(Arithmetic[Poly]):
         return self.combine(c * generator**e for e, c in parts.items())
 
     def _partner(self, g: Generator) -> Generator | None:
-        """The root 1/w for w, or w for 1/w, if it came before."""
+        """Return the generator 1/w for a root w, or w for 1/w, if it precedes ``g``; else None."""
         for candidate in self.generators[: self.generators.index(g)]:
             if candidate.kind == "root" and candidate.degree == g.degree and candidate.arguments == g.arguments:
                 return candidate
@@ -527,7 +543,7 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def _eliminate_cosroot(self, parts: dict[int, Poly], g: Generator) -> Poly:
-        """The element with powers of cosroot above 1 replaced, by cosroot² + s·sinroot² = 1."""
+        """Return the element with powers of cosroot above 1 replaced, by cosroot² + s·sinroot² = 1."""
         generator, sin = self.variable(g.name), self._generator("sinroot", g.arguments)
         square = 1 - g.arguments[0] * sin**2
         return self.combine(c * generator ** (e % 2) * square ** (e // 2) for e, c in parts.items())
@@ -535,7 +551,7 @@ class Tower(Arithmetic[Poly]):
     def _eliminate_root(self, parts: dict[int, Poly], g: Generator) -> Poly:
         base, n, generator = g.arguments[0], g.degree, self.variable(g.name)
         if partner := self._partner(g):
-            # w·v = 1: multiplied by a power of the partner, g disappears.
+            # w·v = 1: multiplication by a power of the partner eliminates g.
             top, w = max(parts), self.variable(partner.name)
             return self.combine(c * w ** (top - e) for e, c in parts.items())
         if not g.inverse:
@@ -544,21 +560,24 @@ class Tower(Arithmetic[Poly]):
         return self.combine(c * generator ** (e % n) * base ** (top - e // n) for e, c in parts.items())
 
     def _parts(self, element: Poly, name: str) -> dict[int, Poly]:
-        """The coefficients of the powers of a generator that occur; divisions by powers go through terms in C."""
+        """Return the coefficients of the powers of a generator that occur.
+
+        Terms are divided by powers in the C library.
+        """
         i, parts = self._index[name], dict[int, Poly]()
         while (exponent := int(element.degrees()[i])) > 0:
             parts[exponent], element = divmod(element, self.gens[i] ** exponent)
         return {**parts, 0: element} if element != 0 else parts
 
     def combine(self, terms: Iterable[Poly]) -> Poly:
-        """The sum of the terms, v · (1/v) cancelled."""
+        """Return the sum of the terms, with v · (1/v) cancelled."""
         result = self.zero
         for t in terms:
             result += t
         return self.cancelled(result)
 
     def cancelled(self, element: Poly) -> Poly:
-        """The element with products of a variable and its reciprocal, or of w and 1/w for a root, cancelled."""
+        """Return the element with cancelled products of a variable and its reciprocal, or of w and 1/w for a root w."""
         degrees = element.degrees()
         pairs = [(i, j) for i, j in self._inverse_pairs() if degrees[i] and degrees[j]]
         if not pairs:
@@ -570,7 +589,7 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def _inverse_pairs(self) -> list[tuple[int, int]]:
-        """Indices of ring variables whose product is 1."""
+        """Pairs of indices of ring variables whose product is 1."""
         if self._pairs is None:
             self._pairs = []
             for g in self.generators:
@@ -586,19 +605,19 @@ class Tower(Arithmetic[Poly]):
         return self._pairs
 
     def vanishes(self, element: Poly) -> bool:
-        """Whether the element is 0 as a polynomial (no relations used)."""
+        """Whether the element is 0 as a polynomial; relations are not used."""
         return bool(element == 0)
 
 
 def _is_arithmetic(e: Expression) -> bool:
-    """Whether a node needs no generator: it is a polynomial in its arguments."""
+    """Whether a node needs no generator, since it is a polynomial in its arguments."""
     if e.op == "pow":
         return bool(e.value > 0 and e.value.denominator == 1)
     return e.op in ("number", "symbol", "add", "sub", "neg", "mul")
 
 
 def rational(c: Any) -> Fraction:
-    """A flint rational as a Fraction."""
+    """Return a flint rational as a Fraction."""
     return Fraction(int(c.p), int(c.q))
 
 
@@ -607,7 +626,7 @@ def _exponents(m: Iterable[Any]) -> tuple[int, ...]:
 
 
 def _ratio(a: Poly, b: Poly) -> Fraction | None:
-    """a/b if that is a rational number."""
+    """Return a/b if that is a rational number, else None."""
     if a == 0 or b == 0 or len(a) != len(b):
         return None
     r = a.leading_coefficient() / b.leading_coefficient()

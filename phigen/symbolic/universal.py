@@ -15,34 +15,37 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-#: The name of the function; its arguments are t, r, η, β, μ and |q × q̇|².
+#: Name of the function; its arguments are t, r, η, β, μ and |q × q̇|².
 ANOMALY = "anomaly"
 
-#: Iterations after which the function has no value: halving a bracket takes 53, growing one up to 1,000.
+#: Largest number of iterations, after which the function has no value. Halving a bracket takes 53 iterations.
 MOST_ITERATIONS = 100
 
-#: A motion is radial where |q × q̇|² is below this part of η² + |μ|r: the products have ten units of rounding.
+#: A motion is radial if |q × q̇|² is below this fraction of η² + |μ|r; the products have ten units of rounding.
 RADIAL = 1e-30
 
 
 def slopes(
     call: Callable[..., Any], s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any
 ) -> tuple[Any, ...]:
-    """The partial derivatives along t, r, η, β and μ; |q × q̇|² only tells whether there is a value."""
+    """Return the partial derivatives with respect to t, r, η, β and μ.
+
+    |q × q̇|² only decides whether there is a value, so its derivative is 0.
+    """
     square = s**2
     z = beta * square
     half_sine, slope = call("sinroot", z / 4), call("sinroot1", z / 4)
     g1, g2, g3 = s * call("sinroot", z), square * half_sine**2 / 2, square * s * call("arcroot", z)
     inverse = 1 / (r * call("cosroot", z) + eta * g1 + mu * g2)
-    # sinroot(z/4)²/2 has the derivative sinroot(z/4) sinroot1(z/4)/4 along z.
+    # sinroot(z/4)²/2 has the derivative sinroot(z/4) sinroot1(z/4)/4 with respect to z.
     along_t = r * call("sinroot1", z) + eta * s * (half_sine * slope / 4) + mu * square * call("arcroot1", z)
     return inverse, -(g1 * inverse), -(g2 * inverse), -(square * s * along_t * inverse), -(g3 * inverse), 0
 
 
 def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any) -> Any:
-    """The value, in double precision if the library is `math`, else to that of an mpmath context.
+    """Return the value in the precision of the library: double for `math`, else that of an mpmath context.
 
-    `ValueError` where there is none: at r = 0, and beyond a collision of a radial motion.
+    Raises `ValueError` if there is no value: at r = 0, and beyond a collision of a radial motion.
     """
     if not r > 0:
         raise ValueError("the distance of a Kepler motion is not positive")
@@ -56,7 +59,7 @@ def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any)
 
 
 def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
-    """The solution for t > 0, by Laguerre's method between bounds, until the residual is rounding."""
+    """Return the solution for t > 0, by Laguerre's method between bounds, until the residual is rounding error."""
     rounding = 2.3e-16 if library is math else library.eps
     low, high, s = 0 * t, None, _guess(library, t, r, eta, beta, mu)
     for k in range(MOST_ITERATIONS + (0 if library is math else 10 * library.dps)):
@@ -77,8 +80,11 @@ def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any
 
 
 def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
-    """The series of the solution where the motion is a small part of an orbit; else that of the mean motion, or a unit
-    of a hyperbola, which is doubled if it is too small."""
+    """Return an initial value of the iteration.
+
+    It is a series if the motion is a small part of an orbit. Otherwise it is that of the mean motion, or a unit of a
+    hyperbola, which is doubled if it is too small.
+    """
     u = t / r
     if abs(beta) * u**2 > 1:
         return beta * t / mu if beta > 0 else 1 / library.sqrt(-beta)
@@ -89,7 +95,7 @@ def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
 
 
 def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> tuple[Any, Any, Any, Any]:
-    """The residual, the size of its terms, and its first two derivatives."""
+    """Return the residual, the size of its terms, and its first two derivatives."""
     from phigen.symbolic import entire
 
     z = beta * s**2
@@ -106,7 +112,8 @@ def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any
 
 
 def _collides(library: Any, s: Any, r: Any, eta: Any, beta: Any) -> bool:
-    """Whether a radial motion has met r = 0 before s: √r moves like a pendulum of small amplitude along s."""
+    """Whether a radial motion reaches r = 0 before s: √r, as a function of s, moves like a pendulum of small
+    amplitude."""
     from phigen.symbolic import entire
 
     z = beta * s**2 / 4

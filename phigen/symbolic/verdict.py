@@ -1,4 +1,4 @@
-"""Statements that were proved, refuted, or only checked at points; decision whether expressions vanish."""
+"""Statements, which are proved, refuted, or only checked at points, and the decision whether expressions vanish."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ UNDECIDED = "undecided"
 
 POINTS = 8
 DIGITS = 60
-#: A value below 10**-ZERO_DIGITS of its scale counts as zero; rounding stays 15 digits below that.
+#: Values below 10**-ZERO_DIGITS times their scale count as zero; rounding errors are 15 digits smaller.
 ZERO_DIGITS = 40
 _ATTEMPTS = 64
-#: Failing parts that a refutation lists; it bounds the memory for large structures.
+#: Largest number of failing parts that a refutation lists; it bounds the memory for large structures.
 MOST_LISTED = 1000
 
 
 @dataclass(frozen=True)
 class Statement:
-    """One checked statement.
+    """A statement with its verdict.
 
-    ``verdict`` is ``proved`` (in exact arithmetic, for all values of the symbols), ``refuted`` (``residual`` is
-    what should be zero and is not), ``checked numerically`` (``detail`` says at how many points and to
-    which tolerance) or ``undecided`` (not provable, and no point of the domain was found). ``failing`` lists the parts
-    of a refuted statement that do not reduce to 0, such as the triples of a Jacobi identity, with their residuals.
+    ``verdict`` is ``proved`` (in exact arithmetic, for all values of the symbols), ``refuted`` (``residual`` should be
+    zero and is not), ``checked numerically`` (``detail`` says at how many points and to which tolerance) or
+    ``undecided`` (not provable, and no point of the domain is known). ``failing`` lists the parts of a refuted
+    statement that do not reduce to 0, such as the triples of a Jacobi identity, with their residuals.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Statement:
 
     @property
     def holds(self) -> bool:
-        """Whether the statement was proved or at least stood every numerical check."""
+        """Whether the statement was proved or passed every numerical check."""
         return self.verdict in (PROVED, CHECKED)
 
     def __str__(self) -> str:
@@ -59,10 +59,10 @@ class Statement:
 def decide_zero(
     name: str, residuals: Iterable[tuple[str, Expression]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """Whether all residuals vanish identically in their symbols.
+    """Return the statement that all residuals vanish identically in their symbols.
 
     ``residuals`` are pairs (label, expression); a label such as ``(x1, x2, x3)`` names the failing part in a
-    refutation. ``positive`` names the symbols that take positive values only. ``detail`` is added to a proof.
+    refutation. ``positive`` are the symbols that take positive values only. ``detail`` is added to a proof.
     """
     nonzero = [(label, e) for label, e in residuals if not e.is_zero]
     try:
@@ -78,7 +78,7 @@ def decide_zero(
 def decide_elements(
     name: str, tower: Tower, residuals: Iterable[tuple[str, Poly]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """`decide_zero` for elements of a tower."""
+    """Return `decide_zero` for elements of a tower."""
     pending = [(label, element) for label, element in residuals if not tower.is_zero(element)]
     if not pending:
         return Statement(name, PROVED, detail)
@@ -93,7 +93,8 @@ def decide_elements(
 def _at_points(
     name: str, pending: Sequence[tuple[str, Expression]], describe: Callable[[int], str], positive: Collection[str]
 ) -> Statement:
-    """The verdict on residuals that did not reduce to 0, or are too large to be tried: refuted at a point, or not."""
+    """Return the verdict on residuals that did not reduce to 0, or are too large to be reduced: refuted at a point,
+    or checked."""
     fewest = POINTS
     for k, (label, expression) in enumerate(pending):
         point_or_count = _refuting_point(expression, positive)
@@ -111,7 +112,10 @@ def _at_points(
 
 
 def _refuting_point(expression: Expression, positive: Collection[str]) -> str | int:
-    """A point where the expression is not zero and its value, ``at x=11/7: -8.5``; else the number of points tried."""
+    """Return a point where the expression is not zero, with its value, as text: ``at x=11/7: -8.5``.
+
+    If there is none, return the number of points that were tried.
+    """
     names = symbols_of(expression)
     tried_points = 0
     for k in range(_ATTEMPTS):
@@ -129,7 +133,10 @@ def _refuting_point(expression: Expression, positive: Collection[str]) -> str | 
 
 
 def refutation(point: Mapping[str, str], number: int, value: str) -> str:
-    """``at x=11/7: -8.5``, with the number of a point that is too long; without names ``everywhere -2``."""
+    """Return the text ``at x=11/7: -8.5``, with the number of the point if it is too long.
+
+    Without names the text is ``everywhere -2``.
+    """
     if not point:
         return f"everywhere {value}"
     where = ", ".join(f"{name}={coordinate}" for name, coordinate in point.items())
@@ -137,7 +144,7 @@ def refutation(point: Mapping[str, str], number: int, value: str) -> str:
 
 
 def _value(expression: Expression, point: dict[str, Fraction]) -> str:
-    """The value as text, empty where it is zero."""
+    """Return the value of an expression at a point as text; "" if the value is zero."""
     if is_rational(expression):
         (exact,) = evaluate_exactly([expression], point)
         return f"{float(exact):.4g}" if exact else ""
@@ -146,10 +153,10 @@ def _value(expression: Expression, point: dict[str, Fraction]) -> str:
 
 
 def sample_point(names: Sequence[str], positive: Collection[str], index: int) -> dict[str, Fraction]:
-    """The ``index``-th of a fixed sequence of rational points between 1/5 and 3 in magnitude.
+    """Return the point number ``index`` of a fixed sequence of rational points, with magnitudes between 1/5 and 3.
 
-    Points of odd index have negative components too, except for the ``positive`` names; the same names
-    always get the same points. Covectors (``p:NAME``) are 32 times smaller, since bi-realisations live near p = 0.
+    Points of odd index have negative components too, except for the ``positive`` names. The same names always have the
+    same points. Covectors (``p:NAME``) are 32 times smaller, since bi-realisations are defined near p = 0.
     """
     state = 88172645463325252 + 7919 * (index + 1)
     point = {}

@@ -1,1 +1,1 @@
-"""Targets: each prints a program in one language. See CONTRIBUTING for how to add one."""
+"""Targets, each of which prints a program in one language. CONTRIBUTING says how to add one."""

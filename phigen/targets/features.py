@@ -13,8 +13,8 @@ from phigen.scheme.step_kinds import STEP_KINDS, StepKind
 class Feature:
     """A switch of a runtime.
 
-    It is on if ``when`` holds for the program, if all switches that it ``requires`` are on, and if the user does not
-    leave out the part of the code named ``part``.
+    It is on if ``when`` is true for the program, all switches in ``requires`` are on, and the user does not leave out
+    the part of the code named ``part``.
     """
 
     name: str
@@ -24,7 +24,7 @@ class Feature:
 
 
 def _sums(kind: str) -> Callable[[Program], bool]:
-    """Return the test whether the path, its tangent path or its reverse pass need sums over orders of a kind."""
+    """Return the test whether the path, its tangent path or its reverse pass contains sums over orders of this kind."""
 
     def needed(program: Program) -> bool:
         step = program.step
@@ -38,7 +38,7 @@ def _is_of(kind: StepKind) -> Callable[[Program], bool]:
     return lambda p: p.step.kind is kind
 
 
-#: Switches of all languages; each comes after those that it requires.
+#: Switches of all languages; each comes after the switches that it requires.
 FEATURES = (
     *(Feature(kind.name.upper(), _is_of(kind)) for kind in STEP_KINDS.values() if not kind.sites),
     Feature("FRAMED", lambda p: p.step.frame),
@@ -75,7 +75,7 @@ FEATURES = (
 
 
 def holds(condition: str, switches: Mapping[str, bool]) -> bool:
-    """Whether a condition holds: alternatives (``||``) of switches or their negations that hold together (``&&``)."""
+    """Whether a condition holds: alternatives (``||``) of conjunctions (``&&``) of switches and of their negations."""
     return any(
         all(switches[s.removeprefix("!")] != s.startswith("!") for s in part.split(" && "))
         for part in condition.split(" || ")

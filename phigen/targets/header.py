@@ -1,4 +1,4 @@
-"""Headers of generated files, and the checksum by which edits by hand are noticed."""
+"""Headers of generated files, with a checksum by which manual edits are recognised."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from phigen.scheme.program import MAX_NORMAL_VARIATE, Program
 
 CHECKSUM = "body-sha256:"
 
-#: Columns of a comment at the head of a file, without its marks.
+#: Width in columns of the comment at the head of a file, without its marks.
 WIDTH = 104
 
 
 def plain(text: str) -> str:
-    """Return text of a spec that is safe in comments of any language: printable, no comment marks, no trigraphs."""
+    """Return text from a spec that is safe in comments of any language: printable, without comment marks and
+    trigraphs."""
     printable = "".join(c if c == "\n" or unicodedata.category(c)[0] not in "CZ" else " " for c in text)
     printable = printable.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").replace("\\", "/")
     return re.sub(r"[ \n]+", " ", printable).strip()
@@ -68,8 +69,8 @@ def facts(
 ) -> dict[str, object]:
     """Return the constants of a module that describe its system, for templates.
 
-    ``listed`` prints a sequence, ``key`` the name of a parameter. ``nothing`` takes the place of defaults that are
-    arrays: a module is for all sizes.
+    ``listed`` prints a sequence, ``key`` the name of a parameter. ``nothing`` replaces defaults that are arrays, since
+    a module is valid for all sizes.
     """
     noise, nonnegative = program.noise, [p.name for p in program.parameters if p.nonnegative]
     return {
@@ -98,7 +99,7 @@ def facts(
 
 
 def sealed(lines: Sequence[str], body: str, mark: str = " * ", begin: str = "/*\n", end: str = " */\n") -> str:
-    """Return the text of a file: a comment of the given lines and the checksum of the body, then the body.
+    """Return the text of a file: a comment with ``lines`` and the checksum of the body, then the body.
 
     Comment marks are those of C by default.
     """
@@ -112,7 +113,7 @@ def checksum(body: str) -> str:
 
 
 def split(text: str) -> tuple[str | None, str]:
-    """Return the checksum in the header of a generated file, None if it has none, and the body after the header."""
+    """Return the checksum in the header of a generated file (None if there is none), and the body after the header."""
     match = re.search(rf"{CHECKSUM} ([0-9a-f]{{64}})[^\n]*\n(?: \*/\n)?", text)
     return (match.group(1), text[match.end() :]) if match else (None, text)
 

@@ -14,8 +14,8 @@ from phigen.targets.reserved import Reserved
 class Language:
     """Spelling of formulas in a language.
 
-    ``functions`` are the names of functions, or texts with ``{0}`` for the argument, including functions that the
-    generated file defines. ``whole`` and ``real`` are the literals of integers and of other numbers.
+    ``functions`` are names of functions, or texts with ``{0}`` for the argument; they include functions that the
+    generated file defines. ``whole`` and ``real`` print integers and other numbers.
     """
 
     reserved: Reserved

@@ -1,4 +1,4 @@
-"""Values of templates and switches of runtimes that lattices have in all languages."""
+"""Values of templates and switches of runtimes that are the same for lattices in all languages."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], 
 
 
 def switches(step: Sweeps) -> dict[str, bool]:
-    """Return the switches that the runtimes of lattices have in all languages."""
+    """Return the switches that the runtimes of all languages have for lattices."""
     return {
         "COLOURS": step.sites.colours > 1,
         "SEAMS": bool(step.sites.seams),

@@ -1,7 +1,8 @@
 """Identifiers of generated code: names of the spec, changed if the language reserves them.
 
-A reserved name gets an underscore at its end. A reserved name that begins with an underscore gets the prefix ``v``,
-since ``_Bool_`` is reserved as ``_Bool`` is. Further underscores follow if another name is equal.
+An underscore is appended to a reserved name. A reserved name that begins with an underscore gets the prefix ``v``
+instead, since ``_Bool_`` is reserved like ``_Bool``. Further underscores are appended while the result equals another
+name.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from phigen.targets.reserved import Reserved
 
 
 def identifiers(names: Iterable[str], reserved: Reserved) -> dict[str, str]:
-    """Return distinct identifiers for names, in their order. Names that are not reserved are unchanged."""
+    """Return distinct identifiers for names, in order. Names that are not reserved are unchanged if possible."""
     names = list(names)
     chosen = {name: name for name in names if name not in reserved}
     for name in names:
@@ -35,25 +36,25 @@ class Scope:
     """Identifiers of the symbols of one function, all distinct."""
 
     def __init__(self, reserved: Reserved) -> None:
-        # t12 is the name of a temporary, so a coordinate t12 gets another identifier.
+        # t12 is the name of a temporary, so a coordinate called t12 gets another identifier.
         self._reserved = Reserved(reserved.words, re.compile(rf"t\d+|{reserved.pattern.pattern}"))
         self._taken: set[str] = set()
         self._given: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> str:
-        """Return the identifier of a symbol; temporary 12 becomes ``t12``."""
+        """Return the identifier of a symbol; that of temporary 12 is ``t12``."""
         if name not in self._given and isinstance(name, Symbol) and name.kind == TEMPORARY:
             self._given[name] = name.replace(":", "")
             self._taken.add(self._given[name])
         return self.request(name, name)
 
     def request(self, name: str, preferred: str) -> str:
-        """Return the identifier of a symbol: the ``preferred`` one if it is free."""
+        """Return the identifier of a symbol: ``preferred`` if that is free."""
         if name not in self._given:
             self._given[name] = _free(re.sub(r"\W", "_", preferred, flags=re.ASCII), self._reserved, self._taken)
             self._taken.add(self._given[name])
         return self._given[name]
 
     def bind(self, name: str, code: str) -> None:
-        """Print a piece of code, such as ``coef[3]``, wherever the symbol occurs."""
+        """Use a piece of code, such as ``coef[3]``, wherever the symbol is printed."""
         self._given[name] = code

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from phigen.scheme.policies import POLICIES, MeasurePolicy, Policy, PolicyConstant
 from phigen.scheme.program import Program
 
-#: Numbers below this power of two are printed as powers of two: they are bounds on rounding errors.
+#: Exponent of two below which numbers are printed as powers of two: these are bounds on rounding errors.
 _LEAST_EXPONENT = -20
 
 
 def policies_of(program: Program) -> dict[str, Policy]:
     """Return the policies by the names of their files.
 
-    For coordinates that keep their sign, errors are relative to each coordinate.
+    If coordinates keep their sign, errors are relative to each coordinate.
     """
     if program.step.inner_solve and program.step.inner_solve.relative:
         return {**POLICIES, "measure_policy": MeasurePolicy(floor=0.0)}
@@ -27,7 +27,7 @@ def policies_of(program: Program) -> dict[str, Policy]:
 class PolicySpelling:
     """Spelling of constants in a language: powers of two with a negative exponent, and all constants of a policy.
 
-    ``rounded`` spells real numbers that are to be rounded to another precision.
+    ``rounded`` prints real numbers for another precision.
     """
 
     power: str
@@ -44,7 +44,7 @@ class PolicySpelling:
         return repr(value).replace("e-0", "e-")
 
     def text(self, policy: Policy, omitted: Collection[str] = ()) -> str:
-        """Return the declarations of the constants of a policy, without those of ``omitted`` names."""
+        """Return the declarations of the constants of a policy, except those in ``omitted``."""
         constants = [c for c in policy.constants() if c.name not in omitted]
         return self.written([(c, self.value(c.value)) for c in constants])
 

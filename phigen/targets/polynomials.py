@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-#: Coefficients in one line of output.
+#: Number of coefficients in one line of output.
 _BLOCK = 4
 
 
 def estrin(coefficients: Sequence[Fraction], variable: str, first: str = "a") -> tuple[list[str], str]:
-    """Return statements, and the value of Σ c_k variable^k: Estrin's scheme in blocks of four, each by Horner's
-    rule.
+    """Return statements, and the value of Σ c_k variable^k.
 
-    Blocks are named by letters from ``first`` on.
+    Estrin's scheme is used with blocks of four coefficients, each evaluated by Horner's rule. The blocks are named by
+    letters from ``first`` on.
     """
     v = variable
     blocks = [coefficients[i : i + _BLOCK] for i in range(0, len(coefficients), _BLOCK)]

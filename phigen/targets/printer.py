@@ -1,4 +1,4 @@
-"""Trees over symbols as infix text: the common part of C and Python."""
+"""Trees over symbols as infix text: the common part of the printers of C, JavaScript and Python."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from fractions import Fraction
 
 from phigen.symbolic.expression import Expression, fold
 
-#: Binding strength: sums, products, atoms. Unary minus is printed in parentheses inside products.
+#: Binding strength of sums, products and atoms. A unary minus is printed in parentheses inside products.
 SUM, PRODUCT, ATOM = 1, 2, 3
 
 Printed = tuple[str, int]
 
 
 class Printer:
-    """Prints lowered trees (see `phigen.scheme.lowering`); targets define names, literals and functions."""
+    """Printer of lowered trees (`phigen.scheme.lowering`). Targets define names, literals and functions."""
 
     def __init__(
         self,
@@ -25,7 +25,11 @@ class Printer:
         whole: Callable[[int], str] = "{}.0".format,
         real: Callable[[float], str] = repr,
     ) -> None:
-        """``whole`` returns an integer as text, ``real`` any other number."""
+        """Make a printer.
+
+        ``name`` returns the identifier of a symbol, ``whole`` an integer as text, ``real`` any other number as text.
+        ``power`` is the spelling of a power.
+        """
         self.name, self.functions, self.constants, self.power = name, functions, constants, power
         self.whole, self.real = whole, real
 
@@ -38,8 +42,10 @@ class Printer:
         return fold([e], self._visit)[0]
 
     def literal(self, value: Fraction) -> Printed:
-        """Return a rational number as text: exact if possible, else as a quotient or the nearest double, in shortest
-        form."""
+        """Return a rational number as text with its binding strength.
+
+        It is exact if possible; otherwise it is a quotient or the shortest text of the nearest double.
+        """
         if value < 0:
             return "-" + self.literal(-value)[0], SUM
         if value.denominator == 1 and value < 2**53:

@@ -1,4 +1,5 @@
-"""Rendering of Jinja templates. Their values are printed strings and lists of these: templates decide nothing."""
+"""Rendering of Jinja templates. Values are printed strings and lists of strings: decisions are made before, in
+Python."""
 
 from __future__ import annotations
 
@@ -23,5 +24,5 @@ def _environment(target: str) -> jinja2.Environment:
 
 
 def render(target: str, template: str, values: Mapping[str, object]) -> str:
-    """Return the text of ``templates/TARGET/TEMPLATE.jinja`` with the values inserted; a missing value is an error."""
+    """Return the text of ``templates/TARGET/TEMPLATE.jinja`` with the values inserted. A missing value is an error."""
     return _environment(target).get_template(template + ".jinja").render(values)

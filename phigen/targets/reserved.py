@@ -1,7 +1,7 @@
 """Reserved identifiers of each language: its keywords, and macros of its standard headers.
 
-Macros of the headers that generated C includes would break that C. Macros of other headers would break programs that
-include these before the header of a solver. The tests compare with the compilers of the machine.
+Macros of the headers that generated C includes would break that code. Macros of other headers would break programs that
+include these before the header of a solver. The tests compare the lists with the compilers of the machine.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Reserved:
-    """Reserved names of a language: ``words``, and all names that match a ``pattern``. ``names | words`` adds words."""
+    """Reserved names of a language: ``words``, and all names that match a ``pattern``. The operator ``|`` adds
+    words."""
 
     words: frozenset[str] = frozenset()
     pattern: re.Pattern[str] = re.compile(r"(?!)")
@@ -35,11 +36,11 @@ explicit export false friend mutable namespace new noexcept not not_eq operator 
 reinterpret_cast requires static_assert static_cast template this thread_local throw true try typeid typename using
 virtual wchar_t xor xor_eq fortran far near main size_t ptrdiff_t"""
 
-# Keywords and types of OpenCL C, in which parameters have the names that they have in C.
+# Keywords and types of OpenCL C. Parameters have the same names there as in C.
 _OPENCL = """constant event_t generic global half kernel local pipe quad read_only read_write sampler_t uchar uint ulong
 uniform ushort write_only"""
 
-# Macros of the standard headers, and of headers that these include, that belong to no family below.
+# Macros of the standard headers, and of headers that these include, that do not belong to the families below.
 _C_MACROS = """AIO_PRIO_DELTA_MAX BC_BASE_MAX BC_DIM_MAX BC_SCALE_MAX BC_STRING_MAX BIG_ENDIAN
 BITINT_MAXWIDTH BUFSIZ BYTE_ORDER CHARCLASS_NAME_MAX CHAR_BIT CLOCKS_PER_SEC COLL_WEIGHTS_MAX CPU_SETSIZE CSIGNAL
 DELAYTIMER_MAX DOMAIN EOF EXIT_FAILURE EXIT_SUCCESS EXPR_NEST_MAX FD_SETSIZE FILENAME_MAX FOPEN_MAX F_LOCK F_OK F_TEST
@@ -74,7 +75,7 @@ _SIGINFO = """addr addr_lsb arch band call_addr fd int lower overrun pid pkey pt
 utime value"""
 _ATOMIC = "init|load|store|exchange|compare_exchange_strong|compare_exchange_weak|fetch_(add|and|or|sub|xor)"
 
-#: Families of reserved names: all names with an initial underscore, and macros that differ in a part only.
+#: Families of reserved names: all names with an initial underscore, and macros that differ only in a part.
 _C_FAMILIES = (
     r"_\w*",
     rf"({_INTEGERS}|SIG_ATOMIC|WCHAR|WINT)_(MAX|MIN|WIDTH)",
@@ -88,8 +89,7 @@ _C_FAMILIES = (
     r"(bool|u?(char|short|int|long)|half|float|double)(2|3|4|8|16)",
 )
 
-#: Keywords of C and C++ up to C23 and C++26, and of OpenCL C, and macros of the standard headers, on Linux and
-#: elsewhere.
+#: Keywords of C and C++ up to C23 and C++26 and of OpenCL C, and macros of the standard headers on Linux and elsewhere.
 C_RESERVED = Reserved(
     frozenset([*_C.split(), *_OPENCL.split(), *_C_MACROS.split(), *(f"E{e}" for e in _ERRNO.split())]),
     re.compile("|".join(_C_FAMILIES)),
@@ -112,5 +112,5 @@ export extends false finally for function get if implements import in instanceof
 private protected public return set static super switch this throw true try typeof undefined var void while with yield
 __proto__ constructor globalThis Array Error Float64Array Infinity Math NaN Number Object"""
 
-#: Keywords of modules in JavaScript, names with a meaning in objects, and globals that generated code may use.
+#: Keywords in JavaScript modules, names with a meaning in objects, and globals that generated code may use.
 JAVASCRIPT_RESERVED = Reserved(frozenset(_JAVASCRIPT.split()))

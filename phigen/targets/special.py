@@ -1,4 +1,4 @@
-"""Values of the templates of φ and its derivatives, and of entire functions, in all languages."""
+"""Values for the templates of φ and its derivatives, and of entire functions, in all languages."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
 
-#: Halvings of t for exponentials: beyond, these overflow.
+#: Largest number of halvings of t for exponentials of small matrices; with more, the exponentials overflow.
 MOST_HALVINGS = 14
 
-#: Iterations after which the arithmetic–geometric mean has converged for any two numbers.
+#: Number of iterations after which the arithmetic–geometric mean has converged for any two numbers.
 MOST_MEANS = 16
 
 _MEANING = (
@@ -40,14 +40,14 @@ _CLOSED = (
 
 
 def used(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
-    """The functions of `SPECIAL` that the kernels call, in order, except the ``unprinted`` ones."""
+    """Return the functions of `SPECIAL` that the kernels call, in order, except the ``unprinted`` kernels."""
     kernels = [kernel for kernel in program.kernels if kernel not in unprinted]
     ops = {e.op for e in topological([e for kernel in kernels for e in kernel.roots])}
     return [name for name in SPECIAL if name in ops]
 
 
 def values(function: str, name: str) -> Mapping[str, object]:
-    """The values of the template for one function, named ``name`` in the output."""
+    """Return the values for the template of one function, which is named ``name`` in the output."""
     order = order_of(function)
     near, rest = near_coefficients(order), rest_coefficients(order)
     return {
@@ -67,45 +67,49 @@ def values(function: str, name: str) -> Mapping[str, object]:
 
 
 def closed(order: int) -> tuple[str, ...]:
-    """The closed form of a derivative of φ, and the values that it reads, in terms of c = w cot w, in C and in
-    Python."""
+    """Return the closed form of a derivative of φ in C and in Python, and the values that it reads.
+
+    The form is in terms of c = w cot w.
+    """
     return _CLOSED[: order + 1]
 
 
 def turns(*, single: bool) -> dict[str, object]:
-    """The constants that subtract multiples of π from w = √s/2: the upper part of π, the lower part, and 1/π.
+    """Return the constants that subtract multiples of π from w = √s/2: the upper part of π, the lower part, and 1/π.
 
-    The upper part has 33 bits, 8 in single precision. So its products with the first 2^20 (2^16) integers are exact,
-    and ``limit`` is the value of s for the last one.
+    The upper part has 33 bits, 8 in single precision. So its products with the first 2^20 (2^16) integers are exact;
+    ``limit`` is the value of s for the last of them.
     """
     bits, most = (6, 2.0**16) if single else (31, 2.0**20)
     upper = math.floor(math.pi * 2.0**bits) / 2.0**bits
     lower = (math.pi - upper) + _BEYOND_PI
-    limit = float(f"{0.95 * (2.0 * math.pi * most) ** 2:.1e}")  # rounded to two digits, downwards for both
+    limit = float(f"{0.95 * (2.0 * math.pi * most) ** 2:.1e}")  # rounded down to two digits
     return {"reciprocal": repr(1.0 / math.pi), "upper": repr(upper), "lower": repr(lower), "limit": repr(limit)}
 
 
-#: The difference of π and its double.
+#: Difference of π and its double.
 _BEYOND_PI = 1.2246467991473532e-16
 
 
 class _Calls:
-    """A math library whose functions occur in formulas."""
+    """A math library whose calls are recorded as expressions."""
 
     def __getattr__(self, name: str) -> Callable[..., Expression]:
         return lambda *arguments: call(name, *arguments)
 
 
 def _closed_forms(function: str) -> list[Expression]:
-    """The closed forms of a function of `ENTIRE`, for s > 0 and for s < 0, or one for both; ``root`` stands for
-    √|s|."""
+    """Return the closed forms of a function of `ENTIRE`, for s > 0 and for s < 0, or one for both.
+
+    The symbol ``root`` stands for √|s|.
+    """
     return [form(_Calls(), symbol("s"), symbol("root")) for form in ENTIRE[function].closed]
 
 
 def far(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict[str, object]:
-    """The closed form of a function of `ENTIRE` in a language, and whether it contains the ``root`` of |s|.
+    """Return the closed form of a function of `ENTIRE` in a language, and whether it contains the ``root`` of |s|.
 
-    ``choice`` is the spelling of {0} for s > 0 and {1} for s < 0.
+    ``choice`` is the spelling of a conditional, {0} for s > 0 and {1} for s < 0.
     """
     forms = _closed_forms(function)
     texts = [printer(Scope(Reserved()))(expand_powers([form])[0]) for form in forms]
@@ -113,7 +117,7 @@ def far(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict
 
 
 def entire_used(program: Program) -> list[str]:
-    """The functions of `ENTIRE` that the kernels call, and those that these call, in order."""
+    """Return the functions of `ENTIRE` that the kernels call, directly or through each other, in order."""
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     for f in (f for f in ENTIRE if f in ops):
         ops = ops | {e.op for e in topological(_closed_forms(f))}
@@ -126,20 +130,20 @@ def calls_anomaly(program: Program) -> bool:
 
 
 def elliptic_used(program: Program) -> list[str]:
-    """The functions of `ELLIPTIC` that kernels call, and the first of them if any other is called."""
+    """Return the functions of `ELLIPTIC` that kernels call. The first of them is included if any other is called."""
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     called = [name for name in (*ELLIPTIC, elliptic.THIRD) if name in ops]
     return called if not called or called[0] == ELLIPTIC[0] else [ELLIPTIC[0], *called]
 
 
 def remainders_used(program: Program) -> list[str]:
-    """The functions of `phigen.symbolic.remainders` that kernels call."""
+    """Return the functions of `phigen.symbolic.remainders` that kernels call."""
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     return [name for name in (*remainders.REMAINDERS, *remainders.QUOTIENTS) if name in ops]
 
 
 def remainder_values(names: Sequence[str]) -> dict[str, object]:
-    """The values of the templates of these functions, with their places among remainders and quotients."""
+    """Return the values for the templates of these functions, with their indices among remainders and quotients."""
     places = {name: k for k, name in enumerate((*remainders.REMAINDERS, *remainders.QUOTIENTS))}
     reach = remainders.MAX_ROOT
     return {
@@ -154,12 +158,13 @@ def remainder_values(names: Sequence[str]) -> dict[str, object]:
 
 
 def _described(place: int) -> str:
-    """The purpose of a function of `phigen.symbolic.remainders`, as a comment."""
+    """Return the purpose of a function of `phigen.symbolic.remainders`, as a comment."""
     return f"Coefficient {place % 4} of the {'remainder' if place < 4 else 'quotient'}."
 
 
-#: The integrals of elliptic functions: their meaning, the template of Carlson's integral, and the arguments of that for
-#: them and for half a turn, from the squares cc of cn, dd of dn and s*s of S, and the ratio R/P.
+#: The integrals of elliptic functions: their meaning, the template of Carlson's integral, and its arguments, for the
+#: integral and for half a turn. The arguments are in terms of the squares cc of cn, dd of dn and s*s of S, and the
+#: ratio R/P.
 _INTEGRALS = {
     elliptic.SQUARES: ("The integral over t of S**2 with S = sn/sqrt(P)", "carlson", "cc, dd, 1.0", "0.0, ratio, 1.0"),
     elliptic.RATIOS: (
@@ -177,9 +182,10 @@ def elliptic_texts(
     render: Callable[[str, Mapping[str, object]], str],
     spelling: Callable[[str], str] = lambda name: name,
 ) -> list[str]:
-    """The definitions of elliptic functions by templates: amplitude, Carlson's integrals, and those that call them.
+    """Return the definitions of elliptic functions by templates: amplitude, Carlson's integrals, and functions that
+    call these.
 
-    ``spelling`` is how the language writes the names of Carlson's integrals.
+    ``spelling`` returns the names of Carlson's integrals in the language.
     """
     values: dict[str, object] = {
         "part": repr(2.0**-elliptic.DOUBLINGS),
@@ -204,7 +210,7 @@ def elliptic_texts(
 
 
 def _nested_series() -> str:
-    """The series of S/t by Horner's rule, in x and y."""
+    """Return the series of S/t as text, by Horner's rule in x and y."""
     return _nested([_nested([repr(float(c)) for c in row], "x") for row in elliptic.series()], "y")
 
 
@@ -217,16 +223,16 @@ def _nested(coefficients: Sequence[str], variable: str) -> str:
 
 
 def stumpff() -> tuple[list[Fraction], list[Fraction]]:
-    """The coefficients of c2 = (1 - cos x)/x² and c3 = (x - sin x)/x³ as series in x², for x² up to 1."""
+    """Return the coefficients of c2 = (1 - cos x)/x² and c3 = (x - sin x)/x³ as series in x², for x² up to 1."""
     count = len(ENTIRE["arcroot"].terms())
     c2 = [Fraction((-1) ** n, math.factorial(2 * n + 2)) for n in range(count)]
     return c2, [ENTIRE["arcroot"].coefficient(n) for n in range(count)]
 
 
 def anomaly_values(*, single: bool = False) -> dict[str, object]:
-    """The values of the templates of the anomaly that all languages share; ``single`` is for 32-bit numbers.
+    """Return the values for the templates of the anomaly that all languages share; ``single`` is for 32-bit numbers.
 
-    ``unit`` is the unit of rounding, and ``rounding`` a tenth of it: the remaining error of the iteration.
+    ``unit`` is the unit of rounding; ``rounding``, a tenth of it, is the remaining error of the iteration.
     """
     if single:
         return {"most": MOST_ITERATIONS, "radial": "1e-12", "unit": "1.2e-7", "rounding": "1e-8"}
@@ -234,15 +240,15 @@ def anomaly_values(*, single: bool = False) -> dict[str, object]:
 
 
 def largest_exponential(program: Program) -> int:
-    """The rows of the largest matrix whose exponential ``prepare`` takes; 0 without any."""
+    """Return the number of rows of the largest matrix whose exponential ``prepare`` computes; 0 if there is none."""
     return max((n for _, n in program.step.prepare.exponentials), default=0)
 
 
 def transposes_exponentials(program: Program) -> bool:
-    """Whether cotangents are pulled back through matrix exponentials that depend on parameters."""
+    """Whether the reverse pass goes through matrix exponentials that depend on parameters."""
     return program.step.adjoint is not None and program.step.adjoint.prepare.exponents is not None
 
 
 def exponential_constants() -> dict[str, object]:
-    """The constants of the exponential of matrices."""
+    """Return the constants of the matrix exponential."""
     return {"pade": ", ".join(repr(float(c)) for c in PADE), "reach": repr(MAX_PADE_NORM)}

@@ -15,7 +15,7 @@ from phigen.targets.language import Language
 from phigen.targets.names import Scope
 from phigen.targets.printer import ATOM, PRODUCT, SUM
 
-#: Binding strength of operators, as in `phigen.targets.printer`, and of values that need no parentheses.
+#: Binding strength of operators, as in `phigen.targets.printer`.
 _STRENGTH = {"or": 1, "and": 1, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
 _STRENGTH |= dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), 2)
 _ATOM = 9
@@ -24,10 +24,11 @@ _OF_ARITHMETIC = {SUM: 3, PRODUCT: 4, ATOM: _ATOM}
 
 @dataclass(frozen=True)
 class Dialect:
-    """Spelling of values in a language: ``operators`` and ``functions`` that have another name there.
+    """Spelling of values in a language; ``operators`` and ``functions`` have the names that differ from those of the
+    IR.
 
-    ``select`` is a conditional value, of the condition and both values. ``subscript`` is an element of an array, whose
-    indices count from 0, and ``member`` a member of a record.
+    ``select`` prints a conditional value, from the condition and both values. ``subscript`` prints an element of an
+    array, whose indices count from 0, and ``member`` a member of a record.
     """
 
     language: Language
@@ -45,9 +46,10 @@ class Spelling:
     """The identifiers of one function, and its values as text."""
 
     def __init__(self, dialect: Dialect, reserved: Iterable[str], body: ir.Block) -> None:
-        """Names of the spec come first, so that they are changed only if they are ``reserved``.
+        """Choose the identifiers of a function.
 
-        Names that statements fix are reserved, and so are functions that the dialect can call.
+        Names of the spec come first, so that they are changed only if they are ``reserved``. Names that statements
+        define are reserved, as are functions that the dialect can call.
         """
         self.dialect = dialect
         called = _words("\n".join(dialect.language.functions.values()))
@@ -77,13 +79,13 @@ class Spelling:
         return self.scope[symbol]
 
     def substitute(self, declaration: ir.Declare) -> None:
-        """Print the values of a declaration wherever its symbols occur."""
+        """Print the values of a declaration wherever its symbols occur, instead of the symbols."""
         for symbol, value in declaration.items:
             text, strength = self._spelt(value)
             self.scope.bind(symbol, text if strength else f"({text})")
 
     def __call__(self, value: ir.Value, strength: int = 0) -> str:
-        """Return a value as text, in parentheses where it binds less than a strength."""
+        """Return a value as text, in parentheses if it binds less strongly than ``strength``."""
         text, binding = self._spelt(value)
         return text if binding >= strength else f"({text})"
 
@@ -140,7 +142,7 @@ def _words(text: str) -> frozenset[str]:
 
 
 def _fixed(body: ir.Block) -> Iterator[str]:
-    """Yield the identifiers that statements fix."""
+    """Yield the identifiers that statements define."""
     for node in values(body):
         match node:
             case ir.Name(Symbol(kind=ir.FIXED, key=(name,))):

@@ -1,8 +1,8 @@
 """The state of a solver, block by block: its members, and how copies, rollback and a new step size treat them.
 
-A block belongs to the solvers whose switches satisfy its condition. The blocks determine, in C, the members of the
-struct, the copies by which a step of several stages is reverted if a stage fails, and the statements for another step
-size; in JavaScript, the fields that a copy of a solver has.
+A block belongs to the solvers whose switches satisfy its condition. In C the blocks determine the members of the
+struct, the copies by which a step of several stages is reverted if a stage fails, and the statements for a new step
+size. In JavaScript they determine the fields that a copy of a solver has.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class StateBlock:
-    """Members of the state that belong together; ``when`` is a condition on switches, empty for all solvers.
+    """Members of the state that belong together; ``when`` is a condition on switches, "" for all solvers.
 
-    ``members`` are declarations in C, with comments for users. ``saved`` are the arrays, each with its size, or the
-    numbers (without one) that a failing step restores. ``reset`` are statements for another step size; ``copied`` are
-    those of a copy, in JavaScript.
+    ``members`` are declarations in C, with comments for users. ``saved`` are the members that a failing step restores:
+    arrays with their sizes, and numbers without a size. ``reset`` are statements for a new step size. ``copied`` are
+    the statements of a copy, in JavaScript.
     """
 
     name: str
@@ -30,7 +30,7 @@ class StateBlock:
     copied: tuple[str, ...] = ()
 
     def save(self) -> Iterator[str]:
-        """Copies of the members that a step changes."""
+        """Yield the statements that copy the members which a step changes."""
         arrays = [f"{member}[{size}]" for member, size in self.saved if size]
         numbers = [f"{member} = s->{member}" for member, size in self.saved if not size]
         yield from [f"double {', '.join(arrays)};"] if arrays else []
@@ -38,14 +38,14 @@ class StateBlock:
         yield from (f"PHI_COPY({member}, s->{member}, {member}, {size});" for member, size in self.saved if size)
 
     def restore(self) -> Iterator[str]:
-        """Restoration of the state from its copies."""
+        """Yield the statements that restore the state from the copies."""
         for member, size in self.saved:
             yield f"PHI_COPY(s->{member}, {member}, {member}, {size});" if size else f"s->{member} = {member};"
 
 
 _COEFFICIENTS = "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];"
 
-#: In the order of the members of the struct.
+#: Blocks in the order of the members of the struct.
 STATE = (
     StateBlock(
         "x",
@@ -208,7 +208,7 @@ STATE = (
 
 
 def copied(switches: Mapping[str, bool]) -> list[str]:
-    """The statements in JavaScript that copy the state to another solver."""
+    """Return the statements in JavaScript that copy the state to another solver."""
     return [line for block in STATE if block.copied and belongs(block, switches) for line in block.copied]
 
 

@@ -1,1 +1,1 @@
-"""Search for the cheapest setting of a spec at an accuracy: candidates are built, measured, compared and confirmed."""
+"""Search for the cheapest setting of a spec for an accuracy: candidates are built, measured, compared and confirmed."""

@@ -1,6 +1,6 @@
-"""Parallel builds of candidates, each in its own process, so that a build that takes too long can be ended.
+"""Parallel builds of candidates, each in a separate process, so that builds that take too long can be ended.
 
-A process generates the code and compiles it into the cache of solvers, where the calling process finds it.
+A process generates the code and compiles it into the cache of solvers, from which the calling process loads it.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from phigen.spec.model import Spec
 from phigen.targets.header import split
 from phigen.tuning.settings import Setting
 
-#: The reason for candidates that were not built before the deadline.
+#: Reason for candidates that were not built before the deadline.
 LATE = "there was no time to build it"
-#: Processes at a time, at most.
+#: Largest number of processes at a time.
 WORKERS = 4
-#: Seconds that a process has to end after it was asked to.
+#: Number of seconds in which a process must end after it was asked to.
 _GRACE = 2.0
 
 
@@ -41,7 +41,7 @@ class Built:
     """A compiled candidate: its files, its resolved setting, and the seconds that the build took.
 
     ``order`` may exceed that of the setting, since symmetric methods have even order. ``fingerprint`` is the same for
-    two settings that mean the same code.
+    two settings with the same code.
     """
 
     setting: Setting
@@ -63,13 +63,16 @@ class Built:
         return hashlib.sha256("\0".join(bodies).encode()).hexdigest()
 
     def solver(self) -> Backend:
-        """The back end; the cache holds the library, if it is C."""
+        """Return the back end; if it is C, the library is in the cache."""
         return backend_of(self.files, self.interface)
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """The reason why a candidate cannot be built; ``inapplicable`` if it is the system, not size or time."""
+    """The reason why a candidate cannot be built.
+
+    ``inapplicable`` says that the method does not apply to the system; otherwise the size or the time is the reason.
+    """
 
     reason: str
     inapplicable: bool = False
@@ -80,13 +83,14 @@ Outcome = Built | Refusal
 
 
 def build(spec: Spec, system: System | None, setting: Setting) -> Built:
-    """Generate and compile one candidate. Raises `PhigenError` as `compile_spec` and the compiler do."""
+    """Generate and compile one candidate. Raises the errors of `compile_spec` and of the compiler."""
     start = time.perf_counter()
     return built(compile_spec(setting.applied(spec), system=system), setting, start)
 
 
 def built(compilation: Compilation, setting: Setting, start: float) -> Built:
-    """Compile the code of a compilation, as C where there is a compiler; ``start`` is the time when its build began."""
+    """Return a compilation compiled as C if there is a compiler, else as NumPy; ``start`` is the time when the build
+    began."""
     program, target = compilation.program, chosen_target("auto")
     files = emit(program, target, f"phigen build {program.name}.yaml")
     step = program.step
@@ -146,14 +150,17 @@ def _received(pipe: Connection, seconds: float) -> Outcome:
 
 
 def _work(spec: Spec, system: System | None, setting: Setting, pipe: Connection) -> None:
-    """The body of a process. A process that is terminated still unwinds, which also ends its C compiler."""
+    """Build one candidate and send the outcome through the pipe; the main function of a process.
+
+    A process that is terminated also ends its C compiler.
+    """
 
     def leave(*_: Any) -> None:
         raise SystemExit(1)
 
     for name in (signal.SIGTERM, signal.SIGINT):
         signal.signal(name, leave)
-    # Results go through the pipe; what a terminated interpreter prints on stderr is of no use.
+    # Results are sent through the pipe; the output of a terminated interpreter on stderr is not useful.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     start, outcome = time.perf_counter(), Refusal("building it failed")
     try:

@@ -1,6 +1,6 @@
-"""Realisations, schemes and classical methods side by side on one run: cost, errors, and the Poisson defect.
+"""Comparison of realisations, schemes and classical methods on one run: cost, errors, and the Poisson defect.
 
-`tune` searches for the cheapest setting; a comparison measures all of them at one step size, or at one cost.
+`tune` searches for the cheapest setting; a comparison measures all settings with one step size, or at one cost.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from phigen.tuning.settings import Setting, own_setting
 from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import MARKS, marks
 
-#: States at which the Poisson defect is measured; the largest counts.
+#: Number of states at which the Poisson defect is measured; the largest defect counts.
 STATES = 5
-#: The largest number of rows at which errors are measured.
+#: Largest number of rows at which errors are measured.
 ROWS = 2000
 #: Classical methods of the comparison, by their names in tables.
 PEERS = {"rk4": "RK4", "dop853": "DOP853"}
-#: Shares of the budget of time: for building, and for the reference of one orbit.
+#: Shares of the time budget: for building, and for the reference of one orbit.
 BUILDING, REFERRING = 0.6, 0.05
 
 Notify = Callable[[str], object]
@@ -39,11 +39,11 @@ Notify = Callable[[str], object]
 
 @dataclass(frozen=True)
 class ComparedMethod:
-    """One method of a comparison; ``refusal`` says why there are no numbers, "" if there are.
+    """One method of a comparison; ``refusal`` is the reason why there are no numbers, "" if there are numbers.
 
     ``error`` (of the energy) and ``casimirs`` are the largest errors along the trajectory. ``orbit`` is the distance
-    from the solution at the end, ``defect`` the residual of DΦ π DΦᵀ = π∘Φ. Numbers that are not known are None. A
-    step takes ``nanoseconds``. ``poisson`` says whether a step is a Poisson map by its construction.
+    from the solution at the end, ``defect`` the residual of DΦ π DΦᵀ = π∘Φ. Unknown numbers are None. A step takes
+    ``nanoseconds``. ``poisson`` says whether a step is a Poisson map by construction.
     """
 
     title: str
@@ -67,7 +67,7 @@ class ComparedMethod:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All methods on one run; ``equal`` is ``step`` or ``work``, ``unit`` the kind of unit of energy errors."""
+    """All methods on one run; ``equal`` is ``step`` or ``work``, ``unit`` the unit of energy errors."""
 
     entries: tuple[ComparedMethod, ...]
     horizon: float
@@ -78,7 +78,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A method before it is measured: its runner, and its one-step map if that can be differentiated."""
+    """A method that is not measured yet: its runner, and its one-step map if that can be differentiated."""
 
     title: str
     order: int
@@ -99,8 +99,9 @@ def compare(
 ) -> Comparison:
     """Measure the setting of the spec and all others of these orders, RK4 and DOP853 on one run.
 
-    ``compilation`` and the candidates have tangent maps. With ``equal`` ``work``, each takes the step that costs what
-    the step of the run costs with the setting of the spec. Raises `StepError` if that setting cannot make the run.
+    ``compilation`` and the candidates have tangent maps. If ``equal`` is ``work``, each method uses the step size at
+    which it costs as much as the setting of the spec at the step of the run. Raises `StepError` if that setting cannot
+    make the run.
     """
     start = time.perf_counter()
     current = own_setting(compilation)
@@ -147,7 +148,7 @@ def compare(
 
 
 def _settings(problem: Problem, current: Setting, orders: Sequence[int]) -> list[Setting]:
-    """Return the settings to compare: each bi-realisation and the splitting, at each of the orders it has."""
+    """Return the settings to compare: each bi-realisation, and the splitting, at each of the ``orders`` that it has."""
     families = dict.fromkeys([current.family, *(guess.family for guess in problem.guesses(current))])
     return [replace(family, order=order) for family in families for order in orders if order in family.orders]
 
@@ -162,7 +163,7 @@ def _of_build(build: Built, problem: Problem, *, is_current: bool = False) -> _C
 def _measured(
     candidate: _Candidate, problem: Problem, h: float, exact: CompiledMethod | None, seconds: float
 ) -> ComparedMethod:
-    """Measure a method at a step over the whole run."""
+    """Measure a method with a step size over the whole run."""
     unmeasured = ComparedMethod(candidate.title, candidate.order, poisson=candidate.poisson, own=candidate.own)
     if not math.isfinite(h):
         return replace(unmeasured, refusal="a step cannot be made")

@@ -1,4 +1,4 @@
-"""RK4 at the cost of a solver: the largest energy error over the same run."""
+"""RK4 at the cost of a solver: its largest energy error over the same run."""
 
 from __future__ import annotations
 
@@ -11,14 +11,15 @@ from phigen.runtime.backend import Backend
 from phigen.tuning.problem import Classical, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: Largest number of states at which the energy is examined.
+#: Largest number of states at which the energy is evaluated.
 ROWS = 2000
 
 
 def rk4_energy_error(compilation: Compilation, solver: Backend, problem: Problem) -> float:
-    """Return the energy error of RK4, in double precision, whose run takes as much processor time as the solver's.
+    """Return the energy error of an RK4 run, in double precision, that takes as much processor time as the solver's
+    run.
 
-    Infinity if RK4 breaks down, NaN if steps cannot be timed. Raises `ToolchainError` without a compiler.
+    The result is infinity if RK4 breaks down, NaN if steps cannot be timed. Raises `ToolchainError` without a compiler.
     """
     state = problem.start.copy()
     rk4 = Classical(problem.classical(compilation, ["rk4"], state).runners["rk4"], state, problem)

@@ -22,11 +22,12 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem
 from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, direct
 
-#: Sites above which a smaller grid of the same kind is measured.
+#: Number of sites above which a smaller grid of the same kind is measured.
 MOST_SITES = 10_000
-#: Limits on the numbers stored of one run, and of a run that is compared with a reference.
+#: Largest numbers of values stored for one run, and for a run that is compared with a reference.
 MOST_NUMBERS, MOST_COMPARED = 2**24, 2**13
-#: States at which the energy of one run is examined, at most: each takes a call of Python and a pass over all sites.
+#: Largest number of states at which the energy of one run is evaluated: each takes a call of Python and a pass over all
+#: sites.
 LATTICE_ROWS = 1024
 
 
@@ -42,15 +43,15 @@ class FlatSession:
         return self.session.steps
 
     def state(self) -> Floats:
-        """A copy of the state (DIM,)."""
+        """Return a copy of the state (DIM,)."""
         return self.session.state().reshape(-1)
 
     def advance(self, h: float, steps: int) -> None:
-        """Make ``steps`` steps."""
+        """Make ``steps`` steps of size ``h``."""
         self.session.advance(h, steps)
 
     def branch(self) -> FlatSession:
-        """Raise `NotImplementedError`: sessions of lattices are not copied in tunings."""
+        """Raise `NotImplementedError`: tunings do not copy sessions of lattices."""
         raise NotImplementedError
 
 
@@ -63,39 +64,40 @@ class FlatLattice:
     _seen: list[LatticeSession] = field(default_factory=list)
 
     def start(self, x0: Floats, parameters: Mapping[str, Any]) -> FlatSession:
-        """A session at x0 (DIM,)."""
+        """Return a session at x0 (DIM,)."""
         return FlatSession(self.backend.start(x0.reshape(self.shape), parameters))
 
     def vector_field(self, states: Floats, parameters: Mapping[str, Any]) -> Floats:
-        """The right-hand side at states (rows, DIM)."""
+        """Return the right-hand side of the equations of motion at states (rows, DIM)."""
         return np.array([self._evaluation_session(x, parameters).vector_field().reshape(-1) for x in states])
 
     def energies(self, states: Floats, parameters: Mapping[str, Any]) -> Floats:
-        """H of states (rows, DIM)."""
+        """Return H of states (rows, DIM)."""
         return np.array([self._evaluation_session(x, parameters).hamiltonian() for x in states])
 
     def terms(self, x: Floats, parameters: Mapping[str, Any]) -> float:
-        """The sum of the magnitudes of the energies of the sites."""
+        """Return the sum of the magnitudes of the energies of the sites."""
         return float(np.abs(self._evaluation_session(x, parameters).density()).sum())
 
     def _evaluation_session(self, x: Floats, parameters: Mapping[str, Any]) -> LatticeSession:
-        """Return the session in which the functions of one problem are evaluated."""
+        """Return the session in which functions of states are evaluated."""
         state = x.reshape(self.shape)
         if not self._seen:
             self._seen.append(self.backend.start(state, parameters))
             return self._seen[0]
         try:
             self._seen[0].place(state)
-        except TypeError:  # profile small
+        except TypeError:  # code with profile small cannot replace the state of a session
             return self.backend.start(state, parameters)
         return self._seen[0]
 
 
 @dataclass(frozen=True)
 class LatticeProblem(Problem):
-    """The tuning problem of a lattice of given sizes and parameter arrays; ``seer`` evaluates its energies.
+    """The tuning problem of a lattice of given sizes and parameter arrays; ``seer`` is the solver that evaluates
+    energies.
 
-    ``whole`` are the sizes of the run if a smaller lattice is measured in its place.
+    ``whole`` are the sizes of the run if a smaller lattice is measured instead.
     """
 
     cell: Cell = field(kw_only=True)
@@ -115,28 +117,28 @@ class LatticeProblem(Problem):
 
     @property
     def most_rows(self) -> int:
-        """Largest number of rows whose energies are computed, limited by the memory."""
+        """Largest number of rows whose energies are evaluated, which is limited by memory."""
         return min(LATTICE_ROWS, max(64, MOST_NUMBERS // len(self.start)))
 
     @property
     def evens_out(self) -> bool:
-        """False: monitors are not searched for lattices."""
+        """False: no monitors are searched for lattices."""
         return False
 
     def energies(self, states: Floats) -> Floats:
-        """Return H of states (rows, DIM), NaN for states that are not finite."""
+        """Return H of states (rows, DIM); NaN for states that are not finite."""
         finite = np.isfinite(states).all(axis=1)
         energies = np.full(len(states), np.nan)
         energies[finite] = self.seer.energies(states[finite], self.parameters)
         return energies
 
     def method(self, solver: Any) -> Candidate:
-        """A solver as a method."""
+        """Return a solver as a method."""
         flat: Any = FlatLattice(solver, self.seer.shape)
         return Candidate(flat, self)
 
     def guesses(self, current: Setting) -> list[Setting]:
-        """The first settings: splittings, and the series with each bi-realisation that might apply at a site."""
+        """Return the first settings: splittings, and the series with each bi-realisation that might apply at a site."""
         local = self.cell.is_local
         kinds = [k for k in BIREALISATIONS if k not in (*FORMULAS, *CHOICES, "karasev")] if local else ["auto"]
         splittings = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
@@ -145,7 +147,7 @@ class LatticeProblem(Problem):
         return [s for s in (*first, *(s for s in all_settings if s.chart != current.chart)) if s != current]
 
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
-        """Classical methods in NumPy, on the vector field of the solver."""
+        """Return classical methods in NumPy, on the vector field of the solver."""
 
         def slope(x: Floats) -> Floats:
             velocity: Floats = self.seer.vector_field(x[None], self.parameters)[0]
@@ -165,10 +167,9 @@ class LatticeProblem(Problem):
 def lattice_problem(
     compilation: Compilation, run: Run, settings: Mapping[str, float], step: float, span: float, direction: float
 ) -> LatticeProblem:
-    """Return the problem of a run with changed parameters; a run with many sites is measured on a smaller grid if
-    possible.
+    """Return the problem of a run with other parameters.
 
-    Raises `SpecError` if the run cannot start.
+    A run with many sites is measured on a smaller grid if possible. Raises `SpecError` if the run cannot start.
     """
     spec, cell = compilation.spec, compilation.by_sweeps().cell
     solver = lattice_solver_of(compilation)
@@ -185,7 +186,7 @@ def lattice_problem(
 
 
 def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -> tuple[int, ...]:
-    """Halve the largest size of the run until the number of sites is small enough."""
+    """Return sizes from those of the run, with the largest size halved until the number of sites is small enough."""
     reduced = list(sizes)
     while np.prod(reduced) > MOST_SITES:
         axis = int(np.argmax(reduced))
@@ -197,7 +198,7 @@ def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -
 
 
 def _start_with_sizes(spec: Spec, run: Run, sizes: tuple[int, ...]) -> Start | None:
-    """Return the start of the run with other sizes; None if its arrays have fixed sizes."""
+    """Return the initial state and parameters of the run with other sizes; None if its arrays have fixed sizes."""
     assert run.lattice is not None
     try:
         return start_of(spec, replace(run, lattice=replace(run.lattice, sizes=sizes)))

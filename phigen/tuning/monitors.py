@@ -39,24 +39,25 @@ from phigen.tuning.scales import MOST_TURN, fastest_rate, motion
 from phigen.tuning.settings import GAUSS, SPLITTING, Setting
 from phigen.tuning.trials import ROUNDING
 
-#: Monitors are tried where the largest speed is at least this multiple of the median.
+#: Ratio of the largest speed to the median above which monitors are tried.
 UNEVEN = 3.0
-#: The largest number of distances; the exponents, in quarters, of their squares, the likeliest first; the exponents
-#: of 1 + the square of the speed.
+#: Largest number of distances; exponents of their squares, in quarters, the most promising first; exponents of 1 + the
+#: square of the speed.
 MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
-#: The longest monitor in characters, which a user can still read and vary: two distances in space.
+#: Largest number of characters of a monitor, which a user can still read and modify: two distances in space.
 MOST_LETTERS = 160
-#: The order at which monitors are compared, at most; the fewest steps, and the seconds of one run.
+#: Largest order at which monitors are compared; least number of steps of a run, and its largest duration in seconds.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
-#: The share of the time that is reserved for runs after all builds.
+#: Share of the time that is reserved for runs after all builds.
 MEASURING = 0.25
-#: The largest number of halvings of a step; the largest number of steps, in multiples of those without a monitor.
+#: Largest number of halvings of a step; largest number of steps, in multiples of that without a monitor.
 HALVINGS, MOST = 30, 64
 
 
 @dataclass(frozen=True)
 class Trial:
-    """The number of steps of a size in τ (in t, without a monitor) with the ``error``; infinite if there is none."""
+    """Number of steps in τ (in t without a monitor) with an energy ``error``; infinite if no number reaches the
+    accuracy."""
 
     setting: Setting
     label: str
@@ -69,10 +70,10 @@ class Trial:
 
 @dataclass(frozen=True)
 class Monitors:
-    """Gains of monitors over a ``span`` of time: the trial with steps equal in t, and those of all monitors, the
-    fastest first.
+    """Gains of monitors over a ``span`` of time.
 
-    Steps of different schemes differ in cost.
+    They are the trial with steps equal in t, and those of all monitors, the fastest first. Steps of different schemes
+    differ in cost.
     """
 
     span: float
@@ -81,23 +82,23 @@ class Monitors:
     refused: Mapping[str, str] = field(default_factory=dict)
 
     def gain(self, trial: Trial) -> float:
-        """The ratio of the numbers of steps without and with the monitor."""
+        """Return the ratio of the numbers of steps without and with the monitor."""
         return self.plain.steps / trial.steps
 
 
 def is_uneven(rates: Callable[[Floats], Floats], states: Floats) -> bool:
-    """Whether the speed of the motion varies much; ``states`` (rows, DIM) are at equidistant times."""
+    """Whether the speed of the motion varies much. ``states`` (rows, DIM) are at equal distances in time."""
     speeds = np.linalg.norm(rates(states), axis=1)
     return bool(np.isfinite(speeds).all() and speeds.max() > UNEVEN * np.median(speeds))
 
 
 def candidates(system: System, parameters: Mapping[str, float], states: Floats) -> Iterator[Expression]:
-    """Candidate monitors: positive functions that are small in fast motion, not longer than `MOST_LETTERS`."""
+    """Yield candidate monitors: positive functions that are small in fast motion, not longer than `MOST_LETTERS`."""
     return (g for g in _candidates(system, parameters, states) if _is_short(g))
 
 
 def _is_short(monitor: Expression) -> bool:
-    printed = str(monitor)  # very long expressions are cut there
+    printed = str(monitor)  # very long expressions are cut in this text
     return len(printed) <= MOST_LETTERS and "…" not in printed
 
 
@@ -121,7 +122,7 @@ def _candidates(system: System, parameters: Mapping[str, float], states: Floats)
 
 
 def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expression]:
-    """(1 + Σ 1/b)^exponent over as many of the first bases as fit in a line; None if fewer than two fit."""
+    """Yield (1 + Σ 1/b)^exponent over as many of the first bases as fit in a line, unless fewer than two fit."""
     for count in range(len(bases), 1, -1):
         monitor = power(ONE + total(power(b, -1) for b in bases[:count]), number(exponent))
         if _is_short(monitor):
@@ -130,13 +131,13 @@ def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expre
 
 
 def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
-    """The smallest value divided by the median: smallest for the distances of close encounters."""
+    """Return the smallest value divided by the median; it is smallest for the distances of close encounters."""
     (values,) = evaluate([b], columns)
     return float(np.min(values) / np.median(values))
 
 
 def _bases(system: System) -> list[Expression]:
-    """The coordinate-dependent expressions in denominators, under roots and in logarithms of H."""
+    """Return the coordinate-dependent expressions in denominators, under roots and in logarithms of H."""
     by_text: dict[str, Expression] = {}
     for node in topological([system.hamiltonian]):
         rooted = node.op == "pow" and (node.value < 0 or node.value != int(node.value))
@@ -149,7 +150,7 @@ def _bases(system: System) -> list[Expression]:
 
 
 def _is_square(b: Expression) -> bool:
-    """Whether the expression is a sum, and so the square of a distance rather than a distance."""
+    """Whether the expression is a sum, and therefore the square of a distance rather than a distance."""
     return b.op in ("add", "sub")
 
 
@@ -162,7 +163,8 @@ def _is_positive(b: Expression, columns: Mapping[str, Floats | float]) -> bool:
 
 
 def settings(current: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
-    """The settings to build, of the same order: without a monitor, and each monitor with the series and with Gauss."""
+    """Return the settings to build, of the same order: without a monitor, and each monitor with the series and with
+    Gauss."""
     order = min(order + order % 2, HIGHEST)
     series = (
         Setting("auto", order, "none") if current.scheme != "series" else replace(current, order=order, gauge="none")
@@ -184,9 +186,9 @@ def compare(
     accuracy: float,
     deadline: float,
 ) -> Monitors | None:
-    """Find the step of each setting that reaches the accuracy. The first has no monitor; None if it cannot be built.
+    """Return the trials of settings at the step sizes that reach the accuracy.
 
-    ``states`` (rows, DIM) are samples of the motion.
+    The first setting has no monitor; None if it cannot be built. ``states`` (rows, DIM) are samples of the motion.
     """
     building = deadline - MEASURING * max(deadline - time.perf_counter(), 0.0)
     outcomes = dict(build_all(spec, system, requested, building))
@@ -211,7 +213,7 @@ def _trial(
 ) -> Trial:
     """Return the trial with the fewest steps whose error is at most ``accuracy``.
 
-    The step is halved until the error is small enough; the last step is interpolated by the order of the method.
+    The step is halved until the error is small enough; the final step is interpolated by the order of the method.
     """
     solver = Solver(candidate.solver(), candidate.interface)
     h, previous = _largest(solver, problem, states), (math.nan, math.inf)
@@ -231,7 +233,7 @@ def _trial(
 
 
 def _largest(solver: Solver, problem: Problem, states: Floats) -> float:
-    """The largest step that resolves the fastest turn of the motion."""
+    """Return the largest step that resolves the fastest rotation of the motion."""
     moving = motion(solver.backend, problem.parameters, monitored=solver.interface.monitored)
     return MOST_TURN / max(fastest_rate(moving, states[:: max(1, len(states) // 64)]), 1e-300)
 
@@ -247,7 +249,7 @@ class _Run:
 
 
 def _run(solver: Solver, problem: Problem, span: float, h: float, max_steps: float) -> _Run:
-    """Make a run to the end of the span; None if it needs more than ``max_steps`` steps, or takes too long."""
+    """Make a run to the end of the span; None if it needs more than ``max_steps`` steps or too much time."""
     started_at, states = time.thread_time(), [problem.start]
     session, steps_done, time_passed = solver.backend.start(problem.start, problem.parameters), 0, 0.0
     try:

@@ -1,4 +1,4 @@
-"""The problem of a tuning, and the methods that solve it: compiled, and started from its initial state."""
+"""The problem of a tuning, and the methods that solve it from its initial state."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from phigen.study.methods import Method as Step
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.tuning.settings import Setting, charts
 
-#: States at which the energy of one run is looked at, at most.
+#: Largest number of states at which the energy of one run is evaluated.
 ROWS = 8_000
 
 
 @dataclass(frozen=True)
 class Problem(ABC):
-    """A tuning problem: the values of a run, its time span, and its ``step``, where searches start.
+    """A tuning problem: the settings of a run, its time span, and its ``step``, with which searches start.
 
-    Steps and times are positive here; ``direction`` is −1 for a run back in time. ``sizes`` are the sizes of a lattice.
-    All times are in units of the ``clock``: τ if the spec has a monitor, which all methods use then, else t.
+    Steps and times are positive here; ``direction`` is −1 for a run backwards in time. ``sizes`` are the sizes of a
+    lattice. All times are in units of the ``clock``: τ if the spec has a monitor, which all methods then use, else t.
     """
 
     start: Floats
@@ -54,16 +54,16 @@ class Problem(ABC):
 
     @property
     def most_rows(self) -> int:
-        """States at which the energy of one run is looked at, at most."""
+        """Largest number of states at which the energy of one run is evaluated."""
         return ROWS
 
     @property
     @abstractmethod
     def evens_out(self) -> bool:
-        """Whether monitors, which even out the speed of the motion, may be tried."""
+        """Whether monitors may be tried; monitors make the speed of the motion more uniform."""
 
     def method(self, solver: Backend) -> Candidate:
-        """A solver as a method."""
+        """Return a solver as a method."""
         return Candidate(solver, self)
 
     @abstractmethod
@@ -72,24 +72,24 @@ class Problem(ABC):
 
     @abstractmethod
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
-        """Classical methods from a ``state`` that may change."""
+        """Return classical methods that start from a ``state``, which may be changed later."""
 
     @abstractmethod
     def energies(self, states: Floats) -> Floats:
-        """H of states (rows, DIM)."""
+        """Return H of states (rows, DIM)."""
 
     def casimir_error(self, states: Floats) -> float | None:
-        """Return the largest error of any Casimir along states (rows, DIM); None where it is not measured."""
+        """Return the largest error of any Casimir along states (rows, DIM); None if it is not measured."""
         return None
 
     def defect(self, step: Step, states: Floats, h: float) -> float | None:
-        """Return the largest Poisson defect at states (rows, DIM); None where the derivative is not to be had."""
+        """Return the largest Poisson defect at states (rows, DIM); None if the step cannot be differentiated."""
         return None
 
 
 @dataclass(frozen=True)
 class SystemProblem(Problem):
-    """The problem of a ``system`` of a few coordinates."""
+    """The tuning problem of a ``system`` of few coordinates."""
 
     system: System = field(kw_only=True)
 
@@ -106,22 +106,23 @@ class SystemProblem(Problem):
 
     @property
     def evens_out(self) -> bool:
-        """Whether monitors may be tried: only systems without explicit time, forces and noise."""
+        """Whether monitors may be tried: only for systems without explicit time, forces and noise."""
         return not self.system.driven
 
     def guesses(self, current: Setting) -> list[Setting]:
-        """Settings to begin with: one for each bi-realisation that might apply."""
+        """Return the first settings: one for each bi-realisation that might apply."""
         return charts(self.system, current)
 
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
-        """Classical methods from a ``state`` that may change, in C where there is a compiler."""
+        """Return classical methods that start from a ``state``, which may be changed later; in C if there is a
+        compiler."""
         target = chosen_target("auto")
         if target == "c":
             return race.compiled(compilation, names, state, self.parameters)
         return race.interpreted(solver_of(compilation, target), names, state, self.parameters)
 
     def energies(self, states: Floats) -> Floats:
-        """H of states (rows, DIM)."""
+        """Return H of states (rows, DIM)."""
         values = {**self.parameters, **{c: states[:, i] for i, c in enumerate(self.system.coordinates)}}
         (energies,) = evaluate([self.system.hamiltonian], values)
         return np.broadcast_to(energies, (len(states),))
@@ -141,7 +142,7 @@ class SystemProblem(Problem):
         return float(max(errors))
 
     def defect(self, step: Step, states: Floats, h: float) -> float | None:
-        """Return the largest Poisson defect at states (rows, DIM); None where the derivative is not to be had."""
+        """Return the largest Poisson defect at states (rows, DIM); None if the step cannot be differentiated."""
         signed = self.direction * h
         try:
             return max(measures.poisson_defect(self.system, self.parameters, step, x, signed) for x in states)
@@ -150,20 +151,20 @@ class SystemProblem(Problem):
 
 
 class CompiledMethod(Protocol):
-    """A compiled method, started from the problem's initial state."""
+    """A compiled method, which starts from the problem's initial state."""
 
     def rows(self, h: float, steps: int, stride: int) -> Floats | None:
         """Return the states (rows, DIM) after 0, stride, 2·stride, … and all steps; None if a step fails."""
         ...
 
     def walk(self, h: float) -> Callable[[int], object]:
-        """Return a function to be timed: each call makes ``steps`` more steps, the first from the start."""
+        """Return a function for timing: each call makes ``steps`` more steps, the first call from the initial state."""
         ...
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A solver of phigen's as a method."""
+    """A solver of phigen as a method."""
 
     solver: Backend
     problem: Problem
@@ -178,7 +179,7 @@ class Candidate:
         return rows if np.isfinite(rows).all() else None
 
     def reach(self, h: float, steps: int) -> tuple[float, str]:
-        """Return the time of the last successful step of ``steps``, and the status of the next."""
+        """Return the time of the last successful step of ``steps``, and the status of the step after it."""
         try:
             session = self.solver.start(self.problem.start, self.problem.parameters)
             session.advance(self.problem.direction * h, steps)
@@ -193,7 +194,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Classical:
-    """A classical method in compiled C; ``state`` is the start of its runner."""
+    """A classical method in compiled C; ``state`` is the array from which its runner starts."""
 
     runner: race.Runner
     state: Floats
@@ -212,11 +213,11 @@ class Classical:
         return states
 
     def walk(self, h: float) -> Callable[[int], object]:
-        # Its steps take the same time everywhere, so all calls start at the initial state of the problem.
+        # Its steps take the same time everywhere, so all calls may start at the initial state of the problem.
         self.state[:] = self.problem.start
         return lambda steps: self.runner(self.problem.direction * h, steps, 1)
 
 
 def steps_in(span: float, h: float) -> int:
-    """The number of steps that fill a span of time, at least one."""
+    """Return the number of steps of size ``h`` in a span of time, at least one."""
     return max(1, round(span / h))

@@ -13,20 +13,20 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import CompiledMethod
 from phigen.tuning.trials import MARKS
 
-#: Steps are halved until the solution changes by less than this fraction of the accuracy.
+#: Fraction of the accuracy below which a change of the solution ends the halving of steps.
 CONVERGED = 0.02
-#: The largest difference of the two methods, as a fraction of the accuracy.
+#: Largest difference of the two methods, as a fraction of the accuracy.
 AGREED = 0.2
 _HALVINGS = 16
-#: For orbits without a requested accuracy: an error below this is accurate enough.
+#: Error that is small enough for orbits without a requested accuracy.
 KNOWN = 1e-12
 
 
 @dataclass
 class Reference:
-    """The solution by one method at a step of at most ``step``: states (count + 1, DIM) at multiples of any spacing.
+    """The solution by one method with steps of at most ``step``: states (count + 1, DIM) at multiples of any spacing.
 
-    ``uncertainty`` is the distance from the second method, relative to the largest coordinate.
+    ``uncertainty`` is the distance from the solution by the second method, relative to the largest coordinate.
     """
 
     method: CompiledMethod
@@ -57,8 +57,8 @@ def agreed(
 ) -> Reference:
     """Return the reference over a time span by the first method, confirmed by the second.
 
-    ``accuracy`` is the error to be measured, relative to the largest coordinate; ``seconds`` is the time limit of each
-    method. Raises `CheckError` if the two do not agree well enough to measure that error.
+    ``accuracy`` is the error that is to be measured, relative to the largest coordinate; ``seconds`` is the time limit
+    of each method. Raises `CheckError` if the methods do not agree well enough to measure this error.
     """
     spacing = span / MARKS
     orbits = []
@@ -84,9 +84,10 @@ def agreed(
 def orbit_error(
     states: Floats, spacing: float, reference_method: CompiledMethod, step: float, seconds: float
 ) -> float | None:
-    """The distance of states (rows, DIM) at multiples of a spacing from those of another method at small steps.
+    """Return the distance of states (rows, DIM), at multiples of a spacing, from those of another method with small
+    steps.
 
-    Relative to the largest coordinate; None if the other method does not reach this accuracy in ``seconds``.
+    The distance is relative to the largest coordinate; None if the other method does not converge in ``seconds``.
     """
     count, until = len(states) - 1, time.perf_counter() + seconds
     orbit = _converged(reference_method, min(step, spacing), spacing, count, KNOWN, until)
@@ -97,14 +98,17 @@ def orbit_error(
 
 
 def distance(states: Floats, reference_states: Floats) -> float:
-    """The largest difference of states (rows, DIM), relative to the largest coordinate."""
+    """Return the largest difference of states (rows, DIM), relative to the largest coordinate."""
     return float(np.max(np.abs(states - reference_states))) / (float(np.max(np.abs(reference_states))) or 1.0)
 
 
 def _converged(
     method: CompiledMethod, step: float, spacing: float, count: int, accuracy: float, until: float
 ) -> tuple[Floats, float, float] | None:
-    """Halve the step until the change is small or no longer decreases. Return the states, the step and the change."""
+    """Return states, step and last change, for steps halved until the change is small or no longer decreases.
+
+    None if a step fails or the time is up.
+    """
     last: Floats | None = None
     best: tuple[Floats, float, float] | None = None
     change = math.inf

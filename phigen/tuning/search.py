@@ -10,19 +10,20 @@ from itertools import pairwise
 from phigen.tuning.settings import Setting, direct, variants
 from phigen.tuning.trials import ROUNDING, Point
 
-#: The factor between step sizes of a scan, and their largest number.
+#: Factor between the step sizes of a scan, and largest number of step sizes.
 FINER, MOST_POINTS = math.sqrt(2.0), 48
-#: Steps below the first guess that may fail.
+#: Number of steps below the first guess that may fail.
 FAILURES = 16
-#: A scan continues to this fraction of the accuracy, for the figure.
+#: Fraction of the accuracy down to which a scan continues, for the figure.
 BEYOND = 1 / 30
-#: The step is chosen for this fraction of the accuracy, since the largest error of a longer run is a little larger.
+#: Fraction of the accuracy for which the step is chosen, since the largest error of a longer run is slightly larger.
 AIM = 0.8
-#: Smaller steps, which may need fewer iterations, are tried until one costs this many times as much as the cheapest.
+#: Cost, relative to the cheapest step, at which the search for cheaper smaller steps ends. Smaller steps may need fewer
+#: iterations.
 DEARER = 1.25
-#: Bi-realisations this many times as expensive as the best are not followed to other orders.
+#: Cost, relative to the best, above which a bi-realisation is not tried at other orders.
 KEEP = 3.0
-#: Halving the step twice reduces errors at least by this factor, unless they are rounding errors.
+#: Least factor by which errors decrease when the step is halved twice, unless they are rounding errors.
 GAIN = 1.5
 
 
@@ -30,7 +31,7 @@ GAIN = 1.5
 class Curve:
     """Measurements of one method: points from coarse to fine. ``setting`` is None for a classical method.
 
-    ``bounded`` tells whether its energy error is bounded: true of Poisson maps only.
+    ``bounded`` says whether its energy error is bounded, which is true only of Poisson maps.
     """
 
     label: str
@@ -56,19 +57,22 @@ class Curve:
 
     @property
     def largest(self) -> float:
-        """The largest step with which the whole time was integrated, 0 if none."""
+        """The largest step with which the whole time span was integrated; 0 if there is none."""
         return max((p.step for p in self.points), default=0.0)
 
     def cost(self, accuracy: float) -> float:
-        """Nanoseconds per unit of time at an accuracy: measured, or extrapolated by the order from the finest step;
-        else inf.
+        """Return nanoseconds per unit of time at an accuracy: measured, or extrapolated by the order from the finest
+        step.
+
+        Infinity if neither is possible.
         """
         return cheapest_step(self.points, accuracy, self.order)[1]
 
 
 def _index_of_least_error(points: Sequence[Point]) -> int:
-    """The index of the point with the smallest error: finer steps have more rounding. The last point if there is none
-    such.
+    """Return the index of the first point whose error consists of rounding: finer steps have more of it.
+
+    If there is no such point, return the index of the last point.
     """
     least = min((p.error for p in points), default=0.0)
     return next(
@@ -87,9 +91,10 @@ def at_floor(points: Sequence[Point]) -> bool:
 
 
 def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """Largest step that meets the accuracy: interpolated, or extrapolated by the order below the finest measured step.
+    """Return the largest step that meets the accuracy.
 
-    None if the measured points show no such step.
+    It is interpolated or, below the finest measured step, extrapolated by the order. None if the measured points show
+    no such step.
     """
     points = points[: _index_of_least_error(points) + 1]
     if not points:
@@ -100,7 +105,7 @@ def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | No
     first = len(points)
     while first > 0 and points[first - 1].error <= accuracy:
         first -= 1
-    if first == len(points):  # a coarse step meets the accuracy by chance, the finest does not
+    if first == len(points):  # a coarse step meets the accuracy by chance, but the finest does not
         return _extrapolated_step(points, accuracy, order)
     if first == 0:
         return points[0].step
@@ -108,7 +113,7 @@ def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | No
 
 
 def _extrapolated_step(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """Step below the finest, extrapolated to the accuracy; None if rounding errors exceed the accuracy."""
+    """Return a step below the finest, extrapolated to the accuracy; None if rounding errors exceed the accuracy."""
     last = points[-1]
     if at_floor(points) or accuracy < max(ROUNDING, last.rounding):
         return None
@@ -116,9 +121,10 @@ def _extrapolated_step(points: Sequence[Point], accuracy: float, order: int) -> 
 
 
 def cheapest_step(points: Sequence[Point], accuracy: float, order: int) -> tuple[float, float]:
-    """Step that meets the accuracy at the least cost, and its nanoseconds per unit of time; 0 and inf if there is none.
+    """Return the step that meets the accuracy at the least cost, and its nanoseconds per unit of time.
 
-    The cheapest step need not be the largest: smaller steps have better predictors, and may save an iteration.
+    The result is 0 and infinity if there is no such step. The cheapest step need not be the largest: smaller steps have
+    better predictors, and may save an iteration.
     """
     largest = step_for(points, accuracy, order)
     if largest is None:
@@ -130,7 +136,7 @@ def cheapest_step(points: Sequence[Point], accuracy: float, order: int) -> tuple
 
 
 def _interpolated_step(coarse: Point, fine: Point, accuracy: float) -> float:
-    """Step that meets the accuracy on a straight line through two points in log–log scale."""
+    """Return the step that meets the accuracy on a straight line through two points in log–log scale."""
     if coarse.error <= fine.error:
         return fine.step
     share = math.log(accuracy / fine.error) / math.log(coarse.error / fine.error)
@@ -138,7 +144,8 @@ def _interpolated_step(coarse: Point, fine: Point, accuracy: float) -> float:
 
 
 def nanoseconds_at(points: Sequence[Point], step: float) -> float:
-    """The time of one step: interpolated between measured steps, that of the nearest one outside them."""
+    """Return the time of one step, interpolated between measured steps; outside their range, that of the nearest
+    step."""
     by_step = sorted(points, key=lambda p: p.step)
     for low, high in pairwise(by_step):
         if low.step <= step <= high.step:
@@ -156,10 +163,10 @@ def scan(
     worth: float = math.inf,
     patience: Callable[[], bool] = lambda: True,
 ) -> tuple[Point, ...]:
-    """Measure points from the largest possible step down to the accuracy and to the cheapest step.
+    """Return points measured from the largest possible step down to the accuracy and to the cheapest step.
 
     The first step is at most ``largest_step``. The scan ends early if the accuracy would cost more than ``worth``
-    nanoseconds per unit of time, if only rounding errors are left, and if ``patience`` returns False.
+    nanoseconds per unit of time, if only rounding errors are left, or if ``patience`` returns False.
     """
     points = _points_at_largest_step(measure, min(first, largest_step), largest_step, patience)
     while points and len(points) < MOST_POINTS and patience():
@@ -178,8 +185,9 @@ def scan(
 
 
 def _is_complete(points: Sequence[Point], accuracy: float) -> bool:
-    """Whether the scan is complete: the accuracy is reached and finer steps cost more, or only rounding errors are
-    left.
+    """Whether the scan is complete.
+
+    It is, if the accuracy is reached and finer steps cost more, or if only rounding errors are left.
     """
     last = points[-1]
     costs = [p.cost for p in points if p.error <= accuracy]
@@ -192,7 +200,7 @@ def _is_complete(points: Sequence[Point], accuracy: float) -> bool:
 def _refined(
     points: list[Point], measure: Callable[[float], Point | None], step: float | None, patience: Callable[[], bool]
 ) -> list[Point]:
-    """Insert one point between the points, unless it is there already."""
+    """Return the points with one more measured point, unless the step was measured before."""
     if not points or not step or not points[-1].step < step < points[0].step or not patience():
         return points
     if any(abs(math.log(p.step / step)) < 0.02 for p in points):
@@ -204,7 +212,8 @@ def _refined(
 def _points_at_largest_step(
     measure: Callable[[float], Point | None], first: float, largest_step: float, patience: Callable[[], bool]
 ) -> list[Point]:
-    """Find the largest possible step, to a factor `FINER`, from a first guess; empty if there is none near it."""
+    """Return points up to the largest possible step, found to a factor `FINER` from a first guess; [] if there is
+    none near it."""
     step, point = first, measure(first)
     for _ in range(FAILURES):
         if point is not None or not patience():
@@ -237,8 +246,8 @@ def _is_too_costly(points: Sequence[Point], accuracy: float, order: int, worth: 
 def proposals(tried_curves: Mapping[Setting, Curve], refused: Sequence[Setting], accuracy: float) -> list[Setting]:
     """Return the settings to try next, the most promising first; empty if none is promising.
 
-    A bi-realisation whose cost is near the best is tried at the next higher order while that pays, then at the next
-    lower one; the best is also tried without gauge and as a composition.
+    A bi-realisation whose cost is near the best is tried at the next higher order while the cost decreases, then at the
+    next lower one. The best one is also tried without gauge and as a composition.
     """
     costs = {setting: curve.cost(accuracy) for setting, curve in tried_curves.items()}
     families: dict[Setting, dict[int, float]] = {}
@@ -288,7 +297,7 @@ def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Se
 
 
 def rounded_down(step: float, digits: int = 3) -> float:
-    """Round a step down to few digits."""
+    """Return a step rounded down to few digits."""
     exponent = math.floor(math.log10(step)) - digits + 1
     rounded = float(f"{math.floor(step / 10.0**exponent + 1e-9)}e{exponent}")
     return rounded if rounded <= step else step

@@ -17,24 +17,24 @@ from phigen.spec.names import BIREALISATIONS, LOGARITHMIC
 from phigen.splitting.parts import split as split_in_parts
 from phigen.symbolic.expression import Expression, symbol
 
-#: The name of a choice of the spec that has no name of its own: formulas, or options of a kind.
+#: Name of a choice in the spec that has no other name: formulas, or options of a kind.
 OWN = "as in the spec"
 
-#: Orders of direct series; canonical-euler is also explicit at order 1, for separable H.
+#: Orders of direct series. canonical-euler also has order 1, which is explicit for separable H.
 ORDERS = tuple(range(2, limits.ORDER + 1, 2))
 
-#: Splitting needs no bi-realisation; this name takes the place of its kind.
+#: Name in place of the kind of bi-realisation, for splittings, which have none.
 SPLITTING = "splitting"
 
-#: The same for Gauss collocation; the orders that are tried.
+#: The name in place of the kind for Gauss collocation, and the orders that are tried.
 GAUSS = "gauss"
 GAUSS_ORDERS = (4, 8, 12, 16)
 
-#: The same for the choice among all schemes by their expected cost.
+#: The name in place of the kind for the automatic choice among all schemes.
 AUTO = "auto scheme"
 
 #: Candidate methods for near-integrable systems, with their orders: the best for each set of error terms in ε and h,
-#: and the methods with a corrector, whose steps are the cheapest.
+#: and methods with a corrector, whose steps are the cheapest.
 NEAR_INTEGRABLE = (
     ("saba-8-2", 2),
     ("wisdom-holman-17", 2),
@@ -43,7 +43,7 @@ NEAR_INTEGRABLE = (
     ("aba-10-6-4", 4),
 )
 
-#: Kinds that need formulas of the user, and kinds with options.
+#: Kinds of bi-realisations that need formulas of the user, and kinds with options.
 FORMULAS = ("custom", "group-map", "spray")
 CHOICES = ("auto", "canonical-euler", "product", "pullback")
 _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("pullback", "cayley"))
@@ -51,11 +51,11 @@ _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("p
 
 @dataclass(frozen=True, order=True)
 class Setting:
-    """A bi-realisation, order, gauge, composition and scheme; ``kind`` and ``gauge`` may be `OWN`. ``of`` is the inner
-    kind of products and pull-backs.
+    """A bi-realisation, order, gauge, composition and scheme.
 
-    A splitting has the kind `SPLITTING`, no gauge, and the composition ``auto``; Gauss collocation the kind `GAUSS`.
-    An empty ``monitor`` stands for that of the spec.
+    ``kind`` and ``gauge`` may be `OWN`. ``of`` is the inner kind of products and pull-backs. A splitting has the kind
+    `SPLITTING`, no gauge, and the composition ``auto``; Gauss collocation has the kind `GAUSS`. An empty ``monitor``
+    stands for that of the spec.
     """
 
     kind: str
@@ -67,7 +67,7 @@ class Setting:
 
     @property
     def family(self) -> Setting:
-        """Setting without its order, which methods of different orders have in common."""
+        """The setting without its order; methods of different orders have it in common."""
         return replace(self, order=0)
 
     @property
@@ -77,7 +77,7 @@ class Setting:
 
     @property
     def orders(self) -> tuple[int, ...]:
-        """The orders that its family has."""
+        """The orders that are available for the family of the setting."""
         if self.is_splitting:
             return tuple(choosing.orders(self.composition))
         if self.is_gauss:
@@ -87,7 +87,8 @@ class Setting:
         return (1, *ORDERS) if self.kind == "canonical-euler" else ORDERS
 
     def described(self, kind: str = "") -> str:
-        """The setting in words: ``exponential, order 8, without gauge, kahan-li``; ``kind`` is that of the build."""
+        """Return the setting in words: ``exponential, order 8, without gauge, kahan-li``; ``kind`` is the kind that
+        was built."""
         chart_name = self.kind if self.of == "auto" else f"{self.kind} of {self.of}"
         attributes = [kind or chart_name, f"order {self.order}"]
         attributes += ["without gauge"] if self.gauge == "none" and self.scheme == "series" else []
@@ -95,21 +96,21 @@ class Setting:
 
     @property
     def is_splitting(self) -> bool:
-        """Whether its scheme is a splitting."""
+        """Whether the scheme is a splitting."""
         return self.kind == SPLITTING
 
     @property
     def is_gauss(self) -> bool:
-        """Whether its scheme is Gauss collocation."""
+        """Whether the scheme is Gauss collocation."""
         return self.kind == GAUSS
 
     @property
     def scheme(self) -> str:
-        """Its scheme, as in specs."""
+        """The scheme, as in specs."""
         return "auto" if self.kind == AUTO else self.kind if self.kind in (SPLITTING, GAUSS) else "series"
 
     def lines(self) -> list[str]:
-        """The top-level lines of a spec that request the setting; `OWN` leaves the lines of the spec as they are."""
+        """Return the top-level lines of a spec that request the setting; for `OWN` the lines of the spec remain."""
         kind = "auto" if self.scheme != "series" else self.kind
         chart_value = kind if self.of == "auto" else f"{{kind: {kind}, of: {self.of}}}"
         lines = [f"scheme: {self.scheme}"]
@@ -119,7 +120,7 @@ class Setting:
         return lines if self.gauge == OWN else [*lines, f"gauge: {self.gauge}"]
 
     def applied(self, spec: Spec) -> Spec:
-        """The spec with this setting."""
+        """Return the spec with this setting."""
         kind = "auto" if self.scheme != "series" else self.kind
         choice = spec.birealisation if kind == OWN else BirealisationChoice(kind, of=self.of)
         return replace(
@@ -131,7 +132,7 @@ class Setting:
 
 
 def monitor_of(expression_text: str, spec: Spec) -> str | Expression:
-    """The monitor that a text denotes: ``log``, or a function of coordinates and parameters."""
+    """Return the monitor of a text: ``log``, or a function of coordinates and parameters."""
     if expression_text == LOGARITHMIC:
         return LOGARITHMIC
     names = (*spec.coordinates, *(p.name for p in spec.parameters))
@@ -142,7 +143,7 @@ def monitor_of(expression_text: str, spec: Spec) -> str | Expression:
 
 
 def own_setting(compilation: Compilation) -> Setting:
-    """The setting of a spec as it is now, with the kinds that ``auto`` chose."""
+    """Return the present setting of a spec, with the kinds that ``auto`` chose."""
     spec, order = compilation.spec, compilation.order.order
     gauge = spec.gauge if isinstance(spec.gauge, str) else OWN
     if compilation.scheme_name != "series":
@@ -150,27 +151,28 @@ def own_setting(compilation: Compilation) -> Setting:
     choice = spec.birealisation
     is_plain = choice == BirealisationChoice(choice.kind, order=choice.order) and choice.kind not in FORMULAS
     kind = compilation.kind if is_plain else OWN
-    if spec.lattice:  # its series has order 2 and is composed for higher orders
+    if spec.lattice:  # the series of a lattice has order 2 and is composed for higher orders
         composition = "auto" if spec.composition == "none" else spec.composition
         return Setting(kind if compilation.birealisation else "auto", order, OWN, composition)
     return Setting(kind, order, gauge, spec.composition if compilation.is_composed else "none")
 
 
 def charts(system: System, current: Setting) -> list[Setting]:
-    """The first settings: one of order 4 for each bi-realisation that might apply, and the spec's own at several
-    orders.
+    """Return the first settings: one of order 4 for each bi-realisation that might apply, and that of the spec at
+    several orders.
 
-    Kinds that need formulas of the user are omitted, and Karasev's paths for constant or linear π, for which the same
-    maps have closed forms. Building the others shows which of them apply. Splittings and Gauss steps come first.
+    Two groups of kinds are omitted: those that need formulas of the user, and Karasev's paths for constant or linear π,
+    for which the same maps have closed forms. The builds of the others show which of them apply. Splittings and Gauss
+    steps come first.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
     plain_kinds = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]
     plain_settings = [Setting(kind, 4) for kind in plain_kinds if not (kind == "karasev" and linear)]
     nested = [Setting(kind, 4, of=inner_kind) for kind, inner_kind in _NESTED]
-    # The other side is the adjoint, with the same errors in reversed time.
+    # The other side is the adjoint, which has the same errors in reversed time.
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
     composed = _near_integrable(system)
-    # They are built in seconds, where series of order 8 may take minutes.
+    # They are built in seconds, whereas series of order 8 may take minutes.
     quick = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
     quick += [Setting(GAUSS, order, "none") for order in (8, 16)]
     quick = [s for s in quick if s.chart != current.chart]
@@ -180,7 +182,7 @@ def charts(system: System, current: Setting) -> list[Setting]:
 
 
 def _near_integrable(system: System) -> list[Setting]:
-    """Splittings of H = A + εB with methods for near-integrable systems; empty if H is no such sum."""
+    """Return splittings of H = A + εB with methods for near-integrable systems; empty if H is not such a sum."""
     try:
         small = split_in_parts(system).small
     except PhigenError:
@@ -189,12 +191,12 @@ def _near_integrable(system: System) -> list[Setting]:
 
 
 def direct(setting: Setting) -> str:
-    """The composition that the plain methods of its kind use."""
+    """Return the composition of the plain methods of the setting's kind."""
     return "auto" if setting.is_splitting or setting.composition == "auto" else "none"
 
 
 def variants(best: Setting, gauged: bool, symmetric: bool) -> list[Setting]:
-    """Variants of a bi-realisation at about the same order: without gauge, or as a composition."""
+    """Return variants of a bi-realisation at about the same order: without gauge, or as a composition."""
     variations = [replace(best, gauge="none")] if gauged else []
     if symmetric and direct(best) == "none":
         recommended = {c.order: c.name for c in reversed(COMPOSITIONS)}

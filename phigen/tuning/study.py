@@ -20,24 +20,24 @@ from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import Point
 from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 
-#: The share of the budget for one confirming run, the factor by which it may be exceeded, the attempts at a step.
+#: Share of the budget for one confirming run, factor by which it may be exceeded, and number of attempts at a step.
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
-#: The number of finalists, their largest cost relative to the best, and the rounds in which all are timed in turn.
+#: Number of finalists, their largest cost relative to the best, and number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
-#: Share of the budget after which only what a result needs is confirmed.
+#: Share of the budget after which only settings that the result needs are confirmed.
 CONFIRMED = 1.0
-#: Share of the budget after which methods are timed once: a round of timings of confirmed methods takes some tenth.
+#: Share of the budget after which methods are timed only once; a round of timings takes some tenth of it.
 TIMED = 1.1
-#: Share of the budget, counted from its start, after which no monitor and no automatic scheme is tried: monitors have
-#: half of the budget if the search used it up.
+#: Share of the budget, counted from its start, after which no monitor and no automatic scheme is tried. Monitors have
+#: half of the budget if the search used up all of it.
 MONITORED = 1.5
-#: Costs within this factor count as equal: then the lower order wins.
+#: Factor within which costs count as equal; the lower order is then preferred.
 EQUAL = 1.1
 
 
 @dataclass(frozen=True)
 class Finalist:
-    """A method at its proposed step, confirmed over ``point.time``, and timed together with the others.
+    """A method at its proposed step, confirmed over ``point.time``, and timed in rounds with the others.
 
     ``seconds`` are CPU times (s) per unit of simulated time, one for each round.
     """
@@ -54,16 +54,15 @@ class Finalist:
 
 @dataclass(frozen=True)
 class Tuning:
-    """The result of a tuning. ``finalists`` meet the accuracy, the best first; empty if nothing does.
+    """The result of a tuning. ``finalists`` meet the accuracy, the best first; empty if no method does.
 
     ``own`` is the setting of the spec at the step that reaches the accuracy, None if no step does. ``present`` is the
     setting of the spec at the step of the run. ``peers`` are the classical methods that reach the accuracy. Scans were
     made over ``piece`` of the ``horizon``. ``refused`` has the reasons why other candidates were not measured.
-    ``finished`` says whether all candidates worth trying were measured. ``orbit_error`` is the error of the orbit of
-    the best finalist over ``piece`` if the energy error was measured, None if it is unknown. ``unit`` is the unit of
-    energy errors. ``monitors`` are the gains of monitors, if the spec has none and the speed of the motion varies
-    much. ``sizes`` are the sizes of the measured lattice, empty for other systems. Times are values of the ``clock``,
-    t or τ.
+    ``finished`` says whether all promising candidates were measured. ``orbit_error`` is the error of the orbit of the
+    best finalist over ``piece`` if the energy error was measured, None if it is unknown. ``unit`` is the unit of energy
+    errors. ``monitors`` are the gains of monitors, if the spec has none and the speed of the motion varies much.
+    ``sizes`` are the sizes of the measured lattice, empty for other systems. Times are values of the ``clock``, t or τ.
     """
 
     measure: str
@@ -82,23 +81,24 @@ class Tuning:
     monitors: Monitors | None = None
     sizes: tuple[int, ...] = ()
     clock: str = "t"
-    automatic: str = ""  # the scheme that ``scheme: auto`` takes at the order of the proposal
+    automatic: str = ""  # the scheme that ``scheme: auto`` chooses at the order of the proposal
 
     @property
     def automatic_ratio(self) -> float:
-        """Time of the best method of that scheme relative to the proposal; infinite if none reaches the accuracy."""
+        """Cost of the best method of the automatic scheme relative to the proposal; infinite if none reaches the
+        accuracy."""
         costs = [c.cost(self.accuracy) for c in self.curves if c.setting and c.setting.scheme == self.automatic]
         best = min((c.cost(self.accuracy) for c in self.curves if c.setting), default=math.inf)
         return min(costs, default=math.inf) / best
 
     @property
     def winner(self) -> Finalist | None:
-        """The method that is proposed: the best finalist, None if there is none."""
+        """The proposed method: the best finalist, None if there is none."""
         return self.finalists[0] if self.finalists else None
 
     @property
     def closest(self) -> tuple[Curve, Point]:
-        """The smallest error that was measured."""
+        """Return the curve and the point with the smallest measured error."""
         measured_points = [(c, p) for c in self.curves for p in c.points if c.setting]
         return min(measured_points, key=lambda pair: pair[1].error)
 
@@ -109,10 +109,10 @@ def tune(
 ) -> Tuning:  # fmt: skip
     """Measure the candidates of a spec on a run, and find the cheapest that meets the accuracy.
 
-    ``measure`` is ``energy``, the largest error of the energy on the way, or ``orbit``, the distance from a
-    reference. Takes about ``budget`` seconds at most, or until a budget that has begun ends. Raises `StepError` if the
-    spec's own setting cannot make even small steps, `CheckError` if there is no reference, `ToolchainError` without a C
-    compiler.
+    ``measure`` is ``energy``, the largest error of the energy along the run, or ``orbit``, the distance from a
+    reference. It takes at most about ``budget`` seconds; a `TimeBudget` may have begun before. Raises `StepError` if
+    the setting of the spec cannot make even small steps, `CheckError` if there is no reference, `ToolchainError`
+    without a C compiler.
     """
     clock = budget if isinstance(budget, TimeBudget) else TimeBudget(budget)
     tuner = Tuner(compilation, problem, accuracy, clock, note)
@@ -136,7 +136,7 @@ def tune(
 
 
 def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
-    """Measure the gains of monitors over the time of a scan; None if the speed of the motion varies little."""
+    """Return the gains of monitors over the time of a scan; None if the speed of the motion varies little."""
     compilation, problem = tuner.compilation, tuner.problem
     spec, setting = compilation.spec, current.setting
     if spec.monitor is not None or not problem.evens_out or setting is None:
@@ -155,7 +155,8 @@ def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
 
 
 def automatic(compilation: Compilation, ranked: Sequence[Finalist]) -> str:
-    """The scheme that ``scheme: auto`` takes at the order of the best; empty for a lattice, and without a best."""
+    """Return the scheme that ``scheme: auto`` chooses at the order of the best; "" for a lattice, and if there is no
+    best."""
     if not ranked or compilation.spec.lattice:
         return ""
     setting = replace(ranked[0].curve.setting or own_setting(compilation), kind=AUTO, composition="auto", gauge="auto")
@@ -167,7 +168,10 @@ def automatic(compilation: Compilation, ranked: Sequence[Finalist]) -> str:
 
 
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
-    """Finalists by cost; among those indistinguishable from the best, the lowest order comes first, without gauge."""
+    """Return finalists by cost.
+
+    Among those with about the cost of the best, the lowest order comes first, and then settings without a gauge.
+    """
     ranked = sorted(finalists, key=lambda f: f.cost)
     equal = [f for f in ranked if f.cost <= EQUAL * ranked[0].cost]
     simple = min(equal, key=lambda f: (f.curve.order * max(f.curve.stages, 1), f.curve.gauged, f.cost), default=None)
@@ -175,7 +179,7 @@ def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
 
 
 def final(tuner: Tuner, current: Curve) -> list[Finalist]:
-    """Return the best candidates and the spec's own setting, each at a step that a longer run confirmed."""
+    """Return the best candidates and the setting of the spec, each at a step that a longer run confirmed."""
     accuracy = tuner.accuracy
     finalists: list[Finalist] = []
     for curve in sorted(tuner.tried.values(), key=lambda c: c.cost(accuracy)):
@@ -191,9 +195,9 @@ def final(tuner: Tuner, current: Curve) -> list[Finalist]:
 
 
 def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
-    """Measure the cheapest step, rounded to few digits, over the horizon or the part for which there is time.
+    """Measure the cheapest step, rounded to few digits, over the horizon, or as much of it as there is time for.
 
-    A step that misses the accuracy is reduced a few times; None if none of them reaches it.
+    A step that misses the accuracy is reduced a few times; None if no step reaches the accuracy.
     """
     accuracy = tuner.accuracy
     method, measure = tuner.methods[curve.key], tuner.measures[curve.bounded]
@@ -215,9 +219,9 @@ def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
 
 
 def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
-    """The time that a confirming run covers: the horizon, or what its share of the budget allows.
+    """Return the time span of a confirming run: the horizon, or as much as its share of the budget allows.
 
-    Orbits are measured over the time of their reference. 0 if even the time of a scan would take too long.
+    Orbits are measured over the time span of their reference. 0 if even the time span of a scan would take too long.
     """
     seconds_per_step = 1e-9 * search.nanoseconds_at(curve.points, h)
     affordable = h * CONFIRMING * tuner.clock.budget / seconds_per_step
@@ -227,7 +231,7 @@ def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
 
 
 def _present(tuner: Tuner, current: Curve) -> Finalist | None:
-    """The spec's own setting at the step of the run."""
+    """Return the setting of the spec at the step of the run."""
     h = tuner.problem.step
     span = confirming_span(tuner, current, h) if tuner.clock.left(CONFIRMED) > 0 else 0.0
     point = tuner.measures[current.bounded](tuner.methods[current.key], h, span) if span else None
@@ -235,7 +239,10 @@ def _present(tuner: Tuner, current: Curve) -> Finalist | None:
 
 
 def time_all(finalists: Sequence[Finalist], tuner: Tuner) -> list[Finalist]:
-    """Time all methods in turn, in several rounds, so that disturbances affect all of them alike; at least once."""
+    """Return the methods with timings in several rounds, at least one.
+
+    The methods are timed in turn, so that disturbances affect all of them alike.
+    """
     seconds: list[list[float]] = [[] for _ in finalists]
     for completed in range(ROUNDS):
         if completed and tuner.clock.left(TIMED) < 0:

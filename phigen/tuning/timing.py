@@ -9,16 +9,17 @@ from collections.abc import Callable
 from phigen.runtime.interface import BackendError
 from phigen.tuning.problem import CompiledMethod
 
-#: The least duration of a measurement of time, in seconds.
+#: Least duration of a measurement of time, in seconds.
 LEAST_SECONDS = 2e-3
-#: Numbers of steps that are timed: in the first part, in the largest of the doubled first parts, and in total.
+#: Numbers of timed steps: in the first part of a run, in the largest of the parts that double, and in total.
 FEW_STEPS, PART_STEPS, TIMED_STEPS = 64, 4096, 32_768
 
 
 def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
-    """CPU time on this thread of one of the steps of a run, the fastest of some; NaN if they cannot be made.
+    """Return the CPU time of a step on this thread in nanoseconds, the fastest of several measurements; NaN if steps
+    fail.
 
-    Excludes setup that happens once, such as the choice of a gauge, and the call from Python.
+    Work that is done once, such as the choice of a gauge, and the call from Python are excluded.
     """
     fastest = call = math.inf
     spent = 0.0
@@ -35,10 +36,10 @@ def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
 
 
 def _run_seconds(walk: Callable[[int], object], steps: int) -> tuple[float, float]:
-    """The seconds that were taken, and those that all steps of a run would take.
+    """Return the measured seconds, and the seconds that all steps of a run would take.
 
-    Long runs are timed in part, until their steps are as fast as the rest will be: a solver in C first fits its
-    predictor, then goes on in blocks of steps, several times as fast.
+    Long runs are timed in part, until their steps are as fast as the remaining ones: a solver in C first fits its
+    predictor, and then makes blocks of steps, several times as fast.
     """
     seconds, steps_done, part = 0.0, 0, min(FEW_STEPS, steps)
     while True:

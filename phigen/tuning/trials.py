@@ -12,12 +12,12 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import CompiledMethod, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: Times at which an orbit is compared.
+#: Number of times at which an orbit is compared.
 MARKS = 256
-#: The relative change of the energy by one rounding; over n steps roundings add up like a random walk.
+#: Relative change of the energy by one rounding; over n steps roundings add up like a random walk.
 ROUNDING = 1.1e-16
-#: Errors that grow faster than this power of time are those of chaotic motion; slower than the second power, they are
-#: taken as linear apart from oscillations.
+#: Powers of time by which the growth of errors is classified. Errors that grow faster than LINEAR are those of chaotic
+#: motion; slower than STEADY, they are treated as linear apart from oscillations.
 LINEAR, STEADY = 1.8, 1.3
 
 
@@ -26,8 +26,8 @@ class Point:
     """Measurements at one step size: the error over ``time``, the expected error at the horizon, and the cost of a
     step.
 
-    ``error`` is at the horizon, ``measured`` over the time. ``growth`` is the power of time with which it grows, NaN
-    if that is unknown; ``rounding`` is the known part of the error that smaller steps do not reduce.
+    ``error`` is the error at the horizon, ``measured`` that over the time. ``growth`` is the power of time with which
+    it grows, NaN if that is unknown; ``rounding`` is the known part of the error that smaller steps do not reduce.
     """
 
     step: float
@@ -40,14 +40,14 @@ class Point:
 
     @property
     def cost(self) -> float:
-        """Nanoseconds of one unit of time."""
+        """Nanoseconds of computing per unit of simulated time."""
         return self.nanoseconds / self.step
 
 
-#: States (count + 1, DIM) of the solution at the multiples of a spacing: ``reference(spacing, count)``.
+#: Function (spacing, count) that returns the states (count + 1, DIM) of the solution at multiples of the spacing.
 Solution = Callable[[float, int], Floats]
 
-#: Measures a method at a step over a time; None if a step cannot be made.
+#: Function (method, step, time) that measures a method; None if a step fails.
 Measure = Callable[[CompiledMethod, float, float], Point | None]
 
 
@@ -58,10 +58,10 @@ def marks(span: float, h: float) -> tuple[int, int]:
 
 
 def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
-    """The largest energy error during the run, in its unit.
+    """Return the measure of the largest energy error during the run, in the unit of the energy.
 
     Energy errors of Poisson maps are ``bounded``: the same over the horizon, apart from rounding. Those of other
-    methods are extrapolated if they were seen to grow with time.
+    methods are extrapolated if they grow with time.
     """
     unit = problem.unit
 
@@ -76,7 +76,7 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
         largest = float(np.max(errors))
         if not math.isfinite(largest):
             return None
-        # Rounding errors remain even if a method does not drift.
+        # Rounding errors remain even if a method has no drift.
         largest, time = max(largest, ROUNDING), steps * h
         growth = _growth(errors)
         ratio = max(problem.horizon / time, 1.0)
@@ -90,10 +90,11 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
 
 
 def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True) -> Measure:
-    """The largest distance from a reference at about `MARKS` times, relative to the largest coordinate there is.
+    """Return the measure of the largest distance from a reference at about `MARKS` times, relative to the largest
+    coordinate.
 
     Orbit errors of Poisson maps are extrapolated linearly in time, since their energy errors are ``bounded``, unless
-    they were seen to grow faster, as rounding errors do; orbit errors of other methods at least linearly.
+    they grow faster, as rounding errors do. Orbit errors of other methods are extrapolated at least linearly.
     """
 
     def measure(method: CompiledMethod, h: float, span: float) -> Point | None:
@@ -115,7 +116,8 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
 
 
 def _growth(errors: Floats) -> float:
-    """The power of time with which errors at equidistant times grow, from their maxima over the halves of the run."""
+    """Return the power of time with which errors at equidistant times grow, from their maxima over both halves of
+    the run."""
     if len(errors) < 5:
         return math.nan
     half_count = len(errors) // 2 + 1

@@ -1,4 +1,4 @@
-"""The search for one run of a spec: candidates built and scanned, within a budget of time."""
+"""The search for one run of a spec: candidates are built and scanned, within a budget of time."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, 
 #: Shares of the budget: after which no build starts; for one round of builds; for the expected time of a first guess;
 #: for one scan; and for one reference solution.
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
-#: Shares after which no candidate and no classical method is scanned any more.
+#: Shares of the budget after which no candidate, and no classical method, is scanned.
 SCANNED, COMPARED = 0.9, 0.85
-#: The largest cost of a candidate relative to the best so far, and that of a classical method.
+#: Largest cost of a candidate, and of a classical method, relative to the best so far.
 WORTH, WORTH_KNOWING = 4.0, 100.0
-#: Classical methods that the result is compared with: their names in tables, and orders.
+#: Classical methods with which the result is compared: their names in tables, and orders.
 PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
 
 Notify = Callable[[str], object]
 
 
 class TimeBudget:
-    """The seconds that a search may take, from ``start`` on (`time.perf_counter`); by default from now on."""
+    """The seconds that a search may take, counted from ``start`` (`time.perf_counter`), by default the present time."""
 
     def __init__(self, budget: float, start: float | None = None) -> None:
         self.budget, self.start = budget, time.perf_counter() if start is None else start
 
     def at(self, share: float) -> float:
-        """The time, as of `time.perf_counter`, at which a share of the budget is used up."""
+        """Return the time, as of `time.perf_counter`, at which a share of the budget is used up."""
         return self.start + share * self.budget
 
     def left(self, share: float) -> float:
@@ -48,11 +48,11 @@ class TimeBudget:
 
 
 class Tuner:
-    """The state of a search. ``measures`` maps True to the error measure of Poisson maps, False to that of other
-    methods.
+    """The state of a search.
 
-    ``piece`` is the time over which candidates are scanned, ``most`` the largest useful step, ``referring`` tells
-    whether orbits are compared with a reference.
+    ``measures`` maps True to the error measure of Poisson maps, False to that of other methods. ``piece`` is the time
+    span over which candidates are scanned, ``most`` the largest useful step. ``referring`` says whether orbits are
+    compared with a reference.
     """
 
     def __init__(
@@ -78,10 +78,10 @@ class Tuner:
         self._state = problem.start.copy()
 
     def start(self, measure: str) -> Curve:
-        """Scan the spec's own setting, which sets the scales of the search and the cost to beat.
+        """Scan the setting of the spec, which determines the scales of the search and the cost to improve on.
 
         ``measure`` is ``energy`` or ``orbit``. Raises `CheckError` if there is no reference for the orbit, and
-        `StepError` if no step can be made at all.
+        `StepError` if no step can be made.
         """
         compilation = self.compilation
         setting = own_setting(compilation)
@@ -96,7 +96,7 @@ class Tuner:
         return curve
 
     def search(self, current: Curve) -> bool:
-        """Try candidates; true if none promises more, false if the time is up."""
+        """Try candidates. Return true if no further candidate is promising, false if the time is up."""
         assert current.setting is not None
         guesses = self.problem.guesses(current.setting)
         limit = GUESSING * self.clock.budget
@@ -120,7 +120,7 @@ class Tuner:
         return curve
 
     def peers(self) -> list[Curve]:
-        """The classical methods, scanned; none if there is no time to compile them."""
+        """Return the curves of the classical methods; none if there is no time to compile them."""
         current = next(iter(self.tried.values()))
         if self._race is None and current.seconds > self.clock.left(COMPARED):
             return []
@@ -136,7 +136,7 @@ class Tuner:
         return curves
 
     def try_all(self, settings: Sequence[Setting]) -> None:
-        """Build settings in parallel; measure them when all builds have ended."""
+        """Build settings in parallel, and measure them when all builds have ended."""
         outcomes: dict[Setting, Outcome] = {s: self._made[s] for s in settings if s in self._made}
         until = min(self.clock.at(SEARCHING), time.perf_counter() + BUILDING * self.clock.budget)
         affordable = self._affordable([s for s in settings if s not in self._made])
@@ -161,11 +161,11 @@ class Tuner:
 
     @property
     def least(self) -> float:
-        """The least cost so far, in nanoseconds per unit of time."""
+        """Return the least cost so far, in nanoseconds per unit of time."""
         return min((c.cost(self.accuracy) for c in self.tried.values()), default=math.inf)
 
     def orbit_error(self, curve: Curve, h: float) -> float | None:
-        """The error of the orbit over the time of a scan, by DOP853; None if that is unknown."""
+        """Return the error of the orbit over the time span of a scan, by DOP853; None if that is unknown."""
         stride, count = marks(self.piece, h)
         states = self.methods[curve.key].rows(h, stride * count, stride)
         if states is None or self._race is None:
@@ -174,7 +174,7 @@ class Tuner:
         return orbit_error(states, stride * h, self._classical("dop853"), self.problem.step, seconds)
 
     def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
-        """Drop the settings whose builds would take too long, as estimated from lower orders."""
+        """Return the settings without those whose builds would take too long, as estimated from lower orders."""
         affordable = []
         for setting in settings:
             expected = expected_seconds(setting, self.tried.values())
@@ -194,7 +194,7 @@ class Tuner:
 
     @property
     def _raced(self) -> race.Race:
-        """The classical methods, compiled at the first use."""
+        """Return the classical methods, which are compiled on first use."""
         if self._race is None:
             self._race = self.problem.classical(self.compilation, list(PEERS), self._state)
         return self._race
@@ -223,7 +223,7 @@ class Tuner:
             _expect_linear(self.measures[True], method, problem, self.piece)
 
     def _reference(self, method: CompiledMethod) -> Reference:
-        """Compute the reference over the piece, which is shortened if rounding or chaos prevent it."""
+        """Return the reference over the piece, which is shortened if rounding or chaos require it."""
         problem, second, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
         step, clock = problem.step, problem.clock
         for shorter in (1, 4, 16):
@@ -239,7 +239,7 @@ class Tuner:
 
 
 def _unreachable(method: Candidate, problem: Problem) -> StepError:
-    """The error for a run that the spec's own setting cannot complete at any step."""
+    """Return the error for a run that the setting of the spec cannot complete with any step."""
     h = problem.step / 16
     until, status = method.reach(h, steps_in(problem.horizon, h))
     clock = problem.clock
@@ -251,7 +251,7 @@ def _unreachable(method: Candidate, problem: Problem) -> StepError:
 
 
 def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, span: float) -> None:
-    """Raise CheckError if the orbit error grows too fast to be extrapolated to a longer run."""
+    """Raise `CheckError` if the orbit error grows too fast to be extrapolated to a longer run."""
     h, clock = problem.step, problem.clock
     for _ in range(12):
         point = measure(method, h, span)
@@ -267,7 +267,7 @@ def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, s
 
 
 def expected_seconds(setting: Setting, tried_curves: Iterable[Curve]) -> float:
-    """Estimated seconds of building, from lower orders of the same family, by a power of the order; else 0.
+    """Return the estimated seconds of a build, from lower orders of the same family, by a power of the order; else 0.
 
     The code of compositions has the same length at all orders, apart from the table of stages.
     """

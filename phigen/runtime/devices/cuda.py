@@ -22,7 +22,7 @@ _MEMORY = ("OUT_OF_MEMORY", "OUT_OF_RESOURCES", "MemoryAllocation")
 
 
 class CUDADevice:
-    """A graphics card of NVIDIA, used through CuPy."""
+    """A graphics card of NVIDIA, used through CuPy: a `phigen.runtime.devices.device.Device`."""
 
     target = "cuda"
     double = is_card = True
@@ -38,7 +38,6 @@ class CUDADevice:
         return f"<CUDA device: {self.name}, {self.memory >> 20} MiB>"
 
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
-        """See `phigen.runtime.devices.device.Device`."""
         options = (*_OPTIONS, *(f"-D{name}={value}" for name, value in defined.items()))
 
         def compile_module() -> Any:
@@ -55,15 +54,12 @@ class CUDADevice:
             raise MissingPackageError(f"{self.name}: {message}") from error
 
     def kernel(self, program: Any, name: str) -> Any:
-        """See `phigen.runtime.devices.device.Device`."""
         return self._checked_call(lambda: program.get_function(name))
 
     def local_bytes(self, kernel: Any) -> int:
-        """See `phigen.runtime.devices.device.Device`."""
         return self._checked_call(lambda: int(kernel.local_size_bytes))
 
     def empty(self, size: int) -> Any:
-        """See `phigen.runtime.devices.device.Device`."""
         return self._checked_call(lambda: self._cupy.empty(max(1, size), dtype=np.uint8))
 
     def constants(self, array: Any) -> Any:
@@ -72,17 +68,14 @@ class CUDADevice:
         return array.reshape(-1).view(np.dtype([("values", array.dtype, (array.size,))]))
 
     def write(self, buffer: Any, array: Any) -> None:
-        """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:
             self._checked_call(lambda: buffer[: array.nbytes].set(array.view(np.uint8).reshape(-1)))
 
     def read(self, buffer: Any, array: Any) -> None:
-        """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:
             self._checked_call(lambda: buffer[: array.nbytes].get(out=array.view(np.uint8).reshape(-1)))
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
-        """See `phigen.runtime.devices.device.Device`."""
         group = self._checked_call(lambda: kernel.max_threads_per_block)  # at most the launch bound of the kernel
         launch_arguments = tuple(
             np.uint64(0) if argument is None else argument for argument in arguments

@@ -39,8 +39,8 @@ _LOCAL_BYTES = 512
 class DeviceSolver:
     """Back end over a generated header for devices, and over another back end for computations on the host.
 
-    ``defined`` are macros of the generated code: NAME_GROUP is the number of work items in a group, which does not
-    affect results.
+    It implements `phigen.runtime.backend.Backend`. ``defined`` are macros of the generated
+    code: NAME_GROUP is the number of work items in a group, which does not affect results.
     """
 
     def __init__(
@@ -69,12 +69,10 @@ class DeviceSolver:
 
     @property
     def identity(self) -> str:
-        """See `phigen.runtime.backend.Backend`."""
         text = f"{self._header}\n{self.device.name}\n{self._host.identity}"
         return hashlib.sha256(text.encode()).hexdigest()[:40]
 
     def with_gauge(self, gauge: Floats) -> DeviceSolver:
-        """See `phigen.runtime.backend.Backend`."""
         host = self._host.with_gauge(gauge)
         return DeviceSolver(self._files, self.interface, self.target, host, np.ascontiguousarray(gauge), self._index)
 
@@ -251,12 +249,10 @@ class DeviceSolver:
         return self._host.start(x0, parameters, t0, first, draws)
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
-        """See `phigen.runtime.backend.Backend`."""
         return self._host.restored(saved, parameters)
 
     @property
     def has_pullback(self) -> bool:
-        """See `phigen.runtime.backend.Backend`."""
         return self._host.has_pullback
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
@@ -264,27 +260,21 @@ class DeviceSolver:
         return self._host.pullback(members, bars, threads)
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         return self._host.hamiltonian(x, parameters, t)
 
     def casimirs(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         return self._host.casimirs(x, parameters)
 
     def vector_field(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         return self._host.vector_field(x, parameters, t)
 
     def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         return self._host.observables(x, parameters, t)
 
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         return self._host.noise_fields(x, parameters, t)
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """See `phigen.runtime.backend.Backend`."""
         return self._host.rate(x, parameters)
 
 

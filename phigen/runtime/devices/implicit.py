@@ -23,7 +23,6 @@ class ImplicitSession(DeviceLatticeSession):
         self._written: Any = None
 
     def advance(self, h: float, steps: int) -> None:
-        """See `DeviceLatticeSession.advance`."""
         self.prepare(h)
         predictors: dict[Any, Any] = {}
         with np.errstate(all="ignore"):

@@ -66,14 +66,12 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._on_device = True
 
     def saved(self) -> dict[str, Any]:
-        """See `phigen.runtime.lattice.LatticeSession`."""
         if not self._interface.compensated:
             return super().saved()
         self._upload()
         return {**super().saved(), "compensation": self._launcher.read(self._fields, (2, *self._shape))[1]}
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
-        """See `phigen.runtime.lattice.LatticeSession`."""
         super().resume(h, steps, arrays)
         self._upload(arrays.get("compensation"))
 

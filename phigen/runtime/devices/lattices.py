@@ -25,7 +25,8 @@ from phigen.runtime.numpy_lattice import NumpyLattice, NumpyLatticeSession
 class DeviceLattice(NumpyLattice):
     """Back end over a generated header for devices, and over a NumPy module for computations on the host.
 
-    ``defined`` are macros of the generated code, see `phigen.runtime.devices.ensembles.DeviceSolver`.
+    It implements `phigen.runtime.lattice.LatticeBackend`. ``defined`` are macros of the generated
+    code, see `phigen.runtime.devices.ensembles.DeviceSolver`.
     """
 
     def __init__(
@@ -52,7 +53,6 @@ class DeviceLattice(NumpyLattice):
 
     @property
     def identity(self) -> str:
-        """See `phigen.runtime.lattice.LatticeBackend`."""
         return hashlib.sha256(f"{self._header}\n{self.device.name}\n{super().identity}".encode()).hexdigest()[:40]
 
     @cached_property

@@ -38,7 +38,6 @@ class MonitoredSession(DeviceLatticeSession):
         return float(self._numbers_of(f"part{part + 1}", ["sum"])[0])
 
     def place(self, x: Floats) -> None:
-        """See `phigen.runtime.numpy_lattice.NumpyLatticeSession.place`."""
         if not np.isfinite(x).all():
             raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())
         previous, self._x = self._x, x
@@ -49,7 +48,6 @@ class MonitoredSession(DeviceLatticeSession):
             raise
 
     def advance(self, h: float, steps: int) -> None:
-        """See `DeviceLatticeSession.advance`."""
         self.prepare(h)
         for _ in range(steps):
             with resumable(self.steps), np.errstate(all="ignore"):

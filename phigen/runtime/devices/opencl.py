@@ -21,7 +21,7 @@ _MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEM
 
 
 class OpenCLDevice:
-    """A device of OpenCL, with a queue."""
+    """A device of OpenCL, with a queue: a `phigen.runtime.devices.device.Device`."""
 
     target = "opencl"
 
@@ -39,7 +39,6 @@ class OpenCLDevice:
         return f"<OpenCL device: {self.name}, {self.memory >> 20} MiB>"
 
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
-        """See `phigen.runtime.devices.device.Device`."""
         options = [*_OPTIONS, *(f"-D{name}={value}" for name, value in defined.items())]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # logs of successful compilations
@@ -49,11 +48,9 @@ class OpenCLDevice:
                 raise DeviceError(f"{self.name}: the driver refuses the generated code\n{error}") from error
 
     def kernel(self, program: Any, name: str) -> Any:
-        """See `phigen.runtime.devices.device.Device`."""
         return self._cl.Kernel(program, name)
 
     def empty(self, size: int) -> Any:
-        """See `phigen.runtime.devices.device.Device`."""
         return self._checked_call(lambda: self._cl.Buffer(self._context, self._cl.mem_flags.READ_WRITE, max(1, size)))
 
     def local_bytes(self, kernel: Any) -> int:
@@ -67,17 +64,14 @@ class OpenCLDevice:
         return buffer
 
     def write(self, buffer: Any, array: Any) -> None:
-        """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:
             self._checked_call(lambda: self._cl.enqueue_copy(self._queue, buffer, array))
 
     def read(self, buffer: Any, array: Any) -> None:
-        """See `phigen.runtime.devices.device.Device`."""
         if array.nbytes:
             self._checked_call(lambda: self._cl.enqueue_copy(self._queue, array, buffer))
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
-        """See `phigen.runtime.devices.device.Device`."""
         size = kernel.get_work_group_info(self._cl.kernel_work_group_info.COMPILE_WORK_GROUP_SIZE, self._device)[0]
         self._checked_call(lambda: kernel(self._queue, (-(-items // size) * size,), (size,), *arguments))
 

@@ -2,8 +2,8 @@
 
 The files of ``templates/c/runtime`` are valid C99, with the prefix ``phi_`` and with switches and sizes
 (``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. This module resolves, as a preprocessor would, ``#include "…"`` of
-these files, ``#if`` on switches, include guards, and phrases (`phigen.targets.c.phrases`), and removes static functions
-that nothing calls (`phigen.targets.c.unused`). Other directives remain.
+these files, ``#if`` on switches, include guards, and phrases (`phigen.targets.c.phrases`). It removes static functions
+that nothing calls (`phigen.targets.c.unused`). All other directives remain.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ _PREFIX = re.compile(r"\b(?:phi|PHI)_")
 
 @dataclass
 class Amalgam:
-    """Assembly of one solver: ``switches`` and ``printed`` files by name, all in the type ``real``.
+    """Assembler of the text of one solver: ``switches``, and ``printed`` files by name; all numbers have the type
+    ``real``.
 
-    ``headers`` collects those of the library.
+    ``headers`` collects the headers of the C library.
     """
 
     name: str
@@ -49,7 +50,7 @@ class Amalgam:
 
     @property
     def left_out(self) -> dict[str, str]:
-        """Files of the runtime that the solver does not include → their include guards."""
+        """The files of the runtime that the solver does not include, each with its include guard."""
         return left_out(self.switches)
 
     def text(self, file: str, spelt: Callable[[Sequence[str]], Sequence[str]] = lambda lines: lines) -> str:
@@ -60,7 +61,7 @@ class Amalgam:
         return _spaced(spelt(without_unused(self._expanded(file), f"{self.name}_")))
 
     def texts(self, header: str, code: str) -> tuple[str, str]:
-        """Return the texts of a header and a source that includes it, as `text` does."""
+        """Return the texts of a header and of a source that includes it, as `text` does."""
         lines = [*self._expanded(header), _BEHIND, *self._expanded(code)]
         used = without_unused(lines, f"{self.name}_")
         border = used.index(_BEHIND)
@@ -88,8 +89,8 @@ class Amalgam:
     def _selected(self, text: str) -> list[str]:
         """Return the lines of a text that the switches select."""
         chosen: list[str] = []
-        frames: list[list[bool]] = []  # of open #ifs: this branch is on, one was on, on a switch
-        selected = True  # whether all branches that are open are on
+        frames: list[list[bool]] = []  # for each open #if: this branch is on, one was on, it is a switch
+        selected = True  # whether all open branches are on
         for line in text.splitlines():
             if not line.startswith("#"):
                 chosen += [line] * selected
@@ -123,7 +124,10 @@ class Amalgam:
         return holds(condition.replace("PHI_", ""), self.switches)
 
     def _printed(self, lines: Sequence[str]) -> list[str]:
-        """Return lines that were printed for the solver, in its type, with macros expanded; names of the model stay."""
+        """Return lines that were printed for the solver, in its number type and with macros expanded.
+
+        Names of the model are unchanged.
+        """
         named = lines_with("\n".join(lines), _PHRASES)
         spelt_lines: list[str] = []
         for k, line in enumerate(lines):
@@ -131,7 +135,7 @@ class Amalgam:
         return spelt_lines
 
     def _typed(self, lines: Sequence[str]) -> list[str]:
-        """Return lines that compute in double in the type of the solver."""
+        """Return lines that compute in double, rewritten for the number type of the solver."""
         return self.real.spelt("\n".join(lines)).split("\n") if lines else []
 
     def _prefixed(self, line: str) -> str:
@@ -144,12 +148,12 @@ class Amalgam:
         return self._typed(self._prefixed("\n".join(expanded)).split("\n") if expanded else [])
 
 
-#: Line between header and source while both are processed as one text.
+#: Separator of header and source while both are processed as one text.
 _BEHIND = "/* */"
 
 
 def _spaced(lines: Sequence[str]) -> str:
-    """Return the text of lines, with single blank lines only, and none after the title of a chapter."""
+    """Return the text of lines, with at most one blank line in succession, and none after the title of a chapter."""
     spaced: list[str] = []
     for line in lines:
         if line or (spaced and spaced[-1] and not spaced[-1].endswith(" ---- */")):

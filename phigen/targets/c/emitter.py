@@ -1,7 +1,7 @@
 """A program as C source: `NAME.h` and `NAME.c`.
 
-The parts that depend on the model are printed: sizes, constants, kernels (`printed`). All else is the runtime: C in
-``templates/c/runtime``, assembled by `amalgamation` for the `features` of the program.
+The parts that depend on the model are printed: sizes, constants, kernels (`printed`). The remaining code is the
+runtime: C in ``templates/c/runtime``, assembled by `amalgamation` for the `features` of the program.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Iterations over a block that cost, per step, as much as one evaluation at one point: for vectorised loops, for loops
-#: that call library functions, and for paths, whose derivatives a single evaluation does not need.
+#: Number of iterations over a block that cost, per step, as much as one evaluation at a single point: for vectorised
+#: loops; and for loops that call library functions, and paths, whose derivatives a single evaluation does not need.
 PASSES, PASSES_OF_CALLS = 2, 1
 
-#: Iterations of a stage of an implicit step: with the predictor and, if they fail, without it.
+#: Number of attempts at a stage of an implicit step: with the predictor, and without it if the first one fails.
 ATTEMPTS = 2
 
 #: Number of lines above which a file gets a table of contents.
@@ -46,7 +46,8 @@ FEW_SCREENS = 240
 
 
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
-    """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
+    """Return file names and their contents. With ``single_file`` only `NAME.c` is returned, which then needs no
+    header."""
     name, lines = program.name, header_lines(program, command)
     amalgam, header, code = runtime_of(program)
     declarations, definitions = amalgam.texts(header, code)
@@ -65,9 +66,9 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
 
 
 def unrestricted(program: Program, code: str) -> str:
-    """Return code that compilers without ``restrict`` accept too.
+    """Return code that compilers without ``restrict`` also accept.
 
-    ``restrict`` makes only loops over lanes and sites faster. It is removed from other code.
+    ``restrict`` is removed except in loops over lanes and sites, the only loops that it makes faster.
     """
     if program.profile != "fast" and not program.step.kind.sites and "_EACH_LANE" not in code:
         return without_word(code, "restrict")
@@ -75,7 +76,7 @@ def unrestricted(program: Program, code: str) -> str:
 
 
 def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
-    """Return the assembly of a solver, and the files of the runtime from which header and source start."""
+    """Return the assembler of a solver, and the files of the runtime from which header and source start."""
     lanes = in_lanes(program)
     has = switches(program, lanes)
     constants, real = policies(program, staged=has["STAGED"]), real_of(program)
@@ -101,9 +102,9 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
 
 
 def policies(program: Program, *, staged: bool = False) -> dict[str, str]:
-    """Return the headers with the constants of policies; sizes of arrays are declared with the solver.
+    """Return the headers with the constants of policies. Sizes of arrays are declared with the solver instead.
 
-    ``staged`` are Gauss methods with their stages in lanes.
+    ``staged`` is true for Gauss methods with their stages in lanes.
     """
     sizes = ("DIFFERENCES", "DIRECTIONS")
     policy_by_name = policies_of(program) | {"gauss_policy": gauss_policy(single=program.single, staged=staged)}
@@ -114,7 +115,7 @@ def policies(program: Program, *, staged: bool = False) -> dict[str, str]:
 
 
 def _declared_lines(program: Program) -> list[str]:
-    """The header comment of the declarations; the code has the other facts."""
+    """Return the lines of the comment at the head of the declarations; all other facts are in the source."""
     name = program.name
     return [
         f"The declarations of {name}.c. DO NOT EDIT: phigen detects changes by the checksum below.",
@@ -137,7 +138,7 @@ def _is_chapter(line: str) -> bool:
 
 
 def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, str]:
-    """Return the printed parts of the model by the names under which the runtime includes them."""
+    """Return the printed parts of the model, by the names under which the runtime includes them."""
     step = program.step
     texts = text_of(program).texts(program, step, lanes, has)
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
@@ -148,7 +149,7 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
 
 
 def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
-    """Return the values of the template of declarations."""
+    """Return the values for the template of declarations."""
     member, step = members(program), program.step
     public: Sizes = [
         ("DIM", program.dimension, f"coordinates: {', '.join(program.coordinates)}"),
@@ -207,7 +208,8 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
 
 
 def _stack(bound: StackBound, name: str) -> Sizes:
-    """Return the bytes of stack of chains of calls, with comments on their first functions."""
+    """Return the bytes of stack of the longest chains of calls as constants, with comments that name the first
+    functions."""
     return [
         ("STACK_OF_INIT", bound.init, f"from {name}_init on"),
         ("STACK_OF_STEP", bound.step, f"from {name}_step on"),
@@ -215,12 +217,12 @@ def _stack(bound: StackBound, name: str) -> Sizes:
     ]
 
 
-#: Kernels that are functions of the API: each with its name there, and whether it returns its only value.
+#: Kernels that are public functions, each with its name in the API and whether it returns its only value.
 Exported = list[tuple[Kernel, str, bool]]
 
 
 def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
-    """Yield the exported functions of a state, in groups with the comment of the header."""
+    """Yield the public functions of a state, in groups, each with its comment for the header."""
     seen, noise, monitor, modified = program.observables, program.noise, program.monitor, program.modified
     at = " at the time t" if program.time else ""
     yield (
@@ -247,7 +249,7 @@ def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
 
 
 def _renewing(program: Program) -> str:
-    """Return the arguments of `refresh` in words: the time, the noise, or both."""
+    """Return the inputs of `refresh` in words: the time, the noise, or both."""
     arguments = {"the time": program.time, "the noise": program.noise}
     return " and ".join(name for name, present in arguments.items() if present)
 
@@ -281,7 +283,8 @@ def _defaults(program: Program) -> str:
 
 
 def _member_comment(parameter: Parameter, member: str) -> str:
-    """Return the comment on a member of the struct, with the name in the spec if the member has another one."""
+    """Return the comment on a member of the parameter struct; it contains the name in the spec if the member has
+    another name."""
     comment = plain(parameter.description) or f"default {float(parameter.value)!r}"
     comment += f" [{plain(parameter.unit)}]" * bool(parameter.unit)
     return comment if member == parameter.name else f"{parameter.name}: {comment}"
@@ -316,14 +319,14 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
 
 
 def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
-    """Return the number of SIMD packs of members in one reverse pass, 0 if members are treated one by one."""
+    """Return the number of SIMD batches of members in one reverse pass; 0 if members are treated one by one."""
     if not has["BATCHED"]:
         return 0
     return lanes.reverse_packs if isinstance(lanes, Packs) else 1
 
 
 def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
-    """Return the constants and the functions of the model; ``others`` are further texts printed for it."""
+    """Return the constants and the functions of the model; ``others`` are further printed texts."""
     step = program.step
     body = functions.called(program, device=has["DEVICE"])
     kernels_of_step = text_of(program).kernels(step, has)

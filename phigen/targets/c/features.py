@@ -1,4 +1,4 @@
-"""Features that only solvers in C have: for speed, gradients, and single precision."""
+"""Features that only solvers in C have, for speed, gradients and single precision."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from phigen.targets.features import Feature
 
 FEATURES = (
     Feature("PREDICTED", lambda p: p.step.kind.predicted and not p.noise),
-    Feature("DEVICE", lambda p: False),  # of `phigen.targets.device`
-    Feature("COMMON", lambda p: False),  # of `phigen.targets.device` too
+    Feature("DEVICE", lambda p: False),  # set by `phigen.targets.device` only
+    Feature("COMMON", lambda p: False),  # set by `phigen.targets.device` only
     Feature("SINGLE", lambda p: p.single),
     Feature("PARAMETERS", lambda p: p.parameters),
     Feature("CHANGED_PARAMETERS", requires=("PARAMETERS",), part="parameters"),
@@ -41,7 +41,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     stages = lanes if isinstance(lanes, Stages) else None
     yield Feature("BLOCKS", lambda p: blocks, ("RECURRENCES",), "lanes")
     yield Feature("TRACED", lambda p: (blocks or traces) and p.step.kind.implicit, ("ADJOINT",))
-    blocked = blocks or traces  # the reverse pass is vectorised over stages, and rarely scalar
+    blocked = blocks or traces  # the reverse pass is vectorised over stages; the scalar one is rarely used
     yield Feature("UNROLLED_TRANSPOSE", lambda p: p.step.eliminate_transposed and not blocked, ("UNROLLED", "ADJOINT"))
     yield Feature("STAGED", lambda p: stages, part="lanes")
     yield Feature("REDUCED", lambda p: p.step.reduced, ("STAGED",))
@@ -55,7 +55,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("BATCHED", lambda p: packs.transposes if packs else True, (together, "ADJOINT", "EACH"))
     yield Feature("RECOMPUTED", lambda p: packs and packs.recomputed, ("BATCHED",))
     yield Feature("SPARSE", lambda p: blocks and blocks.factors, ("BLOCKS",))
-    full = blocks and blocks.factors is None  # whether Newton matrices are inverted rather than factorised
+    full = blocks and blocks.factors is None  # whether Newton matrices are inverted instead of factorised
     yield Feature("SWEPT", lambda p: full, ("BLOCKS", "COMPOSED"))
     yield Feature("CENTRED", lambda p: p.step.centred, ("SWEPT",))
     yield Feature("INVERSE_UNROLLED", lambda p: p.step.invert, ("BLOCKS",))

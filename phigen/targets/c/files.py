@@ -1,7 +1,7 @@
-"""The files of the runtime in C that only some solvers have, each with the condition for it.
+"""The files of the C runtime that only some solvers have, each with its condition.
 
-Other files include these without a condition: if a file is left out, its include guard counts as defined. Other
-files call the functions of `CALLS` without a condition too: if a function is left out, so are the statements that
+Other files include these files without a condition: if a file is left out, its include guard counts as defined. Other
+files also call the functions in `CALLS` without a condition. If such a function is left out, so are the statements that
 call it, with an `if` or `for` before them on the line.
 """
 
@@ -14,7 +14,7 @@ from phigen.targets.features import holds
 
 _KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
-#: Conditions on switches (`phigen.targets.c.features`) by files.
+#: Conditions on switches (`phigen.targets.c.features`), by file.
 CONDITIONS = {
     **{f"{kind}.c": kind.upper() for kind in _KINDS},
     **{f"tangent_{kind}.c": f"TANGENT && {kind.upper()}" for kind in _KINDS},
@@ -223,7 +223,7 @@ CONDITIONS = {
     "tangent_product.c": "TANGENT",
 }
 
-#: Hooks: functions that others call in statements of their own, each with the condition for the statement.
+#: Hooks: functions that are called as statements of their own, each with the condition under which the call is kept.
 CALLS = {
     "phi_add_aside": "RATE_OF_GAUGE",
     "phi_add_by_parameters": "PARAMETERS || MONITOR",
@@ -283,17 +283,17 @@ CALLS = {
 
 
 def guard(file: str) -> str:
-    """The include guard of a file of the runtime."""
+    """Return the include guard of a file of the runtime."""
     return f"PHI_FILE_{file.removesuffix('.c').replace('.', '_').upper()}"
 
 
 def left_out(switches: Mapping[str, bool]) -> dict[str, str]:
-    """The files that a solver lacks, with their include guards."""
+    """Return the files that a solver does not have, with their include guards."""
     return {file: guard(file) for file in _lacking(CONDITIONS, switches)}
 
 
 def calls_left_out(switches: Mapping[str, bool]) -> list[str]:
-    """The functions that the statements of a solver do not call."""
+    """Return the hooks whose calls are removed from a solver."""
     return _lacking(CALLS, switches)
 
 

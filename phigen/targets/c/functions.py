@@ -1,4 +1,4 @@
-"""Elementary functions defined by generated C: polynomials for small arguments, else formulas with libm."""
+"""Elementary functions that generated C defines: polynomials for small arguments, otherwise formulas with libm."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ from phigen.targets.c.real import rendered
 from phigen.targets.polynomials import estrin
 from phigen.targets.special import entire_used
 
-#: The functions of the library that have a small-argument version here, under whose name flows call them.
+#: The functions of the C library that have a small-argument version in generated code; flows call that version.
 FLOW_FUNCTIONS = tuple(
     f for f in SMALL_ARGUMENT_FUNCTIONS if f not in (*ENTIRE, ANOMALY, *ELLIPTIC, *REMAINDERS, *QUOTIENTS)
 )
 
 
-#: Terms of series that are smaller than this, relative to the first, are omitted in single precision: a quarter of a
-#: rounding.
+#: Relative size of terms of series, compared with the first term, below which they are omitted in single precision: a
+#: quarter of a rounding.
 _SINGLE_NEGLIGIBLE = 2.0**-26
 
 C = TypeVar("C", float, Fraction)
@@ -50,11 +50,11 @@ C = TypeVar("C", float, Fraction)
 
 @dataclass(frozen=True)
 class Small:
-    """A function by its series for small arguments t: ±1/first!, ±1/(first + step)!, … with alternating signs.
+    """A function with a series for small arguments t: ±1/first!, ±1/(first + step)!, … with alternating signs.
 
-    The variable z is t², or t if ``step`` is 1. ``far`` is the full-range formula. ``flows`` have a radius, a number
-    of terms, and the value as a function of the sum P; ``rows``, for loops over sites, has the same with the fewest
-    operations.
+    The variable z is t², or t if ``step`` is 1. ``far`` is the full-range formula. ``flows`` is the small-argument
+    version in flows: a radius, a number of terms, and the value as a function of the sum P. ``rows`` is the version for
+    loops over sites, with the fewest operations.
     """
 
     meaning: str
@@ -66,13 +66,13 @@ class Small:
     rows: tuple[Fraction, int, str]
 
     def terms(self, count: int) -> list[Fraction]:
-        """Coefficients of the series, exactly."""
+        """Return the first ``count`` coefficients of the series, exactly."""
         return [Fraction(self.signs[k % 2], math.factorial(self.first + k * self.step)) for k in range(count)]
 
 
 _QUARTER, _HALF, _TWICE = Fraction(1, 4), Fraction(1, 2), "2.0 * sin(0.5 * t) * sin(0.5 * t)"
 
-#: The functions of `FLOW_FUNCTIONS`.
+#: The functions of `FLOW_FUNCTIONS` by name.
 _SMALL = {
     "expm1": Small(
         "exp(t) - 1", "expm1(t)", 2, 1, (1, 1), (0.35, 12, "t + t * t * ({P})"), (_QUARTER, 9, "z + z * z * {P}")
@@ -83,13 +83,16 @@ _SMALL = {
 
 
 def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool = False) -> list[str]:
-    """The special functions that kernels call, except the ``unprinted`` ones: φ and its derivatives, `ENTIRE`, and
-    for a splitting those that its flows call. For a ``device``, φ calls no tangent."""
-    # loops over sites have versions of their own
+    """Return the special functions that kernels call, except the ``unprinted`` kernels.
+
+    They are φ and its derivatives, the functions of `ENTIRE`, and for a splitting those that its flows call. On a
+    ``device`` φ calls no tangent.
+    """
+    # loops over sites have separate versions
     used = {e.op for e in topological([e for kernel in program.step.flow_kernels for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     names = special.used(program, unprinted)
-    if device and names and SPECIAL[0] not in names:  # which the others call
+    if device and names and SPECIAL[0] not in names:  # the other functions call it
         names = [SPECIAL[0], *names]
     phis = [rendered(program, "phi_device.c" if device else "phi.c", _phi(program, f, device=device)) for f in names]
     polynomial = [rendered(program, "polynomial.c", {})] if phis else []
@@ -101,7 +104,7 @@ def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool =
 
 
 def _exponentials(program: Program) -> list[str]:
-    """The matrix exponential for the largest matrix in ``prepare``, if there is one."""
+    """Return the matrix exponential for the largest matrix in ``prepare``, or nothing if there is none."""
     rows, adjoint = special.largest_exponential(program), special.transposes_exponentials(program)
     if not rows:
         return []
@@ -110,7 +113,7 @@ def _exponentials(program: Program) -> list[str]:
 
 
 def near(program: Program, names: Iterable[str]) -> list[str]:
-    """Versions of these functions for loops over lanes, for small arguments only."""
+    """Return the versions of these functions for loops over lanes, for small arguments only."""
     listed = list(names)
     others = [f for f in listed if f not in (*ELLIPTIC, *REMAINDERS, *QUOTIENTS)]
     texts = [
@@ -178,13 +181,13 @@ def _row_values(program: Program, f: str) -> dict[str, object]:
 
 
 def _nested(coefficients: Sequence[float]) -> str:
-    """Σ c_k z^k by Horner's rule."""
+    """Return Σ c_k z^k as text, by Horner's rule."""
     *others, last = map(repr, coefficients)
     return "".join(f"({c} + z * " for c in others) + last + ")" * len(others)
 
 
 def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
-    """Return φ and its derivatives for loops over lanes, as far as ``ops`` contain them."""
+    """Return φ and those of its derivatives that occur in ``ops``, for loops over lanes."""
     texts = []
     for f in (f for f in SPECIAL if f in ops):
         first, *rest = map(repr, lane_coefficients(order_of(f)))
@@ -213,7 +216,7 @@ def _phi(program: Program, f: str, *, device: bool) -> Mapping[str, object]:
 
 
 def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]:
-    """The first coefficients of a series, enough for the precision at arguments up to ``reach``."""
+    """Return the coefficients of a series that are needed for full precision at arguments up to ``reach``."""
     if not program.single:
         return list(coefficients)
     least = _SINGLE_NEGLIGIBLE * abs(float(coefficients[0]))
@@ -222,7 +225,7 @@ def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]
 
 
 def _table(name: str, numbers: Sequence[float]) -> list[str]:
-    """Return the declaration of a table, in lines."""
+    """Return the lines of the declaration of a table."""
     text = f"static const double {name}[{len(numbers)}] = {{ {', '.join(map(repr, numbers))} }};"
     first, *rest = textwrap.wrap(text, WIDTH - 4, subsequent_indent="    ", break_on_hyphens=False)
     return [first.replace("static const", "PHI_LOCAL_TABLE", 1), *rest]

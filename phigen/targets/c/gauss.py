@@ -13,18 +13,18 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss
 from phigen.targets.c.real import rendered
 
-#: In single precision, thresholds are powers of those of double precision. This one becomes 1e-9, the same fraction of
-#: a rounding error as 2e-18 in double precision. With the other rule, 1e5 steps of Hénon–Heiles have an energy error of
-#: 2e-5 instead of 5e-7.
+#: In single precision, thresholds are powers of those of double precision. This exception becomes 1e-9, the same
+#: fraction of a rounding error as 2e-18 in double precision. With the general rule, 1e5 steps of Hénon–Heiles have an
+#: energy error of 2e-5 instead of 5e-7.
 SINGLE_SOLVED = 1.3e-20
 
-#: The same where the stages are in a loop. With 2e-18 the energy of Hénon and Heiles' system drifts by 1.7e-18 of its
-#: size in each of 3e5 steps of 0.7 at order 12; with this, by less than 2e-19. Steps take 5 % longer.
+#: The threshold for stages in a loop. With 2e-18 the energy of the Hénon–Heiles system drifts by 1.7e-18 of its size in
+#: each of 3e5 steps of 0.7 at order 12; with this threshold, by less than 2e-19. Steps take 5 % longer.
 LOOP_SOLVED = 5e-19
 
 
 def policy(*, single: bool, staged: bool) -> GaussPolicy:
-    """Return the thresholds of a method; ``staged`` if its stages are in lanes."""
+    """Return the thresholds of a Gauss method; ``staged`` says that its stages are in lanes."""
     usual = POLICIES["gauss_policy"]
     assert isinstance(usual, GaussPolicy)
     if single:
@@ -33,12 +33,12 @@ def policy(*, single: bool, staged: bool) -> GaussPolicy:
 
 
 def _width(step: Gauss, lanes: Lanes | None) -> int:
-    """Number of entries of an array over the stages: the lanes, or the number of stages."""
+    """Return the number of entries of an array over the stages: that of the lanes, or that of the stages."""
     return lanes.lanes if isinstance(lanes, Stages) else step.tableau.stages
 
 
 def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
-    """The sizes in the struct of the solver."""
+    """Return the sizes that are declared with the struct of the solver: name, value and comment."""
     width = _width(step, lanes)
     return [
         ("NODES", step.tableau.stages, "stages of a step"),
@@ -49,7 +49,7 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
 
 
 def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
-    """Sizes of a Gauss step beside the number of stages: name, value and comment."""
+    """Return the sizes of a Gauss step other than the number of stages: name, value and comment."""
     return [
         ("PLAIN", step.plain, "unknowns that are offsets of coordinates; others are those of group elements"),
         (
@@ -62,7 +62,8 @@ def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
 
 
 def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
-    """The kernels that are evaluated at one stage; with ``staged`` most kernels are evaluated at all stages at once."""
+    """Return the kernels that are evaluated at one stage. If ``staged``, most kernels are evaluated at all stages
+    together."""
     at_stages = [] if staged else [step.slope, step.frame]
     at_stages += [step.reduced.follow] if staged and step.reduced else []
     varied = [step.tangent.slope, step.tangent.change] if step.tangent else []
@@ -72,18 +73,19 @@ def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
 
 
 def trail(program: Program, step: Gauss, lanes: Lanes | None) -> int:
-    """Numbers on the tape for one step: its start and its stage increments."""
+    """Return the number of values on the tape for one step: those of its start and its stage increments."""
     return program.dimension + step.unknowns * _width(step, lanes)
 
 
 def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool) -> str:
-    """The coefficients, and the functions that compute unknowns from stage increments; ``batched`` adds the one for
-    members in lanes.
+    """Return the coefficients, and the functions that compute unknowns from stage increments.
+
+    ``batched`` adds the function for members in lanes.
     """
     table, width = step.tableau, _width(step, lanes)
     precision = SINGLE if program.single else DOUBLE
     if program.single:
-        table = tableau(table.stages, SINGLE)  # rounded to float, their sums would differ from 1
+        table = tableau(table.stages, SINGLE)  # rounded to float, the sums of coefficients would differ from 1
     staged = isinstance(lanes, Stages)
     predictions = predictors(table.stages, precision, integrated=staged and bool(step.reduced))
     if not staged:
@@ -111,7 +113,7 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
 
 
 def _reduced(step: Gauss, table: Tableau, width: int) -> dict[str, object]:
-    """Return the values of the template for reduced sweeps."""
+    """Return the values for the template of reduced sweeps."""
     reduced = step.reduced
     assert reduced is not None
     return {
@@ -137,7 +139,7 @@ def _in_chains(terms: Sequence[str]) -> str:
 
 
 def _halved(terms: Sequence[str]) -> str:
-    """Return a sum as that of the sums of two halves, and so on: few additions wait for one another."""
+    """Return a sum as the sum of two halves, which are divided likewise: the chain of dependent additions is short."""
     if len(terms) == 1:
         return terms[0]
     half = (len(terms) + 1) // 2

@@ -1,4 +1,4 @@
-"""Print kernels as C functions."""
+"""Kernels as C functions."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from phigen.targets.c.loops import statements
 from phigen.targets.c.real import real_of
 from phigen.targets.header import plain, sentence
 
-#: Most assignments in one function; compile time is quadratic in the length.
+#: Largest number of assignments in one function; compile time grows quadratically with it.
 LONGEST_FUNCTION = 200
 
-#: Longest line that several temporaries share.
+#: Largest length of a line with the declarations of several temporaries.
 SHARED_LINE = 105
 
 
@@ -32,10 +32,11 @@ SHARED_LINE = 105
 class Form:
     """Form in which a kernel is printed as a C function called ``name``.
 
-    An ``exported`` function takes NULL for the default parameters. ``returning`` returns the only output. ``lanes``
-    evaluates at all SIMD lanes, ``single`` at one of them. All lanes share the arrays in ``shared``; those in ``alike``
-    have one value for all lanes if the argument ``own`` is 0. ``workspace`` is the size of the workspace of a function
-    that is cut into parts. ``linkage`` is that of a static function.
+    An ``exported`` function accepts NULL for the default parameters. ``returning`` means that the only output is the
+    return value. ``lanes`` evaluates the kernel at all SIMD lanes, ``single`` at one of them. The arrays in ``shared``
+    have one value for all lanes. Those in ``alike`` have one value for all lanes if the argument ``own`` is 0.
+    ``workspace`` is the size of the workspace of a function that is cut into parts. ``linkage`` is that of a static
+    function.
     """
 
     name: str
@@ -49,7 +50,7 @@ class Form:
     linkage: str = "static"
 
     def number(self, program: Program, array: str) -> str:
-        """The type of an entry of an array."""
+        """Return the C type of an entry of an array."""
         return f"{program.name}_lanes" if self.lanes and array not in self.shared else real_of(program).name
 
 
@@ -68,13 +69,13 @@ def function(
     versions: Mapping[str, str] | None = None,
     linkage: str = "static",
 ) -> str:
-    """The C source of a kernel: one function, or a chain of static ones that share a workspace.
+    """Return the C source of a kernel: one function, or a chain of static functions that share a workspace.
 
     With ``lanes`` the kernel is evaluated at several points: each value becomes an array over the lanes, except the
-    inputs that are ``shared``. For those ``alike`` all lanes read the first lane if the argument ``own`` is 0; such
-    a kernel is inlined where ``own`` is known. A ``single`` kernel is evaluated at one lane, the argument ``lane``,
-    and its outputs are numbers. A ``sparse`` one does not store entries that are always zero. It calls these
-    ``versions`` of functions, see `phigen.ir.passes.forms`.
+    inputs that are ``shared``. For inputs that are ``alike``, all lanes read the first lane if the argument ``own`` is
+    0; such a kernel is inlined where ``own`` is known. A ``single`` kernel is evaluated at one lane, the argument
+    ``lane``, and its outputs are numbers. A ``sparse`` kernel does not store entries that are always zero. ``versions``
+    of functions are called, as in `phigen.ir.passes.forms`.
     """
     if kernel.exponents:
         return _through_exponentials(program, kernel)
@@ -98,7 +99,8 @@ def function(
     if not whole:
         built = after_passes(whole=False)
         pieces = cut(built, LONGEST_FUNCTION)
-    said = [] if exported else _comment(f"{called}." if lanes else sentence(kernel.purpose))  # the header says it
+    # the comment of an exported function is in the header
+    said = [] if exported else _comment(f"{called}." if lanes else sentence(kernel.purpose))
     head = [*said, _signature(program, kernel, form) + "\n{"]
     if whole:
         return "\n".join([*head, *_body(program, kernel, form, built), *_exponentials(program, kernel), "}"]) + "\n"
@@ -128,13 +130,16 @@ def function(
 
 
 def _exponentials(program: Program, kernel: Kernel) -> list[str]:
-    """The statements that replace matrices by their exponentials minus 1."""
+    """Return the statements that replace matrices by their exponentials minus 1."""
     array = kernel.outputs[0].name
     return [f"    {program.name}_matrix_exponential({n}, {array} + {start});" for start, n in kernel.exponentials]
 
 
 def _through_exponentials(program: Program, kernel: Kernel) -> str:
-    """The transpose of a kernel with exponentials: the matrices, their cotangents, and the kernel of these."""
+    """Return the transpose of a kernel with exponentials.
+
+    It consists of functions for the matrices, for their cotangents, and for the kernel itself.
+    """
     assert kernel.exponents is not None
     inner = kernel.exponents
     outer = replace(kernel, name=f"{kernel.name}_of_exponents", exponentials=(), exponents=None)
@@ -160,7 +165,7 @@ def declaration(program: Program, kernel: Kernel, *, name: str = "", returning: 
 
 
 def _signature(program: Program, kernel: Kernel, form: Form) -> str:
-    # C99 has no conversion from double (*)[8] to const double (*)[8]: the inputs of lanes are not const.
+    # The inputs of lanes are not const, because C99 has no conversion from double (*)[8] to const double (*)[8].
     real = real_of(program).name
     inputs, alone = (f"{program.name}_lanes", "restrict ") if form.lanes else (f"const {real}", "")
     kinds = {i: (f"const {real}", "") if i in form.shared else (inputs, alone) for i in kernel.inputs}
@@ -172,7 +177,7 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
         else f"{kinds[i][0]} {i}[{kinds[i][1]}{max(1, len(symbols))}]"
         for i, symbols in kernel.inputs.items()
     ]
-    # restrict: the outputs never overlap the inputs of our own calls; callers of the API get no such duty.
+    # Internal calls never pass overlapping inputs and outputs, so restrict is correct there; callers of the API may.
     qualifier = "" if form.exported else "restrict "
     arguments += ["int lane"] if form.single else []
     arguments += ["int distinct_coef"] if form.alike else []
@@ -188,7 +193,7 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
 
 
 def _body(program: Program, kernel: Kernel, form: Form, built: ir.Function) -> list[str]:
-    """Return the lines of a function, which marks the arguments that it does not read."""
+    """Return the lines of a function; arguments that it does not read are marked as unused."""
     parameters = [*kernel.inputs, *(() if form.returning else (o.name for o in kernel.outputs))]
     parameters += [*["work"] * bool(form.workspace), *["distinct_coef"] * bool(form.alike), *["lane"] * form.single]
     if form.returning:

@@ -1,4 +1,7 @@
-"""SIMD lowering in C: blocks of steps, and batches of members (groups of implicit steps, packs of explicit ones)."""
+"""SIMD lowering in C: blocks of steps, and batches of members.
+
+Batches of implicit steps are called groups in the runtime, batches of explicit steps packs.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +17,20 @@ from phigen.scheme.steps import Splitting
 from phigen.targets.c import functions, splitting
 from phigen.targets.c.kernels import function
 
-#: Past values in the fitted recurrence, a multiple of 8; values that it is fitted to; and the least number of the
-#: latter, which large systems have, whose solvers would otherwise take too much memory.
+#: WINDOW is the number of past values in the fitted recurrence, a multiple of 8. FITTED is the number of values that it
+#: is fitted to, and SMALLEST the least such number, which is for large systems, whose solvers would otherwise need too
+#: much memory.
 WINDOW, FITTED, SMALLEST = 40, 112, 32
 
-#: Limit of all values in the history of a solver, 64 kB in double precision.
+#: Largest number of values in the history of a solver: 64 kB in double precision.
 MOST_HISTORY = 8_000
 
-#: Past values that a recurrence is tested on, and not fitted to.
+#: Number of past values that a recurrence is not fitted to but tested with.
 CHECKS = 8
 
 
 def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
-    """Return the sizes of the recurrences of a solver, as constants by name: values stored, used, predicted, tested."""
+    """Return the sizes of the recurrences of a solver as constants by name: values stored, used, predicted, tested."""
     affordable = MOST_HISTORY // (2 * program.dimension * len(program.fractions))
     values = max(SMALLEST, min(FITTED, affordable))
     window = 8 * (values * WINDOW // FITTED // 8)
@@ -36,16 +40,16 @@ def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
     return {"REMEMBERED": rows + checks + window + ahead - 1, "WINDOW": window, "AHEAD": ahead, "CHECKS": checks}
 
 
-#: Number of steps at whose starts slopes are known, from which the increment of a stage is predicted: the next step,
-#: the present one, and earlier ones.
+#: Number of steps whose initial slopes are known, from which the increment of a stage is predicted: the next step, the
+#: present one, and earlier ones.
 KNOTS = 4
 
 
 def travels(fractions: Sequence[float]) -> list[list[float]]:
-    """Return for each stage the weights of slopes at the times 2 − `KNOTS` … 1 whose sum is its increment.
+    """Return, for each stage, the weights of slopes at the times 2 − `KNOTS` … 1 whose weighted sum is its increment.
 
-    Times and increments are in units of the step. The sum is the integral of the polynomial through the slopes, by
-    Gauss' rule of three points, which is exact.
+    Times and increments are in units of the step. The weighted sum is the integral of the polynomial through the
+    slopes; it is computed by Gauss' rule of three points, which is exact.
     """
     knots = range(2 - KNOTS, 2)
     weights = []
@@ -57,7 +61,7 @@ def travels(fractions: Sequence[float]) -> list[list[float]]:
 
 
 def grouped(program: Program, lanes: Lanes | None) -> bool:
-    """Whether ensembles are integrated in SIMD batches, whose histories lie on the stack."""
+    """Whether ensembles are integrated in SIMD batches, whose histories are on the stack."""
     memory = remembered(program, lanes)
     values = len(program.fractions) * (memory["REMEMBERED"] + memory["WINDOW"]) * program.dimension
     return isinstance(lanes, Blocks) and lanes.grouped(values)
@@ -68,7 +72,7 @@ def printed(
 ) -> list[str]:
     """Return the text of the kernels in SIMD lanes.
 
-    ``packed`` prints the kernels of members with explicit steps. ``batched`` adds the kernels of batches of Gauss
+    ``packed`` prints the kernels of batches with explicit steps. ``batched`` adds the kernels of batches of Gauss
     steps.
     """
     texts = functions.phi_lanes(program, lanes.calls)
@@ -82,22 +86,22 @@ def printed(
 
 
 def printed_back(program: Program, step: Splitting, packs: Packs) -> str:
-    """Return the transposes of the flows of packs."""
+    """Return the transposes of the flows of batches with explicit steps."""
     return "\n".join(splitting.adjoint_in_lanes(program, step, packs.transposes, _NEAR, SIMD))
 
 
-#: The versions of functions that loops over lanes call for small arguments.
+#: The versions of functions that loops over lanes call, which are for small arguments.
 _NEAR = {**SIMD, **{f: f + NEAR for f in SMALL_ARGUMENT_FUNCTIONS}}
 
 
 def packed_kernels(program: Program, packs: Packs) -> list[str]:
-    """Return the kernels of packs whose step is one kernel."""
+    """Return the kernels of batches whose step is one kernel."""
     texts = [function(program, kernel, lanes=True, alike=["coef"]) for kernel in packs.kernels]
     return texts + [function(program, kernel, lanes=True) for kernel in packs.transposes]
 
 
 def packed_step(program: Program, step: Splitting, packs: Packs) -> list[str]:
-    """Return the flows of packs, and the step composed of them."""
+    """Return the flows of batches, and the step that consists of them."""
     called = operations([*packs.kernels, *packs.transposes])
     texts = functions.near(program, [f for f in SMALL_ARGUMENT_FUNCTIONS if f in called])
     texts += splitting.in_lanes(program, step, "", _NEAR)

@@ -21,19 +21,19 @@ FUNCTIONS = elementary.written_in("c")
 LANGUAGE = Language(
     reserved=C_RESERVED,
     functions=FUNCTIONS,
-    constants={"pi": "3.141592653589793", "E": "2.718281828459045"},  # digits, since -std=c99 hides M_PI
+    constants={"pi": "3.141592653589793", "E": "2.718281828459045"},  # digits, since M_PI is not defined under -std=c99
 )
 
 
 @cache
 def reserved_members(name: str) -> Reserved:
-    """Return what no member may be called: also phrases of the runtime, and macros of the solver."""
+    """Return the names that no member may have: reserved words, phrases of the runtime, and macros of the solver."""
     return _extended(name, "[A-Z0-9_]*[A-Z0-9]")
 
 
 @cache
 def reserved_variables(name: str) -> Reserved:
-    """Return what no variable may be called: also what begins as functions and types of the solver do."""
+    """Return the names that no variable may have: also those with the prefixes of functions and types of the solver."""
     return _extended(name, r"\w*[^\W_]")
 
 
@@ -45,10 +45,11 @@ def _extended(name: str, pattern: str) -> Reserved:
 
 @cache
 def elementary_functions(name: str) -> dict[str, str]:
-    """Return what a solver calls elementary functions: functions of its own where the library of C has none.
+    """Return the names that a solver uses for elementary functions; those that the C library lacks belong to the
+    solver.
 
-    Versions for small arguments and for SIMD lanes, see `phigen.ir.passes.forms`, are functions of the solver, or
-    formulas of these.
+    Versions for small arguments and for SIMD lanes (`phigen.ir.passes.forms`) are functions of the solver, or formulas
+    of such functions.
     """
     lanes = {f: f"{name}_{f}{LANE}" for f in LANE_FUNCTIONS}
     formulas = {f: text.format_map(lanes) for f, text in LANE_FORMULAS.items()}
@@ -60,10 +61,10 @@ def elementary_functions(name: str) -> dict[str, str]:
 
 
 def printer(scope: Scope, functions: Mapping[str, str] = FUNCTIONS) -> Printer:
-    """Prints lowered trees in C, with the names of a scope."""
+    """Return the printer of lowered trees in C, with the names of a scope."""
     return replace(LANGUAGE, functions=functions).printer(scope)
 
 
 def members(program: Program) -> dict[str, str]:
-    """The members of the parameter struct, by the names of the parameters."""
+    """Return the members of the parameter struct, by the names of the parameters."""
     return identifiers((p.name for p in program.parameters), reserved_members(program.name))

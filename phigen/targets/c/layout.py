@@ -8,14 +8,14 @@ from collections.abc import Iterable, Iterator
 
 WIDTH = 110
 
-#: Code with a comment behind it.
+#: Pattern of code with a trailing comment.
 _BEHIND = re.compile(r"( *[^ /].*?[;,0-9A-Z]) +(/\*.*\*/)")
 _STRING = re.compile(r'"[^"]*"')
 
-#: Penalty in columns of a line break inside parentheses, and inside brackets, for each level: outer ones are preferred.
+#: Penalties, in columns, of a line break inside parentheses and inside brackets, for each level of nesting.
 _DEPTH, _INDEX = 18, 60
 
-#: Penalty in columns of a line break at an operator: the more strongly it binds, the worse a break reads.
+#: Penalty, in columns, of a line break at an operator: it is larger for operators that bind more strongly.
 _BOUND = dict.fromkeys("*/", 50) | dict.fromkeys("+-", 36) | dict.fromkeys(("<", ">", "<=", ">=", "==", "!="), 28)
 
 
@@ -75,7 +75,7 @@ def _macro(lines: list[str]) -> Iterator[str]:
 
 
 def _statement(lines: list[str], first: int) -> int:
-    """Return the number of the line in which all parentheses of a statement are closed."""
+    """Return the index of the line in which all parentheses of a statement are closed."""
     depth = 0
     for k in range(first, len(lines)):
         code = _STRING.sub("", lines[k]) if '"' in lines[k] else lines[k]
@@ -86,7 +86,7 @@ def _statement(lines: list[str], first: int) -> int:
 
 
 def comment(text: str, indent: str = "") -> list[str]:
-    """Return a comment, marks included, wrapped to lines; the end mark never stands alone."""
+    """Return a comment with its marks, wrapped to lines; the closing mark is never alone on a line."""
     lines = textwrap.wrap(
         text.replace(" */", "\N{NO-BREAK SPACE}*/"),
         WIDTH,
@@ -102,7 +102,7 @@ def _indent(line: str) -> str:
     return line[: len(line) - len(line.lstrip())]
 
 
-#: A function of one statement on one line.
+#: Pattern of a function with one statement on one line.
 _FUNCTION = re.compile(r"(\S.*\)) \{ (.*;) \}")
 
 
@@ -127,7 +127,7 @@ def _code(line: str, width: int = WIDTH) -> Iterator[str]:
 
 
 def _places(line: str, least: int, width: int) -> Iterator[tuple[int, int]]:
-    """Yield the columns at which a line may be broken, each after its score; the highest score is the best."""
+    """Yield the columns at which a line may be broken, as pairs (score, column); the highest score is the best."""
     depth, index, head = 0, 0, re.match(r" *(for|if|while) \(", line)
     line = _STRING.sub(lambda match: "'" * len(match[0]), line)
     for k, c in enumerate(line[: width + 1]):

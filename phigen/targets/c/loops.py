@@ -15,7 +15,7 @@ from phigen.targets.c.layout import WIDTH, comment
 from phigen.targets.c.real import real_of
 from phigen.targets.spelling import Dialect, Spelling
 
-#: Functions and sizes of the runtime, whose names begin with that of the solver.
+#: Functions and sizes of the runtime; their names in generated code begin with the name of the solver.
 _RUNTIME = (
     "first", "LANES", "total", "added", "ADDED", "piece_of", "between", "units", "part_of_flow", "DIM", "SUMS", "ROW",
     "ELEMENT", "BACK_PACKS", "FLOWS", "TERMS", "taylor_product", "taylor_chain", "taylor_power",
@@ -24,7 +24,7 @@ _RUNTIME = (
 #: Types of integers.
 _INTEGERS = {ir.Type.INDEX: "ptrdiff_t", ir.Type.SIZE: "size_t", ir.Type.FLAG: "int"}
 
-#: Types of the variables of loops, by their kinds.
+#: Types of loop variables, by kind.
 _COUNTERS = {
     "segments": "size_t",
     "search": "size_t",
@@ -34,14 +34,14 @@ _COUNTERS = {
     "entries": "int",
 }
 
-#: Limits of a case of a switch that is printed on one line: statements, and letters, which leave room for the label and
-#: the indentation.
+#: Limits of a case of a switch that is printed on one line: number of statements, and number of characters, which
+#: leaves space for the label and the indentation.
 _SHORT_CASE, _CASE_WIDTH = 2, WIDTH - 24
 
 
 @dataclass(frozen=True)
 class CTypes:
-    """The names of types in a solver, whose name is their prefix; numbers are ``real``."""
+    """The names of types in a solver, which begin with the name of the solver; numbers have the type ``real``."""
 
     prefix: str
     real: str
@@ -51,7 +51,7 @@ class CTypes:
         return f"{self.prefix}_lanes" if lanes else self.real
 
     def value(self, kind: ir.Type) -> str:
-        """Return the type of a value that is no address."""
+        """Return the type of a value that is not an address."""
         return self.real if kind is ir.Type.REAL else _INTEGERS[kind]
 
     def parameter(self, name: str, kind: ir.ParameterType, spell: Spelling) -> str:
@@ -83,7 +83,7 @@ def function(printed: ir.Function, program: Program, linkage: str = "static") ->
 
 
 def commented(printed: ir.Function, program: Program, linkage: str = "static") -> str:
-    """Return a function of a solver as text, below its purpose."""
+    """Return a function of a solver as text, with its purpose as a comment."""
     return "\n".join([*comment(f"/* {printed.doc}. */"), function(printed, program, linkage)])
 
 
@@ -97,7 +97,8 @@ def table(printed: ir.ConstantTable, program: Program) -> str:
 def statements(printed: ir.Function, program: Program, *, shared_line: int = 0) -> list[str]:
     """Return the lines of the body of a function of a solver.
 
-    Declarations of computed values share lines that are not longer than ``shared_line``.
+    Declarations of computed values share lines of at most ``shared_line`` characters; 0 means one declaration on each
+    line.
     """
     return [*_indented(_StatementPrinter.of(printed, program, shared_line).lines(printed.body))]
 
@@ -121,7 +122,7 @@ def _indented(lines: Iterable[str]) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class _StatementPrinter:
-    """The statements of one function, in a spelling and with the types of a solver; see `statements`."""
+    """Printer of the statements of one function, with a spelling and with the types of a solver; see `statements`."""
 
     spell: Spelling
     types: CTypes
@@ -154,7 +155,7 @@ class _StatementPrinter:
                     yield from self._statement(s)
 
     def _kind(self, s: ir.Statement) -> str:
-        """Return the kind of statements that are printed together, or nothing."""
+        """Return the kind of statements that are printed as a group, or ""."""
         if isinstance(s, ir.Discard):
             return "discards"
         if not self.shared_line or not isinstance(s, ir.Declare) or s.in_place or s.type is not ir.Type.REAL:
@@ -245,8 +246,9 @@ class _StatementPrinter:
 
     def _if(self, s: ir.If) -> Iterator[str]:
         match s:
-            # A flag selects the function of one call: compilers would inline both functions into their caller, and
-            # fewer calls within them: 1.5 to 5 % more instructions in a Heisenberg lattice.
+            # A flag selects which of two functions is called. Written as a conditional, compilers would inline both
+            # functions into their caller, and fewer calls inside them: 1.5 to 5 % more instructions in a Heisenberg
+            # lattice.
             case ir.If(ir.Name(), (ir.Call(one, arguments),), (ir.Call(other, same),)) if arguments == same:
                 selected = f"{self.spell(s.condition)} ? {self.name}_{one} : {self.name}_{other}"
                 yield f"({selected})({', '.join(map(self.spell, arguments))});"

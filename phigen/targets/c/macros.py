@@ -1,7 +1,7 @@
-"""Expansion of the macros by which the C runtime is written, and which generated files do not contain.
+"""Expansion of the macros that the C runtime uses, and that generated files do not contain.
 
-Macros are those of C, with two differences. A macro and its arguments are on one line. If a macro before a statement or
-a block is empty, such as a loop that is made once, the statement loses its indentation.
+The macros follow the rules of C, with two differences. A macro and its arguments must be on one line. If a macro before
+a statement or a block is empty, such as the head of a loop that is made once, the statement loses its indentation.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ _DEFINITION = re.compile(r"#define (\w+)(?:\(([^)]*)\))?(?: (.*))?$")
 
 @dataclass(frozen=True)
 class Macro:
-    """A macro with its ``text``; ``parameters`` is None for a macro without a parameter list."""
+    """A macro with its replacement ``text``; ``parameters`` is None for a macro without a parameter list."""
 
     parameters: tuple[str, ...] | None
     text: str
 
     def of(self, arguments: Sequence[str]) -> str:
-        """Return the text for given arguments. Raises `ValueError` if their number is wrong."""
+        """Return the text for these arguments. Raises `ValueError` if their number is wrong."""
         values = dict(zip(self.parameters or (), arguments, strict=True))
         return re.sub(r"\b\w+\b", lambda word: values.get(word[0], word[0]), self.text) if values else self.text
 
 
 @dataclass
 class Macros:
-    """The macros of the runtime by their names, for expansion without a preprocessor."""
+    """The macros of the runtime by name, for expansion without a preprocessor."""
 
     _known: dict[str, Macro] = field(default_factory=dict)
-    _heads: re.Pattern[str] | None = None  # of macros that are empty, made when they are needed
+    _heads: re.Pattern[str] | None = None  # pattern of macros that are empty, made on first use
 
     def define(self, line: str) -> None:
         """Add the macro that a line defines, if it defines one."""
@@ -47,7 +47,8 @@ class Macros:
         )
         lines = _without_heads(lines, self._heads)
         expanded = [(line, self._line(line) if "PHI_" in line else line) for line in lines]
-        return [text for line, text in expanded if text or not line]  # a statement that is nothing leaves no line
+        # a statement that is expanded to nothing leaves no line
+        return [text for line, text in expanded if text or not line]
 
     def _line(self, line: str) -> str:
         """Return a line with macros expanded, without spaces before a comma or an empty expansion."""
@@ -65,7 +66,7 @@ class Macros:
 
 
 def _arguments(line: str, at: int) -> tuple[list[str], int]:
-    """Return the arguments of a macro, and the column after them. Raises `ValueError` if a line has none."""
+    """Return the arguments of a macro, and the column after them. Raises `ValueError` if there are none."""
     if line[at : at + 1] != "(":
         raise ValueError(f"a macro without its arguments: {line.strip()}")
     arguments, depth, begin = [], 0, at + 1
@@ -85,9 +86,10 @@ def _pattern_of_heads(names: Iterable[str]) -> re.Pattern[str]:
 
 
 def _without_heads(lines: Sequence[str], heads: re.Pattern[str]) -> list[str]:
-    """Return lines without the given heads of loops; the body of a loop, in braces or not, is dedented."""
+    """Return lines without the heads of loops that match; the body of each loop, with or without braces, is
+    dedented."""
     remaining: list[str] = []
-    ends: list[tuple[str, str]] = []  # of each loop that was struck out: its indentation, and the line that ends it
+    ends: list[tuple[str, str]] = []  # for each removed loop: its indentation, and the line that ends it
     for line in lines:
         named = "PHI_" in line
         if not ends and not named:

@@ -1,4 +1,4 @@
-"""Rewriting of C for rules of MISRA C:2012, in the profile certified: the same program with more parentheses and
+"""Rewriting of C for rules of MISRA C:2012, in the profile certified: an equal program with more parentheses and
 braces.
 
 - 12.1: operators of different precedence in one expression have parentheses.
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from phigen.targets.c.tokens import TokenKind, lexemes
 
-#: The kinds of tokens that the grammar does not see.
+#: Kinds of tokens that are not part of the grammar.
 _TRIVIA = (TokenKind.SPACE, TokenKind.COMMENT, TokenKind.DIRECTIVE)
 
 #: Precedence of binary operators, as in C.
@@ -34,19 +34,19 @@ _CLOSING = {"(": ")", "[": "]", "{": "}"}
 _CONTROLS = {"if", "for", "while", "switch"}
 _UNUSED = {"memcpy", "memmove", "memset"}
 
-#: Comparison of the bytes of two numbers, which says whether a step size has changed.
+#: Pattern of a comparison of two numbers by their bytes, which decides whether a step size has changed.
 _BYTES = re.compile(r"memcmp\(&(\w+), &([\w>.-]+), sizeof \w+\) ([!=]=) 0")
 
 
 def compliant(code: str) -> str:
-    """Return C that follows the rules, from C that compiles."""
+    """Return C that complies with the rules, from C that compiles."""
     compared = _BYTES.sub(lambda m: f"{'!' * (m[3] == '!=')}({m[1]} == {m[2]})", code)
     return _Text(_with_void(_Text(compared).braced())).parenthesised()
 
 
 @dataclass
 class _Text:
-    """The tokens of C, with text to be inserted before and after each."""
+    """Tokens of C, and text to be inserted before and after each token."""
 
     code: str
     tokens: list[str] = field(default_factory=list)
@@ -64,7 +64,7 @@ class _Text:
         return self.tokens[self.significant[place]] if place < len(self.significant) else ""
 
     def text(self) -> str:
-        """The code with the inserted text."""
+        """Return the code with the inserted text."""
         places = {token: place for place, token in enumerate(self.significant)}
         return "".join(
             self.before.get(places[k], "") + token + self.after.get(places[k], "") if k in places else token
@@ -72,7 +72,7 @@ class _Text:
         )
 
     def closing(self, place: int) -> int:
-        """The place of the bracket that closes the one at a place."""
+        """Return the index of the bracket that closes the one at ``place``."""
         opening, depth = self[place], 0
         for at in range(place, len(self.significant)):
             depth += (self[at] == opening) - (self[at] == _CLOSING[opening])
@@ -81,7 +81,7 @@ class _Text:
         raise ValueError(f"no bracket closes {opening}")
 
     def braced(self) -> str:
-        """The code with braces around the bodies of loops and conditionals."""
+        """Insert braces around the bodies of loops and conditionals, and return the code."""
         for place in range(len(self.significant)):
             if self[place] in _CONTROLS and self[place + 1] == "(":
                 self._brace(self.closing(place + 1))
@@ -90,14 +90,14 @@ class _Text:
         return self.text()
 
     def _brace(self, head: int) -> None:
-        """Put braces around the statement that follows, unless it has them or there is none."""
+        """Insert braces around the statement after ``head``, unless it has braces or there is no statement."""
         if self[head + 1] not in ("{", ";"):
             last = self._end(head + 1)
             self.after[head] = self.after.get(head, "") + " {"
             self.after[last] = " }" + self.after.get(last, "")
 
     def _end(self, place: int) -> int:
-        """The last token of the statement that starts at a place."""
+        """Return the index of the last token of the statement that starts at ``place``."""
         if self[place] in _CONTROLS:
             last = self._end(self.closing(place + 1) + 1)
             while self[place] == "if" and self[last + 1] == "else":
@@ -110,12 +110,12 @@ class _Text:
         return place
 
     def parenthesised(self) -> str:
-        """The code with parentheses around operands of another precedence."""
+        """Insert parentheses around operands of different precedence, and return the code."""
         self._within(0, len(self.significant))
         return self.text()
 
     def _within(self, begin: int, end: int) -> None:
-        """Treat the expressions between two places, and those in brackets among them."""
+        """Process the expressions between two places, including those in brackets."""
         operand, operands, operators = begin, list[tuple[int, int]](), list[str]()
         place = begin
         while place < end:
@@ -135,16 +135,16 @@ class _Text:
         self._combine(operands, operators, (operand, end))
 
     def _may_end_operand(self, place: int) -> bool:
-        """Whether an operand may end at a place, so that an operator after it is binary."""
+        """Whether the token at ``place`` can end an operand, so that an operator after it is binary."""
         token = self[place]
         return token in (")", "]", "++", "--") or token[0].isalnum() or token[0] in "_\"'."
 
     def _combine(self, operands: list[tuple[int, int]], operators: list[str], last: tuple[int, int]) -> None:
-        """Put parentheses into an expression of operands with operators between them."""
+        """Insert parentheses into an expression, given by its operands and the operators between them."""
         if len(operators) > 1:
             reader = _Operators([*operands, last], operators)
             tree = reader.conditional()
-            if reader.at == len(operators):  # not in labels, whose colon ends a statement
+            if reader.at == len(operators):  # not for labels, in which a colon ends the statement
                 self._wrap(tree)
 
     def _wrap(self, tree: _Tree) -> None:
@@ -161,7 +161,7 @@ _OPERAND = 99
 
 @dataclass(frozen=True)
 class _Tree:
-    """An expression: its span of tokens, the precedence of its operator, and the operands."""
+    """An expression: its range of tokens, the precedence of its operator, and its operands."""
 
     span: tuple[int, int]
     precedence: int = _OPERAND
@@ -169,7 +169,7 @@ class _Tree:
 
 
 class _Operators:
-    """Reader of a sequence of operands with operators between them, by precedence."""
+    """Parser of a sequence of operands with operators between them, by precedence."""
 
     def __init__(self, operands: list[tuple[int, int]], operators: list[str]) -> None:
         self.operands, self.operators, self.at = operands, operators, 0
@@ -178,7 +178,7 @@ class _Operators:
         return self.operators[self.at] if self.at < len(self.operators) else ""
 
     def conditional(self) -> _Tree:
-        """Read an expression that may be a conditional one."""
+        """Read an expression, which may be a conditional expression."""
         condition = self.binary(_CONDITIONAL + 1)
         if self._next() != "?":
             return condition
@@ -191,7 +191,7 @@ class _Operators:
         return _Tree((condition.span[0], otherwise.span[1]), _CONDITIONAL, (condition, then, otherwise))
 
     def binary(self, least: int) -> _Tree:
-        """Read operands joined by operators of at least a precedence."""
+        """Read operands joined by operators of precedence ``least`` or higher."""
         left = _Tree(self.operands[self.at])
         while _PRECEDENCE.get(self._next(), 0) >= least:
             precedence = _PRECEDENCE[self._next()]
@@ -202,7 +202,7 @@ class _Operators:
 
 
 def _with_void(code: str) -> str:
-    """The code with casts before statements that are calls of functions of `_UNUSED`."""
+    """Return the code with casts to void before statements that call functions of `_UNUSED`."""
     return "".join(_cast(code))
 
 

@@ -1,8 +1,8 @@
-"""Phrases of the runtime in C that depend on features: arguments, types and statements of one line.
+"""Phrases of the C runtime that depend on features: arguments, types and statements of one line.
 
-The runtime uses the name of a phrase (``PHI_AND_STAGE``); its text is defined here, once for each feature, and
-replaces the name in generated code (`phigen.targets.c.macros`). `header` prints the same definitions with
-conditions, for a compiler that reads the runtime unassembled.
+The runtime contains the name of a phrase (``PHI_AND_STAGE``). The text of the phrase is defined here, once for each
+feature, and replaces the name in generated code (`phigen.targets.c.macros`). `header` prints the same definitions with
+conditions, for a compiler that reads the runtime before assembly.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class Choice:
-    """A family of macros: for each name, with its parameters, one text per condition on switches.
+    """A family of macros: for each name, with its parameters, one text for each condition on switches.
 
     The first of the ``conditions`` that holds selects the text. The last text has no condition.
     """
@@ -30,7 +30,7 @@ class Choice:
         yield from (_definition(name, texts[which]) for name, texts in self.phrases.items())
 
     def header(self) -> Iterator[str]:
-        """Yield the definitions for all solvers, under ``#if`` for each condition."""
+        """Yield the definitions for all solvers, each under an ``#if`` with its condition."""
         yield f"/* {self.about} */"
         for k, condition in enumerate((*self.conditions, "")):
             expression = " ".join(
@@ -100,7 +100,7 @@ VALUES = Choice(
     },
 )
 
-#: The time of a lattice after a number of steps: counted from the last change of h, so that rounding errors do not
+#: The time of a lattice after a number of steps. It is counted from the last change of h, so rounding errors do not
 #: accumulate.
 LATTICE_TIME = "s->t_before_h + (double)(steps - s->steps_before_h) * s->h"
 
@@ -738,7 +738,7 @@ ALL = (
 
 
 def definitions(switches: Mapping[str, bool]) -> Iterator[str]:
-    """Definitions of all phrases that the switches decide."""
+    """Yield the definitions of all phrases that depend on switches, for a solver."""
     known = {s: False for choice in ALL for s in _switches(choice)} | dict(switches)
     for choice in ALL:
         yield from choice.definitions(known)
@@ -750,7 +750,7 @@ def names() -> frozenset[str]:
 
 
 def header() -> str:
-    """All phrases as a header of C that has conditions."""
+    """Return all phrases as a C header with conditions."""
     return "\n".join(line for choice in ALL for line in choice.header())
 
 

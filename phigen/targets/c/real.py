@@ -17,13 +17,13 @@ from phigen.targets.c.tokens import CToken, TokenKind, tokens
 from phigen.targets.language import Language
 from phigen.targets.rendering import render
 
-#: Ratio of the numbers of digits of float and double.
+#: Ratio of the numbers of binary digits of float and double.
 DIGITS = 24 / 53
 
-#: A number named by a ``#define`` is a threshold if it is smaller than this.
+#: Largest value of a number named by a ``#define`` that counts as a threshold.
 THRESHOLD = 1e-5
 
-#: The functions of C's library that have one for each type.
+#: Functions of the C library that exist for each type.
 _FUNCTIONS = frozenset(
     [
         "acos",
@@ -80,9 +80,9 @@ _LEAST, _MOST = 2.0**-126, (2.0 - 2.0**-23) * 2.0**127
 
 @dataclass(frozen=True)
 class Real:
-    """A type of real numbers: its ``name``, and the ``words`` for the type and limits of double.
+    """A type of real numbers: its ``name``, and the ``words`` that replace the type and the limits of double.
 
-    ``function_suffix`` is appended to the names of library functions; it is empty if these are overloaded.
+    ``function_suffix`` is appended to the names of library functions; it is "" if these are overloaded.
     """
 
     name: str
@@ -94,11 +94,12 @@ class Real:
         return literal(value) if self.words else repr(value)
 
     def threshold(self, value: float) -> float:
-        """Return the value of a named constant, which depends on the precision if it is small."""
+        """Return the value of a named constant in this type; small constants are thresholds that depend on the
+        precision."""
         return threshold(value) if self.words and 0.0 < value < THRESHOLD else value
 
     def language(self, language: Language) -> Language:
-        """Return the description of C in this type, from that of C in double."""
+        """Return the description of C with this type, from that with double."""
         if not self.words:
             return language
         functions = {f: self._function(text) for f, text in language.functions.items()}
@@ -111,7 +112,7 @@ class Real:
         return {**functions, **self.words, **{f"-{word}": f"-{text}" for word, text in self.words.items()}}
 
     def _function(self, text: str) -> str:
-        """Return the name of a function, or a formula that calls functions, in this type."""
+        """Return the name of a function, or a formula that calls functions, for this type."""
         if text.isidentifier():
             return f"{text}{self.function_suffix}" if text in _FUNCTIONS else text
         return self.spelt(text)
@@ -121,7 +122,7 @@ class Real:
         return "".join(self._spelt(text)) if self.words else text
 
     def _spelt(self, text: str) -> Iterator[str]:
-        naming = False  # whether this is the line of a #define
+        naming = False  # whether the line is a #define
         for token, after in pairwise([*tokens(text), CToken(TokenKind.SPACE, "")]):
             naming = (naming or token.text == "define") and "\n" not in token.text
             if token.kind is TokenKind.REAL and not token.text.endswith("f"):
@@ -161,12 +162,13 @@ def rendered(program: Program, template: str, values: Mapping[str, object]) -> s
 
 
 def threshold(value: float) -> float:
-    """Return the threshold in single precision that has the same share of the digits as ``value`` in double."""
+    """Return the threshold in single precision that corresponds to the same fraction of the digits as ``value`` in
+    double."""
     return float(f"{value**DIGITS:.0e}")
 
 
 def literal(value: float) -> str:
-    """Return the shortest literal of the nearest float; values beyond the range of floats become its limits."""
+    """Return the shortest literal of the nearest float; values outside the range of floats become its limits."""
     if value < 0.0:
         return f"-{literal(-value)}"
     if value:

@@ -1,10 +1,12 @@
-"""The state of a lattice and of a row segment, block by block: members of structs in C, and their initialisation."""
+"""Structs of the C runtime for a lattice and for a row segment, block by block: their members and their
+initialisation."""
 
 from __future__ import annotations
 
 from phigen.targets.state import StateBlock
 
-#: In the order of the members of the struct. Members in ``reset`` are arrays in the memory of the solver.
+#: Blocks of the struct of a lattice, in the order of its members. Members in ``reset`` are arrays in the memory of the
+#: solver.
 LATTICE = (
     StateBlock(
         "sizes",
@@ -286,7 +288,8 @@ LATTICE = (
     ),
 )
 
-#: Arguments of loops over the sites of a row segment. ``reset`` are statements for a whole row of a solver s.
+#: Blocks of the struct of a row segment, the arguments of loops over its sites. ``reset`` are statements for a whole
+#: row of a solver s.
 ROW = (
     StateBlock(
         "x",

@@ -35,7 +35,7 @@ def printed(program: Program, step: Splitting) -> str:
     build, schedule = _functions(program, step), step.schedule
     texts = [function(program, replace(step.prepare, name="prepare_row"))]
     texts += [function(program, step.refresh, name="at_step" if program.noise else "at_time")] if step.refresh else []
-    # With an element the function would be too long for compilers to inline it.
+    # With a group element the function is too long to be inlined.
     linkage = "static inline" if build.turns else "static"
     for k, flow in enumerate(program.attitude.turns if program.attitude else step.flows, 1):
         kernel, updated = _flow(flow, k)
@@ -49,14 +49,15 @@ def printed(program: Program, step: Splitting) -> str:
 def _functions(program: Program, step: Splitting) -> FlowFunctions:
     """Return the builder of the functions of flows.
 
-    With a monitor, flows also update the time and a sum, which is NaN outside of the domain of the flows.
+    With a monitor, flows also update the time, and a sum that is NaN outside the domain of the flows.
     """
     along = program.dimension + (2 if program.monitor else 0)
     return FlowFunctions(program.dimension, along, turns=bool(program.attitude), stores=bool(step.adjoint))
 
 
 def in_lanes(program: Program, step: Splitting, form: str, versions: Mapping[str, str]) -> list[str]:
-    """Return the step of packs of members, with these ``versions`` of functions; ``form`` is added to the names."""
+    """Return the step of batches of members with these ``versions`` of functions; ``form`` is appended to function
+    names."""
     texts, linkage = list[str](), f"{program.name}_IN_PLACE static inline"
     for k, flow in enumerate(step.flows, 1):
         kernel, updated = _flow(flow, k)
@@ -67,7 +68,7 @@ def in_lanes(program: Program, step: Splitting, form: str, versions: Mapping[str
 
 
 def _tables(program: Program, step: Splitting, prefix: str, suffix: str) -> str:
-    """Return the part of H and the row of coefficients of each flow of a step."""
+    """Return tables with the part of H and the row of coefficients of each flow of a step."""
     flows, length = step.schedule.flows_of_run, ir.fixed("FLOWS")
     parts = ir.ConstantTable(f"{prefix}part{suffix}", tuple(part + 1 for part, _ in flows), length)
     rows = ir.ConstantTable(f"{prefix}row{suffix}", tuple(row for _, row in flows), length)
@@ -92,7 +93,7 @@ def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
 def adjoint_in_lanes(
     program: Program, step: Splitting, back: Sequence[Kernel], near: Mapping[str, str], far: Mapping[str, str]
 ) -> list[str]:
-    """Return the transposes of the flows of packs, which call the small-argument functions ``near``.
+    """Return the transposes of the flows of batches, which call the small-argument functions ``near``.
 
     Flows that call such functions have a second version with the full-range functions ``far``.
     """
@@ -110,12 +111,12 @@ def adjoint_in_lanes(
 
 
 def reaches_far(kernel: Kernel) -> bool:
-    """Whether a kernel has a second version in lanes, with full-range functions for large arguments."""
+    """Whether a kernel has a second version in lanes, with full-range functions."""
     return not operations([kernel]).isdisjoint(SMALL_ARGUMENT_FUNCTIONS)
 
 
 def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tuple[list[Kernel], FlowTransposes]:
-    """Return the transposed flows, without identically zero outputs, and the builder of their functions."""
+    """Return the transposed flows, without outputs that are always zero, and the builder of their functions."""
     kernels, flows = list[Kernel](), list[Transposed]()
     for flow, kernel in zip(step.flows, back, strict=True):
         reached = [[i for i, e in enumerate(o.values) if not e.is_zero] for o in kernel.outputs]
@@ -131,19 +132,20 @@ def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tu
 
 
 def _read(kernel: Kernel) -> list[tuple[int, int]]:
-    """Return the coordinates of the state that a kernel reads, as runs: the first of each, and their number."""
+    """Return the coordinates of the state that a kernel reads, as ranges: the first one and the number of each
+    range."""
     used = {s for e in kernel.roots for s in symbols_of(e)}
     places = [i for i, s in enumerate(kernel.inputs["state"]) if s in used]
     runs = groupby(places, key=lambda i: i - places.index(i))
     return [(of[0], len(of)) for _, run in runs for of in [list(run)]]
 
 
-#: The versions of functions that flows call, which have a polynomial for small arguments.
+#: The versions of functions that flows call; they have a polynomial for small arguments.
 _VERSIONS = {f: f + OWN for f in FLOW_FUNCTIONS}
 
 
 def _flow(kernel: Kernel, k: int) -> tuple[Kernel, list[int]]:
-    """Return the kernel of a flow without the zero increments, and the numbers of the values that it updates."""
+    """Return the kernel of a flow without increments that are zero, and the indices of the values that it updates."""
     increment = kernel.outputs[0].values
     updated = [i for i, e in enumerate(increment) if not e.is_zero]
     output = Output("change", tuple(increment[i] for i in updated))

@@ -1,4 +1,5 @@
-"""The blocks of state (`phigen.targets.state`) as the runtime in C includes them: members, copies, rollback, reset."""
+"""The blocks of state (`phigen.targets.state`) as files that the C runtime includes: members, copies, rollback,
+reset."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from phigen.targets.state import STATE, StateBlock, belongs
 
 @dataclass(frozen=True)
 class Part:
-    """A file that the runtime includes: some ``lines`` of each of the ``blocks``, with their indentation."""
+    """A file that the runtime includes: ``lines`` returns some lines of each of the ``blocks``; they are indented."""
 
     blocks: Sequence[StateBlock]
     indent: int

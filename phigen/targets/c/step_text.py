@@ -1,4 +1,4 @@
-"""The text of steps in C, one record for each kind; `phigen.targets.c.emitter` puts it into the files of a solver."""
+"""The text of steps in C, one record for each kind. `phigen.targets.c.emitter` puts it into the files of a solver."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from phigen.targets.c.kernels import function
 from phigen.targets.c.lanes import packed_kernels, packed_step, printed_back
 from phigen.targets.c.loops import commented, table
 
-#: Constants: names, values, and comments.
+#: Constants: name, value and comment.
 Sizes = list[tuple[str, int, str]]
 Switches = Mapping[str, bool]
 
@@ -28,11 +28,10 @@ Switches = Mapping[str, bool]
 class StepText:
     """The text of one kind of step.
 
-    ``texts`` are the runtime files of the step, ``declared`` the sizes in the struct of the solver, ``constants``
-    and ``last_constants`` the other sizes, before and after those of lanes. ``kernels`` are printed first,
-    ``tangents`` after the kernels of the gauge and the monitor, then the ``transposes`` that are not in separate
-    texts. ``trail`` is the number of doubles on the tape for one step. ``packed`` prints the kernels of a SIMD
-    batch.
+    ``texts`` are the runtime files of the step, ``declared`` the sizes that are declared with the struct of the solver.
+    ``constants`` and ``last_constants`` are other sizes, before and after those of lanes. ``kernels`` are printed
+    first, ``tangents`` after the kernels of the gauge and the monitor, then the ``transposes`` that are not in separate
+    texts. ``trail`` is the number of values on the tape for one step. ``packed`` prints the kernels of a SIMD batch.
     """
 
     texts: Callable[[Program, Any, Lanes | None, Switches], dict[str, str]] = lambda program, step, lanes, has: {}
@@ -101,7 +100,7 @@ def _adjoint_path(program: Program, path: PathAdjoint) -> str:
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
-    """Return the recurrences of a path, or of a tangent path."""
+    """Return the recurrences of a path or of a tangent path."""
     return "\n".join(commented(f, program) for f in path_functions.functions(program, path, kind))
 
 
@@ -163,5 +162,5 @@ STEP_TEXTS: Mapping[str, StepText] = {
 
 
 def text_of(program: Program) -> StepText:
-    """The record of the step of a program. Raises `KeyError` for a lattice."""
+    """Return the record for the step of a program. Raises `KeyError` for a lattice."""
     return STEP_TEXTS[program.step.kind.name]

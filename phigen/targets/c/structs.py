@@ -1,10 +1,10 @@
-"""Structs of the runtime in C whose members depend on switches, as blocks like those of `phigen.targets.state`."""
+"""Structs of the C runtime whose members depend on switches, as blocks like those of `phigen.targets.state`."""
 
 from __future__ import annotations
 
 from phigen.targets.state import StateBlock
 
-#: Coefficients and predictors of a block of steps, in SIMD lanes.
+#: Members for a block of steps in SIMD lanes: coefficients and predictors.
 TABLE = (
     StateBlock(
         "fits",
@@ -23,7 +23,7 @@ TABLE = (
     ),
 )
 
-#: A stage in SIMD lanes, one for each step of a block, with what corrects it in Newton's method.
+#: Members for a stage in SIMD lanes (one for each step of a block), and for its corrections by Newton's method.
 MODEL = (
     StateBlock(
         "y",
@@ -61,7 +61,7 @@ MODEL = (
     ),
 )
 
-#: The arguments of a run of an ensemble; arrays hold a value for each member, or one for all.
+#: Members for the arguments of a run of an ensemble; arrays have a value for each member, or one for all.
 MEMBERS = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),
@@ -83,7 +83,7 @@ MEMBERS = (
     ),
 )
 
-#: State of the reverse pass of a step: derivatives of a number L.
+#: Members for the reverse pass of a step: derivatives of a number L.
 COTANGENT = (
     StateBlock(
         "x",
@@ -103,7 +103,7 @@ COTANGENT = (
     ),
 )
 
-#: Linearised stages in SIMD lanes.
+#: Members for linearised stages in SIMD lanes.
 TRACED = (
     StateBlock(
         "stages",
@@ -116,13 +116,13 @@ TRACED = (
     StateBlock("t", "RENEWED", ("double t[PHI_LANES]; /* the times of the stages */",)),
 )
 
-#: The arguments of a reverse pass of an ensemble that depend on features.
+#: Members for those arguments of a reverse pass of an ensemble that depend on features.
 PULLED = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* see phi_members */",)),
 )
 
-#: State of the reverse pass of a batch of members: derivatives of L, as in phi_cotangent.
+#: Members for the reverse pass of a batch of members: derivatives of L, as in phi_cotangent.
 BACK_GROUP = (
     StateBlock(
         "x",
@@ -136,7 +136,7 @@ BACK_GROUP = (
     ),
 )
 
-#: The reverse pass of a lattice: derivatives of a number L, and the layout of its memory.
+#: Members for the reverse pass of a lattice: derivatives of a number L, and the layout of its memory.
 TRANSPOSE = (
     StateBlock(
         "bar",
@@ -196,7 +196,7 @@ TRANSPOSE = (
     ),
 )
 
-#: A flow of a step of a lattice.
+#: Members for a flow of a step of a lattice.
 FLOW = (
     StateBlock(
         "part",

@@ -1,5 +1,4 @@
-"""Removal of runtime functions that a solver does not use: uncalled static functions, and declarations of undefined
-functions."""
+"""Removal of unused code of the runtime: static functions without calls, and declarations of undefined functions."""
 
 from __future__ import annotations
 
@@ -10,14 +9,14 @@ from itertools import accumulate
 
 from phigen.targets.c.tokens import closing_brace, names, next_token, used_names
 
-#: First words of declarations that declare no function, or a function of the library.
+#: First words of declarations that do not declare a function of the solver.
 _TYPES = ("typedef", "enum", "struct", "union")
 _NO_FUNCTIONS = ("extern", *_TYPES)
 
 
 @dataclass(frozen=True)
 class Function:
-    """Lines from ``begin`` to ``end`` that declare or define a function, without the comment above them."""
+    """The lines from ``begin`` to ``end`` that declare or define a function, without the comment above."""
 
     name: str
     begin: int
@@ -27,9 +26,11 @@ class Function:
 
 
 def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
-    """Return the lines without static functions that no other code calls, directly or through such functions, and
-    without declarations of functions that are not defined in the lines, if their names have the prefix of the
-    solver."""
+    """Return the lines without unused static functions and without declarations of undefined functions.
+
+    A static function is unused if only unused functions call it. Declarations are removed if the name has the prefix of
+    the solver and the lines contain no definition.
+    """
     declarations = [*declarations_of(lines)]
     functions = [f for f in declarations if f.name.startswith(prefix)]
     static = [f for f in functions if f.static]
@@ -45,18 +46,18 @@ def _declared(functions: Iterable[Function]) -> set[int]:
 
 
 def _types(lines: Sequence[str], declarations: Iterable[Function]) -> set[int]:
-    """The lines that declare types, whose members may have the names of functions."""
+    """Return the indices of the lines that declare types, whose members may have the names of functions."""
     types = (d for d in declarations if lines[d.begin].startswith(_TYPES))
     return {k for d in types for k in range(d.begin, d.end)}
 
 
 def _names_used(text: str) -> set[str]:
-    """Return the names in a text, without names of members; of directives all names, in all their lines."""
+    """Return the names in a text, without names of members; in directives all names count."""
     return used_names(text).union(*map(names, _directives(text)))
 
 
 def _directives(text: str) -> Iterator[str]:
-    """Yield the lines of directives of the preprocessor, with those that a backslash continues."""
+    """Yield the lines of preprocessor directives, including lines continued by a backslash."""
     continued = False
     for line in text.splitlines():
         if continued or line.startswith("#"):
@@ -65,7 +66,7 @@ def _directives(text: str) -> Iterator[str]:
 
 
 def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str]) -> set[str]:
-    """The static functions that other code calls, directly or through each other."""
+    """Return the static functions that other code calls, directly or through other static functions."""
     words: dict[str, set[str]] = {}
     for f in static:
         words.setdefault(f.name, set()).update(_names_used("\n".join(lines[f.begin : f.end])) if f.defined else ())
@@ -84,7 +85,7 @@ def functions_of(lines: Sequence[str]) -> Iterator[Function]:
 
 
 def declarations_of(lines: Sequence[str]) -> Iterator[Function]:
-    """Yield the declarations and definitions outside of functions; the name is empty if it is not a function."""
+    """Yield the declarations and definitions outside functions; the name is "" if it is not that of a function."""
     text, declaration, at = "\n".join(lines), _Declaration(), 0
     line_ends = [*accumulate(len(line) + 1 for line in lines)]
     while token := next_token(text, at):
@@ -107,18 +108,18 @@ def declarations_of(lines: Sequence[str]) -> Iterator[Function]:
 
 @dataclass
 class _Declaration:
-    """A declaration or definition that is being read: its ``first`` word, and the name if it is a function."""
+    """A declaration or definition that is being read: its ``first`` word, and the name if it declares a function."""
 
     first: str = ""
     begin: int = 0
     name: str = ""
     last: str = ""
-    is_plain: bool = False  # whether it is certainly not a function
-    in_size: bool = False  # whether the last token was in the size of an array
+    is_plain: bool = False  # whether it certainly declares no function
+    in_size: bool = False  # whether the last token was inside the size of an array
     has_body: bool = False
 
     def take(self, token: str, place: int) -> None:
-        """Read the next token outside of braces, or an opening brace."""
+        """Read the next token outside braces, or an opening brace."""
         if not self.first:
             self.first, self.begin = token, place
             self.is_plain = token in _NO_FUNCTIONS or not token[:1].islower()
@@ -132,17 +133,17 @@ class _Declaration:
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """The marks outside of braces that end it."""
+        """The marks outside braces that end the declaration."""
         return ("}",) if self.has_body else (";",)
 
     @property
     def is_linkage(self) -> bool:
-        """Whether it is the start of ``extern "C"``."""
+        """Whether it is the beginning of ``extern "C"``."""
         return self.first == "extern" and self.last == "{"
 
 
 def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
-    """Return the lines without functions, and without comments directly above these."""
+    """Return the lines without these functions, and without comments directly above them."""
     gone = {k for f in functions for k in range(f.begin, f.end)}
     for begin in sorted({f.begin for f in functions}):
         first = begin - 1
@@ -156,12 +157,12 @@ def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
 
 
 def _is_comment(lines: Sequence[str], last: int) -> bool:
-    """Whether a comment on lines of its own ends on this line, and is not the title of a chapter."""
+    """Whether a comment on separate lines ends on this line, and is not the title of a chapter."""
     if not lines[last].endswith("*/") or lines[last].startswith("/* ---- "):
         return False
     return lines[_beginning(lines, last)].startswith("/*")
 
 
 def _beginning(lines: Sequence[str], last: int) -> int:
-    """Return the first line of the comment that ends on this line."""
+    """Return the index of the first line of the comment that ends on this line."""
     return next(k for k in range(last, -1, -1) if "/*" in lines[k])

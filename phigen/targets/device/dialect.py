@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from phigen.targets.c.unused import declarations_of
 
-#: The line after which a file is for devices only.
+#: Line in generated files after which the code is for devices only.
 DEVICES_ONLY = "#if defined(__OPENCL_VERSION__) || defined(__CUDACC__) || defined(__HIP__)"
 
 _TABLE = "static const "
@@ -15,17 +15,17 @@ _TABLE = "static const "
 _TYPES = ("typedef", "enum", "struct", "union")
 
 
-#: Declarations of coefficients as parameters of functions.
+#: Texts that declare coefficients as parameters of functions.
 _COEFFICIENTS = [f"const {real} {end}" for real in ("double", "float") for end in ("*coef,", "*coef)", "coef[")]
 
 
 def qualified(lines: Sequence[str], name: str, *, common: bool = False) -> list[str]:
-    """Return the lines of a solver with the qualifiers of devices before functions and tables of the part for devices.
+    """Return the lines of a solver with qualifiers for devices, in the part of the file for devices.
 
-    Functions become `NAME_FUNCTION`, which is static, and tables `NAME_CONSTANT`; kernels have their qualifiers in
-    the runtime. Where coefficients may be ``common`` to all members, functions read them in the address space
-    `NAME_COEF`. Raises `ValueError` for objects without an address space: non-constant objects of a file, and static
-    objects of functions.
+    Functions become `NAME_FUNCTION`, which is static, and tables `NAME_CONSTANT`; kernels have their qualifiers in the
+    runtime. If coefficients may be ``common`` to all members, functions read them in the address space `NAME_COEF`.
+    Raises `ValueError` for objects without an address space: non-constant objects of a file, and static objects of
+    functions.
     """
     begin, linkage = lines.index(DEVICES_ONLY), {"static", "inline", f"{name}_APART"}
     spelt = [*lines]

@@ -1,7 +1,7 @@
 """A program as `NAME_device.h`, one source for OpenCL C, CUDA and HIP.
 
 It is the C of the profile small in a dialect: the runtime of ``templates/c/runtime`` with the switch ``DEVICE``, a
-prelude that names the differences of the languages, and a kernel for ensembles.
+prelude of macros for the differences between the languages, and a kernel for ensembles.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from phigen.targets.device.members import group_size, has_common_coefficients
 from phigen.targets.device.registers import spilling
 from phigen.targets.header import header_lines, sealed
 
-#: The end of the name of a generated file.
+#: Suffix of the name of a generated file.
 SUFFIX = "_device.h"
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """File names and their contents."""
+    """Return file names and their contents."""
     name = program.name
     lines = [*header_lines(program, command), *_READING]
     if slow := spilling(program):
@@ -43,7 +43,7 @@ _READING = (
 
 
 def for_devices(program: Program) -> Program:
-    """Return a program without the parts that no kernel calls: derivatives of steps, the modified H, attitudes."""
+    """Return the program without the parts that no kernel calls: derivatives of steps, the modified H, attitudes."""
     left_out: dict[str, Any] = {"adjoint": None, "tangent": None, "tangents": ()}
     parts = {f.name for f in fields(program.step)}
     if swept := program.step.swept:
@@ -55,7 +55,10 @@ def for_devices(program: Program) -> Program:
 
 
 def text_of_device(program: Program) -> str:
-    """Return the text of a file without its first comment. Raises `SpecError` for bodies in relative coordinates."""
+    """Return the text of a file without its first comment.
+
+    Raises `SpecError` for bodies in relative coordinates.
+    """
     if program.step.swept and program.step.swept.relative:
         message = f"{program.name}: coordinates_from: devices have no steps in relative coordinates"
         raise SpecError([Diagnostic(message, None, "another target, or remove coordinates_from")])

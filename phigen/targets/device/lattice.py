@@ -1,4 +1,5 @@
-"""Lattices for devices: a kernel for each flow and colour, each sum over bonds or pairs, each function of states."""
+"""Lattices for devices: kernels for each flow and colour, for each sum over bonds or pairs, and for each function of
+states."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from phigen.targets.c.loops import statements
 from phigen.targets.c.real import rendered
 from phigen.targets.header import plain, sentence
 
-#: The arrays of kernels: their types, and their contents.
+#: The arrays that are arguments of kernels: their types, and their contents.
 _ARRAYS = {
     "neighbours": ("const int", "neighbours[n * count + i]: the number of neighbour n of site i"),
     "weights": ("const double", "weights[n * count + i]: 0 for terms beyond open ends, else 1"),

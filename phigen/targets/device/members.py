@@ -6,10 +6,10 @@ from phigen.ir.launches import EnsembleLaunch
 from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import Program
 
-#: Bytes of shared memory of a work group that all cards have, and of a number in it.
+#: Bytes of shared memory of a work group that all cards have, and bytes of a number.
 _SHARED, _NUMBER = 48 * 1024, 8
 
-#: Sizes of work groups, the largest first: 128 hides memory latency better than 256 if work items use many registers.
+#: Sizes of work groups, the largest first. 128 hides memory latency better than 256 if work items use many registers.
 _GROUPS = (128, 64, 32, 16, 8, 4, 2, 1)
 
 
@@ -26,7 +26,8 @@ def group_size(program: Program) -> int:
     return next((size for size in _GROUPS if size * of_item <= _SHARED), _GROUPS[-1])
 
 
-#: Bytes of coefficients that a kernel of CUDA can receive: all its arguments have at most 4,096.
+#: Largest size in bytes of the coefficients that a CUDA kernel receives as an argument: all arguments together have at
+#: most 4,096.
 _COMMON_BYTES = 3_840
 
 

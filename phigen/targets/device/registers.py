@@ -1,4 +1,4 @@
-"""Steps that need more registers than cards have, by measurements with the compiler of CUDA (docs/devices.md)."""
+"""Steps that need more registers than graphics cards have, by measurements with the CUDA compiler (docs/devices.md)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from phigen.scheme.program import Program
 
 @dataclass(frozen=True)
 class Spills:
-    """A measured system, whose series spills ``size`` bytes of each member into memory on sm_90."""
+    """A measured system. Steps of its series spill ``size`` bytes of each member into memory on sm_90."""
 
     name: str
     order: int
@@ -18,12 +18,13 @@ class Spills:
     size: int
 
     def is_within(self, coordinates: int, coefficients: int) -> bool:
-        """Whether the system has at most these numbers of coordinates and coefficients."""
+        """Whether the measured system has at most these numbers of coordinates and coefficients."""
         return self.coordinates <= coordinates and self.coefficients <= coefficients
 
 
-#: Steps with as many coordinates and coefficients spill about as much, or more. Steps with fewer than 6 coordinates
-#: and at most 40 coefficients stay in registers: 52 builds of 19 systems of the corpus do, of orders 2 to 6.
+#: Steps with at least as many coordinates and coefficients spill about as much, or more. Steps with fewer than 6
+#: coordinates and at most 40 coefficients stay in registers: this is so in 52 builds of 19 systems of the corpus, of
+#: orders 2 to 6.
 _MEASURED = (
     Spills("spin_chain5", 4, 15, 33, 44_000),
     Spills("so4_manakov", 6, 6, 216, 8_900),
@@ -36,12 +37,13 @@ _MEASURED = (
     Spills("lagrange_top", 2, 6, 6, 350),
 )
 
-#: Numbers in single precision take one register each, half of those in double precision.
+#: Factor for single precision: a number takes one register instead of two.
 _SINGLE = 2
 
 
 def spilling(program: Program) -> str:
-    """Return why the steps of an ordinary system spill into memory on cards, and what to do; "" if they do not."""
+    """Return a warning that the steps of an ordinary system spill into memory on cards, with a hint; "" if they do
+    not."""
     step = program.step
     if step.kind.sites:
         return ""

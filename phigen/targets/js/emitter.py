@@ -27,14 +27,14 @@ from phigen.targets.rendering import render
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """Return the file name and its contents. Raises `SpecError` as `expect_offered` does."""
+    """Return the file name with its contents. Raises the errors of `expect_offered`."""
     expect_offered(program)
     body = _lattice(program, program.step.swept) if program.step.swept else _system_of_coordinates(program)
     return {f"{program.name}.mjs": sealed(header_lines(program, command), body)}
 
 
 def expect_offered(program: Program) -> None:
-    """Raise `SpecError` if the program has the transpose of steps, which JavaScript lacks."""
+    """Raise `SpecError` if the program has the transpose of steps, which the JavaScript target does not offer."""
     if program.step.adjoint:
         message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
@@ -126,7 +126,7 @@ def _table(program: Program) -> Mapping[str, object]:
 
 
 def _contents(program: Program) -> list[str]:
-    """Return the lines of the comment at the head: an example of use, and the table of contents."""
+    """Return the lines of the comment at the head of a module: an example of use, and the table of contents."""
     lines = [
         f"import {{ Solver, StepError }} from './{program.name}.mjs';",
         f"const solver = new Solver({{ x0: [...],{' t0,' * bool(program.time)} params: {{ ... }} }});",

@@ -1,8 +1,8 @@
-"""The modules of the runtime in JavaScript, and which solvers have them.
+"""The modules of the JavaScript runtime, with the conditions under which a solver has them.
 
-Other modules import these without a condition, and call the functions of `HOOKS` without one: if a function is left
-out, so are the statements that call it. Modules `members_NAME` hold members of the class Solver, which replace the
-line ``// #members NAME``.
+Other modules import these modules, and call the functions of `HOOKS`, without a condition. If a function is left out,
+so are the statements that call it. Modules `members_NAME` contain members of the class Solver, which replace the line
+``// #members NAME``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from phigen.targets.features import holds
 
 _KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
-#: Modules of ordinary systems, in their order, each with its condition on switches.
+#: Modules of ordinary systems, in order, each with its condition on switches.
 MODULES = {
     "errors": "",
     "march": "",
@@ -99,7 +99,7 @@ MODULES = {
     "linear": "IMPLICIT",
 }
 
-#: Modules of lattices, likewise.
+#: Modules of lattices, in order, each with its condition on switches.
 LATTICE_MODULES = {
     "errors": "",
     "march": "",
@@ -127,7 +127,7 @@ LATTICE_MODULES = {
     "site_tangent": "!SPLIT && TANGENT",
 }
 
-#: Members of the class Solver, by the ends of the names of their modules.
+#: Modules with members of the class Solver, by the suffix of their names, each with its condition.
 MEMBERS = {
     "constants": "OBSERVED",
     "attitude": "ATTITUDE",
@@ -148,7 +148,7 @@ MEMBERS = {
     "lattice_observed_fields": "OBSERVED_FIELDS",
 }
 
-#: Functions that others call in statements of their own, each with the condition for the statement.
+#: Hooks: functions that are called as statements of their own, each with the condition under which the call is kept.
 HOOKS = {
     "addPosition": "POSITION",
     "addPositions": "POSITION",

@@ -1,4 +1,4 @@
-"""Definitions of functions that JavaScript lacks: polynomials for small arguments, else formulas with Math."""
+"""Definitions of functions that JavaScript lacks: polynomials for small arguments, otherwise formulas with Math."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def elliptic_definitions(names: Sequence[str]) -> list[str]:
 
 
 def _camel(name: str) -> str:
-    """Return a name in the case of JavaScript."""
+    """Return a name in camel case."""
     first, *others = name.split("_")
     return first + "".join(part.capitalize() for part in others)
 

@@ -19,7 +19,7 @@ from phigen.targets.js.loops import function
 from phigen.targets.js.printing import camel, key, properties, wrapped
 from phigen.targets.rendering import render
 
-#: A space at which no line is broken.
+#: A space at which lines are not broken.
 _FIXED = "\N{NO-BREAK SPACE}"
 
 
@@ -39,7 +39,7 @@ def tables(program: Program, step: Sweeps) -> str:
 
 
 def _facts(program: Program, step: Sweeps) -> dict[str, object]:
-    """Return the values of the template of public constants."""
+    """Return the values for the template of public constants."""
     return {
         "contents": [f" * {line}".rstrip() for line in _contents(program, step)],
         **facts(program, json.dumps, key, "null"),

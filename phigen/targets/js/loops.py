@@ -16,7 +16,7 @@ DIALECT = Dialect(
 
 
 def function(lowered: ir.Function, names: Iterable[str] = ()) -> str:
-    """Return the text of a function on memory; ``names`` are those of other functions in the file."""
+    """Return a function of the loop IR as text; ``names`` are those of other functions in the file."""
     head = f"function {camel(lowered.name)}({', '.join(lowered.parameters)}) {{"
     if not lowered.body:
         return "\n".join([*comment(lowered.doc), f"{head}}}"])

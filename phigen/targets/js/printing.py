@@ -12,7 +12,7 @@ from phigen.targets.header import plain, sentence
 from phigen.targets.language import Language
 from phigen.targets.reserved import JAVASCRIPT_RESERVED
 
-#: The widest line.
+#: Largest width of a line.
 WIDTH = 110
 
 LANGUAGE = Language(
@@ -24,7 +24,7 @@ LANGUAGE = Language(
 
 
 def wrapped(statement: str, indent: str = "  ") -> list[str]:
-    """Return a statement in lines of limited width, broken at any space: the statement contains no strings."""
+    """Return a statement in lines of limited width. It is broken at any space, so it must not contain strings."""
     deeper = f"{indent}  " if not indent else f"{indent}    "
     return textwrap.wrap(statement, WIDTH, initial_indent=indent, subsequent_indent=deeper, break_long_words=False)
 
@@ -49,5 +49,8 @@ def properties(parameters: Sequence[Parameter]) -> list[str]:
 
 
 def key(name: str) -> str:
-    """Return the name of a parameter as a key of an object; ``__proto__`` alone would set the prototype."""
+    """Return the name of a parameter as a key of an object.
+
+    ``__proto__`` is written as a computed key, since the plain key would set the prototype.
+    """
     return f'["{name}"]' if name == "__proto__" else name

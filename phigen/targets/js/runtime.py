@@ -1,10 +1,9 @@
-"""The runtime of a solver in JavaScript, assembled from the modules of `templates/js/runtime` for one system.
+"""The runtime of a solver in JavaScript, assembled for one system from the modules in `templates/js/runtime`.
 
-The modules are valid JavaScript; `phigen.targets.js.files` says which solvers have which, and which statements call
-functions that only some have. Lines ``// #if NAME`` or ``// #if !NAME``, ``// #else`` and ``// #endif`` include
-parts; in comments of several lines ``*`` replaces ``//``. ``// #state NAME`` is replaced by lines of
-`phigen.targets.js.state`, ``// #members NAME`` by the members of a class. Imports and exports between the modules are
-removed.
+The modules are valid JavaScript. `phigen.targets.js.files` has the conditions for modules and for calls of functions
+that only some solvers have. Lines ``// #if NAME`` or ``// #if !NAME``, ``// #else`` and ``// #endif`` select parts; in
+comments of several lines ``*`` replaces ``//``. ``// #state NAME`` is replaced by lines of `phigen.targets.js.state`,
+``// #members NAME`` by the members of a class. Imports and exports between the modules are removed.
 """
 
 from __future__ import annotations
@@ -21,12 +20,12 @@ from phigen.targets.policies import JAVASCRIPT
 _IMPORT = re.compile(r'import .* from "\./(\w+)\.mjs";')
 _DIRECTIVE = re.compile(r"\s*(?://|\*) #(if|else|endif)(?: (!?)(\w+))?")
 
-#: The modules whose classes are exported by the result.
+#: The modules whose exports remain in the result.
 PUBLIC = ("errors", "solver", "lattice")
 
 
 def assembled(modules: list[str], features: Mapping[str, bool], policies: Mapping[str, Policy]) -> str:
-    """Return the modules as one text, after the constants of the policies that they import."""
+    """Return the modules as one text, which begins with the constants of the policies that they import."""
     lines = {name: _lines(name, features) for name in modules}
     imported = {match[1]: None for each in lines.values() for line in each if (match := _IMPORT.fullmatch(line))}
     constants = [JAVASCRIPT.text(policies[name]) for name in imported if name in policies]
@@ -74,7 +73,7 @@ def _included(line: str, features: Mapping[str, bool]) -> list[str]:
 
 
 def _parts(line: str) -> tuple[str, str, str]:
-    """Return the indentation of a directive, with the beginning of a comment of several lines, and its two words."""
+    """Return the indentation of a directive (with the mark of a comment line), and its two words."""
     words = line.split()
     indent = line[: len(line) - len(line.lstrip())]
     if len(words) == 3 and words[0] in ("//", "*") and words[1] in ("#state", "#members"):

@@ -12,7 +12,7 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class Option:
-    """An option of the constructor: its name, its type in JSDoc, and its description, whose lines are separated."""
+    """Option of the constructor: name, type in JSDoc, and description of one or several lines."""
 
     name: str
     type: str
@@ -30,10 +30,10 @@ class Option:
 
 @dataclass(frozen=True)
 class StateFields:
-    """Fields of a solver that belong together; ``when`` is a condition on switches, empty for all solvers.
+    """Fields of a solver that belong together; ``when`` is a condition on switches, "" for all solvers.
 
-    ``fields`` are lines of the class, ``saved`` the names of those that a failing step restores. ``options`` are those
-    of the constructor; ``arguments`` are lines that describe arguments of a step.
+    ``fields`` are lines of the class. ``saved`` are the names of the fields that a failing step restores. ``options``
+    are options of the constructor, ``arguments`` lines that describe arguments of a step.
     """
 
     when: str = ""
@@ -43,7 +43,7 @@ class StateFields:
     arguments: tuple[str, ...] = ()
 
 
-#: In the order of the fields of the class.
+#: Blocks in the order of the fields of the class.
 SOLVER = (
     StateFields(
         options=(
@@ -157,7 +157,7 @@ SOLVER = (
 )
 
 
-#: Lattices: their options only.
+#: Blocks of lattices, which have options only.
 LATTICE = (
     StateFields(
         options=(
@@ -199,7 +199,7 @@ def _saved(blocks: list[StateFields], switches: Mapping[str, bool]) -> Iterator[
     yield f"const SAVED = [{names}];"
 
 
-#: The text that replaces ``#state NAME``, by NAME.
+#: Functions that return the lines for ``#state NAME``, by NAME.
 PARTS: Mapping[str, Callable[[list[StateFields], Mapping[str, bool]], Iterator[str]]] = {
     "fields": lambda blocks, _: (line for b in blocks for line in b.fields),
     "saved": _saved,
@@ -211,7 +211,8 @@ PARTS: Mapping[str, Callable[[list[StateFields], Mapping[str, bool]], Iterator[s
 
 
 def part(name: str, switches: Mapping[str, bool]) -> list[str]:
-    """Return the lines of one of `PARTS` for a solver; for lattices the name begins with ``lattice_``."""
+    """Return the lines of one of `PARTS` for a solver; names that begin with ``lattice_`` select the blocks of
+    lattices."""
     records = LATTICE if name.startswith("lattice_") else SOLVER
     blocks = [block for block in records if not block.when or holds(block.when, switches)]
     return list(PARTS[name.removeprefix("lattice_")](blocks, switches))

@@ -1,4 +1,4 @@
-"""The text of steps in JavaScript, one record for each kind; `phigen.targets.js.emitter` puts it into modules."""
+"""The text of steps in JavaScript, one record for each kind. `phigen.targets.js.emitter` puts it into modules."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from phigen.targets.rendering import render
 class StepModule:
     """The text of one kind of step.
 
-    ``constants`` stand before the kernels and ``series`` after them; ``kernels`` are those that the runtime calls, for
-    which the kernels of attitudes may stand in. `phigen.targets.js.files` has the parts of the runtime.
+    ``constants`` precede the kernels, ``series`` follow them. ``kernels`` are those that the runtime calls; kernels of
+    attitudes may replace some of them. The runtime of each kind is listed in `phigen.targets.js.files`.
     """
 
     kernels: Callable[[Program, Any], Sequence[Kernel | None]]
@@ -31,7 +31,7 @@ class StepModule:
 
 
 def _implicit(step: Newton | Path) -> list[str]:
-    """The constants of an inner solve, and those of a path, which are 0 elsewhere."""
+    """Return the constants of an inner solve, and those of a path, which are 0 for other steps."""
     path, varied = step.path, step.varied_path
     return [
         render(
@@ -57,7 +57,7 @@ def _path_series(program: Program, step: Path) -> list[str]:
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
-    """The recurrences of a path, or of one with its variation."""
+    """Return the recurrences of a path, or of a path with its variation."""
     blocks = PathFunctions(program, path, PathLayout()).blocks()
     lines = {name: [line.removeprefix("  ") for line in statements(function)] for name, function in blocks.items()}
     return render("js", "path.mjs", {**lines, "kind": kind})
@@ -72,7 +72,7 @@ def _explicit_kernels(program: Program, step: Explicit) -> Sequence[Kernel | Non
 
 
 def _collocation(program: Program, step: Gauss) -> list[str]:
-    """The coefficients of a Gauss method."""
+    """Return the coefficients of a Gauss method."""
     table = step.tableau
     values = {
         "unknowns": step.unknowns,
@@ -88,7 +88,7 @@ def _collocation(program: Program, step: Gauss) -> list[str]:
 
 
 def _schedule(step: Splitting, attitude: Attitude | None) -> list[str]:
-    """The flows of a step, and their times."""
+    """Return the flows of a step, and the times of the flows."""
     schedule = step.schedule
     values = {
         "times": json.dumps(schedule.times),

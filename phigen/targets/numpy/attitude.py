@@ -42,7 +42,7 @@ def pieces(program: Program, attitude: Attitude) -> list[str]:
 
 def _turn_of_stage(attitude: Attitude, solved: str, *, collocates: bool) -> str:
     """Return the expression of the attitude increment of a stage, minus the identity."""
-    if collocates:  # the kernel is one of unknowns, whose axis is the first
+    if collocates:  # the first axis of the kernel's input is that of the unknowns
         return f"np.stack(_turn(stage[0], np.sum({solved}, axis=-1)), axis=-1)"
     turn = "_along(solved)" if attitude.along else f"_turn(stage[0], x + {solved})"
     return f"_of_covector({turn})" if attitude.group.matrices and not attitude.cayley else turn
@@ -58,7 +58,7 @@ def _shaped(rows: int, position: bool) -> str:
 
 
 def _ordered(spatial: bool) -> dict[str, str]:
-    """Return the factors of products in order: later ones are on the left if momenta are in space coordinates."""
+    """Return the factors of products in order: later factors are on the left if momenta are in space coordinates."""
     pairs = {
         "uniform_first": ("first", "_uniform(rate, t)"),
         "element_first": ("first", "element"),

@@ -16,7 +16,7 @@ from phigen.targets.rendering import render
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """Return the file name and its contents."""
+    """Return the file name with its contents."""
     body = _body(program)
     return {f"{program.name}.py": sealed(header_lines(program, command), body, "# ", "", "")}
 
@@ -64,7 +64,7 @@ def _body(program: Program) -> str:
 
 
 def _monitor(program: Program) -> list[str]:
-    """Return the functions that compute the physical time of steps, [] without a monitor."""
+    """Return the functions that compute the physical time of steps; [] without a monitor."""
     if not program.monitor:
         return []
     kernels = [k for k in (program.monitor.elapsed, program.monitor.rate) if k]
@@ -91,12 +91,12 @@ def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
 
 
 def _with_level(prepare: Kernel) -> Kernel:
-    """Return the transpose of ``prepare`` with a second result, which is empty without an energy level e."""
+    """Return the transpose of ``prepare`` with a second result: the cotangent of the energy level e, or nothing."""
     return replace(prepare, outputs=(*prepare.outputs, Output("gauge_bar", ()))[:2])
 
 
 def _of_pullback(program: Program, step: Step) -> dict[str, object]:
-    """Return the values of the templates of the reverse pass."""
+    """Return the values for the templates of the reverse pass."""
     rows = len(step.flow_schedule.times) if step.flow_schedule else 1
     moment = ", t0 + done * h, h" if step.flow_schedule else ""
     said = "the e of a trajectory follows x0\n    and the parameters, unless a gauge is given."

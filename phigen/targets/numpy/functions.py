@@ -1,4 +1,5 @@
-"""Definitions of functions that NumPy lacks: polynomials for small arguments, else formulas of NumPy's functions."""
+"""Definitions of functions that NumPy lacks: polynomials for small arguments, otherwise formulas with functions of
+NumPy."""
 
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ def called(program: Program) -> list[str]:
 
 
 def _exponentials(program: Program) -> list[str]:
-    """Return the matrix exponential, [] if ``prepare`` does not call it."""
+    """Return the matrix exponential; [] if ``prepare`` does not call it."""
     if not special.largest_exponential(program):
         return []
     values = {"adjoint": special.transposes_exponentials(program), **special.exponential_constants()}

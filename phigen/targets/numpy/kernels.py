@@ -18,7 +18,7 @@ from phigen.targets.numpy.loops import statements
 
 
 def function(program: Program, kernel: Kernel) -> str:
-    """Return a kernel as a function of arrays with any number of axes before that of the coordinates."""
+    """Return a kernel as a function of arrays, which may have any number of axes before that of the coordinates."""
     if kernel.exponents:
         return _through_exponentials(program, kernel, kernel.exponents)
     arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
@@ -33,7 +33,7 @@ def function(program: Program, kernel: Kernel) -> str:
 
 
 def over_states(function: ir.Function) -> ir.Function:
-    """Return the declarations of a kernel for arrays of states, whose last axis is that of the coordinates.
+    """Return a kernel's function rewritten for arrays of states, whose last axis is that of the coordinates.
 
     Parameters are in a dictionary. Functions of NumPy return the stored values in lists.
     """
@@ -51,7 +51,10 @@ def over_states(function: ir.Function) -> ir.Function:
 
 
 def _through_exponentials(program: Program, kernel: Kernel, inner: Kernel) -> str:
-    """Return the transpose of a kernel with matrix exponentials: functions of the matrices and of their cotangents."""
+    """Return the transpose of a kernel with matrix exponentials.
+
+    It consists of functions for the matrices and for their cotangents.
+    """
     outer = replace(kernel, name=f"{kernel.name}_of_exponents", exponentials=(), exponents=None)
     names = {i: "parameters" if i == "params" else i for i in kernel.inputs}
     matrices = f"_{inner.name}({', '.join(names[i] for i in inner.inputs)})"
@@ -87,7 +90,7 @@ def _result(program: Program, kernel: Kernel, values: Mapping[str, Sequence[str]
 
 
 def _state(kernel: Kernel) -> str:
-    """Return the argument that holds states (..., DIM), whose shape results have; "" if there is none."""
+    """Return the argument that holds states (..., DIM) and determines the shape of results; "" if there is none."""
     others = [a for a in kernel.inputs if a not in (TABLE, "params", "gauge", *SCALARS)]
     return next((a for a in others if kernel.inputs[a] and not isinstance(kernel.inputs[a][0], Symbol)), "")
 

@@ -1,4 +1,4 @@
-"""A lattice as a Python module: kernels work on whole arrays over the sites."""
+"""A lattice as a Python module, whose kernels work on whole arrays over the sites."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from phigen.targets.numpy.loops import function
 from phigen.targets.policies import PYTHON
 from phigen.targets.rendering import render
 
-#: The templates of implicit steps.
+#: Templates of implicit steps.
 _SERIES = ("lattice_series", "lattice_predictors", "lattice_newton")
 
 
 def body(program: Program, step: Sweeps, prepare: str) -> str:
-    """Return the text of the module; ``prepare`` are the functions that compute coefficients."""
+    """Return the text of the module; ``prepare`` is the text of the functions that compute coefficients."""
     values: dict[str, object] = {
         **facts(program, listed, quoted, "None"),
         **lattice_values.tables(program, step, listed),
@@ -44,7 +44,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     values["equation"] = step.equation is not None
     values["adjoint"] = step.adjoint is not None
     flows = "(part, _), _ in sites.schedule" if step.by_colour else "part, _ in SCHEDULE"
-    swept = f"sum(len(PARTS[part]) for {flows})" if any(step.parts) else "1"  # even if no field changes, not 0
+    swept = f"sum(len(PARTS[part]) for {flows})" if any(step.parts) else "1"  # not 0, even if no field changes
     values["of_step"] = "2 * len(SCHEDULE)" if step.equation else swept
     values["extremes"] = any(ends.extremes for ends in step.others.observed.ends)
     values["pairs"] = step.partners is not None and not graph
@@ -68,7 +68,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
 
 
 def _of_bodies(step: Sweeps) -> dict[str, object]:
-    """Return the values of templates for bodies in relative coordinates."""
+    """Return the values for templates of bodies in relative coordinates."""
     relative = step.relative
     if not relative:
         return {"relative": False}
@@ -83,7 +83,8 @@ def _of_bodies(step: Sweeps) -> dict[str, object]:
 
 
 def _reductions(program: Program) -> dict[str, object]:
-    """Return the rows of observables by the method of arrays that reduces them, and those that are means of bonds."""
+    """Return the indices of observables by the array method that reduces them, and the observables that are means
+    over bonds."""
     reductions = program.observables.reductions
     methods = ["mean" if r.kind == "mean" and r.over == "sites" else r.kind.replace("mean", "sum") for r in reductions]
     rows = {m: [k for k, method in enumerate(methods) if method == m] for m in dict.fromkeys(methods)}
@@ -98,7 +99,7 @@ def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]], suffix: st
 
 
 def _functions(loops: LatticeLoops) -> Iterator[str]:
-    """Yield the functions of all kernels, preceded by sums over bonds or pairs."""
+    """Yield the functions of all kernels; sums over bonds or pairs come first."""
     step, lowering = loops.step, WholeArrays(loops)
 
     def summed(gather: Gather) -> ir.Function:
@@ -124,7 +125,8 @@ def _functions(loops: LatticeLoops) -> Iterator[str]:
 
 
 def _transposes(loops: LatticeLoops, lowering: WholeArrays, kernels: Mapping[str, Kernel]) -> Iterator[str]:
-    """Yield the transposes of all sweeps, or of the kernels of an equation, and the list of those of each part."""
+    """Yield the transposes of all sweeps, or of the kernels of an equation, then the list of the transposes of each
+    part."""
     step = loops.step
 
     def swept(sweep: Sweep) -> ir.Function:

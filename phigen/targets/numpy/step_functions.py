@@ -1,4 +1,4 @@
-"""The text of steps in NumPy, one record for each kind; `phigen.targets.numpy.emitter` puts it into modules."""
+"""The text of steps in NumPy, one record for each kind. `phigen.targets.numpy.emitter` puts it into modules."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from phigen.targets.rendering import render
 
 
 class _PathOverMembers(PathLayout):
-    """The places of the values of a path: columns of arrays over members, and lists of the orders of a series."""
+    """Places of the values of a path: columns of arrays over members, and lists of the orders of a series."""
 
     def covector(self, i: int) -> ir.Value:
         """Return component i of p."""
         return ir.Entry(ir.fixed("p"), ir.Several((ir.fixed(":"), ir.Constant(i))))
 
     def fixed(self, i: int) -> ir.Value:
-        """Return value i of those that are constant along a path."""
+        """Return value number i among those that are constant along a path."""
         return ir.fixed(f"f{i}")
 
     def following(self, i: int, k: ir.Value, value: ir.Value) -> ir.Statement:
-        """Return the statement that appends coefficient k; the first ones are arrays, not numbers."""
+        """Return the statement that appends coefficient k. The first coefficients are made arrays, not numbers."""
         first = k == ir.Constant(0)
         return ir.Append(self.series(i), ir.Binary("+", value, ir.Constant(0.0)) if first else value)
 
@@ -46,7 +46,7 @@ def _path_lines(program: Program, path: Recurrences) -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class StepPart:
-    """Kernels, the templates that use them, and further values of these templates."""
+    """Kernels, the templates that use them, and additional values for these templates."""
 
     kernels: Sequence[Kernel | None] = ()
     templates: Sequence[str] = ()
@@ -57,7 +57,7 @@ class StepPart:
         return [function(program, kernel) for kernel in self.kernels if kernel]
 
     def rendered(self, program: Program, prefix: str = "") -> list[str]:
-        """The templates, whose names begin with a prefix."""
+        """Return the rendered templates, whose names begin with ``prefix``."""
         values = {**values_of(program), **self.values}
         return [render("numpy", f"{prefix}{part}.py", values) for part in self.templates]
 
@@ -66,8 +66,8 @@ class StepPart:
 class StepFunctions:
     """The functions of one kind of step: a stage, its tangent map, and its transpose.
 
-    ``adjoint`` has the kernels that the transpose needs beside its own. With ``chained`` the transpose of a step starts
-    from that of the step after.
+    ``adjoint`` has the additional kernels that the transpose needs. ``chained`` says that the transpose of a step
+    starts from that of the following step.
     """
 
     stage: Callable[[Program, Any], StepPart]
@@ -121,7 +121,10 @@ def _path_adjoint(program: Program, step: Path) -> StepPart:
 
 
 def _varied(program: Program, step: Path, adjoint: PathAdjoint) -> dict[str, object]:
-    """A path with its derivatives along its start, p and the coefficients that π depends on, column by column."""
+    """Return the recurrences of a path with its derivatives, column by column, as template values.
+
+    The derivatives are with respect to its start, p, and the coefficients that π depends on.
+    """
     path, slopes, n = step.recurrences, adjoint.slopes, program.dimension
     whole = Recurrences((*path.series, *slopes.series), path.slopes, (*path.fixed, *slopes.fixed))
     along_p = [(e.row, n + e.column, e.series, True) for e in slopes.tensor]
@@ -217,5 +220,5 @@ STEP_FUNCTIONS: Mapping[str, StepFunctions] = {
 
 
 def functions_of(program: Program) -> StepFunctions:
-    """The record of the step of a program. Raises `KeyError` for a lattice."""
+    """Return the record for the step of a program. Raises `KeyError` for a lattice."""
     return STEP_FUNCTIONS[program.step.kind.name]

@@ -1,4 +1,4 @@
-"""Values that several templates of NumPy modules share."""
+"""Values that several templates of NumPy modules use."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ _OF_TAU = """
 
 
 def values_of(program: Program) -> dict[str, object]:
-    """Return all shared values of a program."""
+    """Return all values of a program that templates share."""
     said = {"title": plain(program.about.title) or program.name, **facts(program, listed, quoted, "None")}
     policies = {name: PYTHON.text(policy) for name, policy in policies_of(program).items()}
     return {**said, **policies, **_of_fixed(program), **_of_time(program), **_of_noise(program), **_of_step(program)}
 
 
 def _of_fixed(program: Program) -> dict[str, object]:
-    """Return the values for gauges, energy levels, steps in tau, and runs between correctors."""
+    """Return the values on gauges, energy levels, steps in tau, and runs between correctors."""
     corrected = program.step.corrected
     return {
         "gauge": listed(program.held),
@@ -49,13 +49,14 @@ def _of_fixed(program: Program) -> dict[str, object]:
 
 
 def _of_gauge(program: Program) -> str:
-    """Return the sentence on the gauge; steps to truncation are Poisson maps for none."""
+    """Return the sentence on the gauge. Steps to truncation are not Poisson maps for any gauge, and the sentence
+    says so."""
     said = _OF_LEVEL if program.monitor else _OF_GAUGE
     return said.partition(":")[0] + "." if program.truncated else said
 
 
 def _of_time(program: Program) -> dict[str, object]:
-    """Return the arguments and sentences on the time, empty if H does not depend on it."""
+    """Return the arguments and sentences on the time; they are empty if H does not depend on the time."""
     time = bool(program.time)
     return {
         "time": time,
@@ -69,7 +70,7 @@ def _of_time(program: Program) -> dict[str, object]:
 
 
 def _of_step(program: Program) -> dict[str, object]:
-    """Return the values for the kind of step, its coefficients and stages, and the iteration that solves it."""
+    """Return the values on the kind of step, its coefficients and stages, and its iteration."""
     step = program.step
     inner, schedule = step.inner_solve or InnerSolve(), step.flow_schedule
     longest = PathPolicy().longest_path

@@ -1,11 +1,11 @@
-"""The transpose of a step of a lattice in C: loops that pull cotangents back through its sweeps.
+"""The transpose of a step of a lattice in C: loops that propagate cotangents backwards through its sweeps.
 
 The reverse pass of a sweep has two traversals, so that every site writes only its own elements, for any number of
 threads. In the first, each site computes its contributions to the cotangents of all values that it has read. It adds
-contributions to its own cotangents at once, and stores contributions to other sites in arrays, one for each
-``handed`` value. In the second, each site adds the contributions stored for it. On grids the second traversal is
-merged with the first one of the flow before, see `layout.takes`. The kernels of the equation of a stage are treated
-alike, see `stage_kernels`.
+contributions to its own cotangents, and stores contributions to other sites in arrays, one for each ``handed`` value.
+In the second, each site adds the contributions stored for it. On grids the second traversal can be merged with the
+first one of the next flow of the reverse pass; see `phigen.scheme.sweep_facts.takes`. The kernels of the equation of a
+stage are treated likewise; see `stage_kernels`.
 """
 
 from __future__ import annotations
@@ -65,7 +65,8 @@ from phigen.targets.c.real import rendered
 
 @dataclass(frozen=True)
 class Back:
-    """The reverse pass of a part, or of a kernel: its ``loops``, and the calls for each row segment in two traversals.
+    """The reverse pass of a part of H or of a kernel: its ``loops``, and the calls for a row segment in both
+    traversals.
 
     ``handed`` is the number of arrays that sites pass to other sites; ``recomputed`` are the fields that the inverse
     flow recomputes.
@@ -80,14 +81,14 @@ class Back:
 
 @dataclass(frozen=True)
 class _Pulled:
-    """A transposed kernel of a ``sweep``, or of a stage, and the place of its cotangents.
+    """A transposed kernel of a ``sweep`` or of a stage, and the place of its cotangents.
 
-    The cotangents of its values are symbols of the kind ``seed``. They are in the arrays of cotangents with the numbers
-    ``bars``, or if these are empty in the variation of the row. ``gather`` has the sums that it reads; ``ends`` are the
-    kernels of these, with the parameters that have the opposite sign seen from b, and their transposes. ``before`` are
-    statements for a row segment before its calls. The fields ``recomputed`` are recomputed by the kernel, or by another
-    one from sums that the transposes over bonds or pairs compute. The cotangents that the flow after it passes are
-    ``taken``.
+    The cotangents of the kernel's values are symbols of the kind ``seed``. They are in the arrays of cotangents
+    numbered ``bars`` or, if ``bars`` is empty, in the variation of the row. ``gather`` has the sums that the kernel
+    reads; ``ends`` are the kernels of these sums, with the parameters that have the opposite sign as seen from b, and
+    their transposes. ``before`` are statements that a row segment executes before the calls. The fields ``recomputed``
+    are recomputed by this kernel, or by another one from sums that the transposes over bonds or pairs compute.
+    ``taken`` are the cotangents that the flow after it passes on.
     """
 
     kernel: Kernel
@@ -103,7 +104,7 @@ class _Pulled:
 
 
 def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
-    """The loops, and those that make the reverse pass of each part, or kernel of the equation of a stage."""
+    """Return the loops, and the functions that make the reverse pass of each part or of each kernel of a stage."""
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
     texts = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
     texts += [function(program, adjoint.refresh)] if adjoint.refresh else []
@@ -118,7 +119,8 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
 
 
 def handed_by(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
-    """List the cotangents that a kernel passes to neighbours, in arrays from the first on; equal values share one."""
+    """Return the cotangents that a kernel passes to neighbours, in arrays numbered from ``first`` on; equal values
+    share an array."""
     arrays: dict[int, int] = {}
     contributions = []
     for name, value in kernel.along("site"):
@@ -134,7 +136,7 @@ _ARRAYS = {name: member(name, ir.fixed(name)) for name in ("x", "bar", "handed",
 
 @dataclass(frozen=True)
 class _Reverse(RowLoops):
-    """The reverse pass of one lattice; ``kernels`` are the transposes by their names."""
+    """The reverse pass of one lattice; ``kernels`` are the transposes by name."""
 
     rows: Rows
     kernels: Mapping[str, Kernel]
@@ -186,7 +188,7 @@ class _Reverse(RowLoops):
         return commented(build.driver(name, title, parameters, [*cases.values()], [*cases], vectors=True), self.program)
 
     def of_parts(self) -> Iterator[Back]:
-        """Yield the two traversals of all sweeps of each part; one traversal if the next flow adds the
+        """Yield the traversals of all sweeps of each part; there is only one if the next flow adds the
         contributions."""
         program, layout, step = self.program, self.layout, self.layout.step
         recomputed, back = can_recompute_fields(program, step), transposes(program, step)
@@ -227,7 +229,7 @@ class _Reverse(RowLoops):
             yield replace(both, first=(*both.first, *copied), second=second)
 
     def of_equation(self) -> Iterator[Back]:
-        """Yield the two traversals of each kernel of the reverse pass of a stage; the first computes the sums."""
+        """Yield both traversals of each kernel of the reverse pass of a stage; the first one computes the sums."""
         layout, fields, gather = self.layout, self.program.coordinates, self.layout.partners.field
         transposed = [
             restricted(layout.step.sites, fields, self.kernels[of + BACK], outputs, name)
@@ -246,8 +248,11 @@ class _Reverse(RowLoops):
             yield self._transpose_traversals(name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
     def _transpose_traversals(self, name: str, whom: str, pulled: Sequence[_Pulled], *, apart: bool = True) -> Back:
-        """Return the traversals of some kernels; the second is called ``name`` if it is not merged with the next
-        first one (``apart``)."""
+        """Return the traversals of some kernels.
+
+        Unless ``apart``, the second traversal is merged with the first traversal of the next flow; otherwise it is
+        called ``name``.
+        """
         layout, loops = self.layout, list[ir.Function]()
         first, second = list[ir.Statement](), list[ir.Statement]()
         beside, arrays = list[Handed](), 0
@@ -259,7 +264,7 @@ class _Reverse(RowLoops):
             return ir.Call(loop.name, (*[COEF] * coefficients, at(sites), of_segment))
 
         def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], recomputed: Sequence[str]) -> ir.Block:
-            """Return the calls of a kernel, in each form."""
+            """Return the calls of a kernel, for each form of functions."""
             sums, blocks = one.gather.names if one.gather else (), dict[str, ir.Block]()
             on_sites = self.sites.transposed(kernel, one.gather, one.sweep, recomputed)
             summed = len(sums) * any(o.name == "gathered_bar" for o in kernel.outputs)
@@ -296,13 +301,14 @@ class _Reverse(RowLoops):
         return Back(tuple(loops), tuple(first), tuple(second), arrays, tuple(recomputed))
 
     def _cleared(self, handed: Sequence[Handed]) -> Iterator[ir.Statement]:
-        """Clear the arrays of contributions to other sites, if loops omit some of the sites."""
+        """Yield the statements that clear the arrays of contributions to other sites, if loops omit some of the
+        sites."""
         for array in sorted({h.array for h in handed}):
             row = self.row_drivers.first_of_row(_HANDED, array)
             yield ir.Clear(row, BEGIN, ir.Binary("-", STOP, BEGIN))
 
     def _ends_back(self, gather: Gather | None) -> Iterator[tuple[Ends, frozenset[str], Kernel]]:
-        """Yield the loops over bonds or pairs of a gather, see `over_ends`, and their transposes."""
+        """Yield the loops over bonds or pairs of a gather, as in `over_ends`, and their transposes."""
         for (ends, opposite), first in zip(over_ends(gather), gather.ends, strict=False) if gather else ():
             yield ends, opposite, replace(self.kernels[first.kernel.name + BACK], name=ends.kernel.name + BACK)
 
@@ -342,20 +348,20 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
 
 
 def _values_read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
-    """The fields, and parameters, whose values before a sweep some transposed kernel reads."""
+    """Return the fields and parameters whose values before a sweep are read by a transposed kernel."""
     used = {s for kernel in kernels for s in {*kernel.inputs.get("site", ())} & {*symbols_of(*kernel.roots)}}
     return {(step.sites.ends.get(s) or step.sites.places[s])[0] for s in used}
 
 
 def _sums(program: Program, step: Sweeps) -> str:
-    """The number of sums of each row segment, in C."""
+    """Return the number of sums of each row segment, as C."""
     if step.equation and step.partners:
         return f"(int){program.name}_COEFFICIENTS + {program.name}_NUMBERS"
     return f"{program.name}_COEFFICIENTS"
 
 
 def _parameter_functions(program: Program, step: Sweeps, layout: Layout) -> str:
-    """Return the functions that add the derivatives by parameters to those of the caller."""
+    """Return the functions that add the derivatives with respect to parameters to those of the caller."""
     bars = {p: layout.bar(p) for p in (*step.sites.parameters, *step.sites.at_bonds)}
     added = sums_of_derivatives(program.parameters, members(program), bars)
     return "\n".join(commented(one, program) for one in added)

@@ -24,16 +24,17 @@ from phigen.scheme.sweep_inverse import can_recompute_fields
 from phigen.targets import lattice_values
 from phigen.targets.c.language import members
 
-#: Number of differences in the predictors of all stages: more gain little, and each is an array over sites.
+#: Largest number of differences in the predictors of all stages together. More differences gain little, and each is an
+#: array over sites.
 MOST_REMEMBERED = 14
 
 
 @dataclass(frozen=True)
 class Layout(RowLayout):
-    """The rows of a lattice: ``halo`` is the number of sites copied beside a row."""
+    """The memory layout of rows of a lattice; ``halo`` is the number of sites copied at each end of a row."""
 
     halo: int = 0
-    slopes: bool = True  # whether the code has kernels of variations, or takes differences of sweeps
+    slopes: bool = True  # whether the code has kernels of variations; otherwise it takes differences of sweeps
 
     @property
     def program(self) -> Program:
@@ -46,17 +47,17 @@ class Layout(RowLayout):
         return self.lattice.step
 
     def bar(self, array: str) -> int:
-        """The number of the cotangents of a field, or of a parameter at sites or bonds."""
+        """Return the number of the array of cotangents of a field, or of a parameter at sites or bonds."""
         return [*self.lattice.arrays, *self.step.sites.at_bonds].index(array)
 
     @property
     def partners(self) -> Partners:
-        """Bonds or pairs, with their variations if these are computed; None without bonds or pairs."""
+        """The sums over bonds or pairs, with their variations if these are computed; None without bonds or pairs."""
         partners = self.step.others
         return partners if self.slopes else replace(partners, varied=Gather((), ()))
 
     def gathered(self, kernel: Kernel) -> Gather:
-        """Return the sums over bonds or pairs that a kernel of the equation of a stage reads."""
+        """Return the sums over bonds or pairs that a kernel of a stage reads."""
         return self.partners.varied if kernel.reads_variations else self.partners.field
 
     @property
@@ -66,12 +67,12 @@ class Layout(RowLayout):
 
     @property
     def sums_up(self) -> bool:
-        """Whether observables at a site sum over bonds in their own loops: if no stage needs these sums."""
+        """Whether observables at a site sum over bonds in separate loops; this is so if no stage needs these sums."""
         return self.graph and self.step.equation is None
 
 
 def layout_of(program: Program, step: Sweeps) -> Layout:
-    """The layout of a lattice."""
+    """Return the layout of a lattice."""
     lattice, sites = LatticeLoops(program, step), step.sites
     offsets = [offset for _, offset in sites.places.values()]
     offsets += [tuple(map(int, s.key[1:])) for s in lattice.seams]
@@ -87,7 +88,7 @@ def _banded(program: Program, step: Sweeps) -> bool:
 
 
 def switches(layout: Layout) -> dict[str, bool]:
-    """The switches of the runtime for lattices."""
+    """Return the switches of the runtime for lattices."""
     program, step = layout.program, layout.step
     banded, weights = _banded(program, step), layout.lattice.weights
     return lattice_values.switches(step) | {

@@ -1,4 +1,4 @@
-"""Kernels of lattices in C, as loops over the sites of a row: the passes that make them, in their order."""
+"""Kernels of lattices in C, as loops over the sites of a row, and the order of the passes that make them."""
 
 from __future__ import annotations
 
@@ -26,19 +26,20 @@ from phigen.targets.c.layout import comment
 from phigen.targets.c.loops import function
 from phigen.targets.header import plain, sentence
 
-#: The name of a part of H.
+#: Pattern of the name of a part of H.
 _PART = re.compile(r"\bH_\d+")
 
-#: Doubles in the buffer of the densities of observables, unless there are more observables: two pages, a quarter of the
-#: L1 cache.
+#: Number of doubles in the buffer of the densities of observables, unless there are more observables: two pages, a
+#: quarter of the L1 cache.
 _BUFFER = 1024
 
-#: Versions of elementary functions by the forms of a function, see `phigen.ir.passes.forms`.
+#: Versions of elementary functions by form; see `phigen.ir.passes.forms`.
 Forms = Mapping[str, Mapping[str, str]]
 
 
 def printed(program: Program, loop: ir.Function, purposes: Iterable[str] = (), *, inline: bool = True) -> str:
-    """Return the C function of a loop below a comment: the purposes of all equal loops, by default its own."""
+    """Return the C function of a loop with a comment: the purposes of all loops of equal code, by default its own
+    purpose."""
     sentences = [plain(sentence(purpose)) for purpose in _merged_purposes(purposes or (loop.doc,))]
     lines = [line for text in sentences for line in comment(text, "   ")]
     lines[0] = f"/* {lines[0].strip()}"
@@ -46,7 +47,7 @@ def printed(program: Program, loop: ir.Function, purposes: Iterable[str] = (), *
 
 
 def _merged_purposes(purposes: Iterable[str]) -> Iterator[str]:
-    """Yield the purposes of a loop, with the parts of H that have the same purpose in one sentence."""
+    """Yield the purposes of a loop; parts of H with the same purpose are named in one sentence."""
     grouped: dict[str, dict[str, None]] = {}
     for purpose in purposes:
         part, _, manner = purpose.rpartition(": ")
@@ -58,7 +59,7 @@ def _merged_purposes(purposes: Iterable[str]) -> Iterator[str]:
 
 
 def code(loop: ir.Function) -> tuple[tuple[str, ...], ir.Block]:
-    """Return the parameters and statements of a loop, which are equal for loops that do the same."""
+    """Return the parameters and statements of a loop. They are equal for loops with equal effect."""
     return loop.parameters, loop.body
 
 
@@ -80,21 +81,21 @@ class RowLoops:
 
     @property
     def fast(self) -> bool:
-        """Whether the code is to be fast rather than short."""
+        """Whether the code is optimised for speed, not for length."""
         return self.program.profile == "fast"
 
     @property
     def sites(self) -> LatticeLoops:
-        """The builder of the loops on the level of sites."""
+        """The builder of loops over sites, before their lowering to rows."""
         return self.layout.lattice
 
     @property
     def versions(self) -> Mapping[str, str]:
-        """The versions of functions in loops of one form: those for lanes, in short code full-range ones."""
+        """The versions of functions in loops with a single form: those for lanes, and in short code full-range ones."""
         return IN_LANES if self.fast else FULL_RANGE
 
     def forms(self, rows: Rows | None, loops: Iterable[ir.Function]) -> Forms:
-        """Return the forms to generate: suffixes of function names with versions of elementary functions.
+        """Return the forms to be generated: suffixes of function names, with versions of elementary functions.
 
         There are a small-argument and a full-range form if one of the ``loops`` needs both. Without ``rows`` there is
         one form.
@@ -104,7 +105,7 @@ class RowLoops:
         return forms_of(loops, rows.small_argument, rows.limited, self.versions)
 
     def after_passes(self, loop: ir.Function, form: str, versions: Mapping[str, str]) -> Iterator[ir.Function]:
-        """Yield the loop after the passes on the level of sites; fast code has another one for sites near open ends."""
+        """Yield the loop after the passes over sites. Fast code has a second loop, for sites near open ends."""
         doc = "as above, with full-range functions" if form == "_far" else loop.doc
         loop = replace(loop, name=loop.name + form, doc=doc)
         for part in divided_at_ends(loop) if self.fast else [loop]:
@@ -117,7 +118,7 @@ class RowLoops:
         return [row_loops.sweep(loop, self.layout, passed=not self.fast, compensated=compensated) for loop in loops]
 
     def stage(self, kernel: Kernel, form: str, versions: Mapping[str, str], *, adds: bool) -> list[ir.Function]:
-        """Return the loops of a kernel of the equation of a stage, which assign or add to the arrays of the row."""
+        """Return the loops of a kernel of a stage, which assign or add to the arrays of the row."""
         fields = self.program.coordinates
         outputs = [Symbol("out", f) for f in fields]
         if kernel.role is Role.OWN_SLOPE:
@@ -140,7 +141,7 @@ class RowLoops:
             yield over or row_loops.over_pairs(one, self.layout)
 
     def bond_arguments(self, ends: Ends, oriented: frozenset[str]) -> tuple[str, ...]:
-        """Return further arguments of short loops over bonds, so that several parts of H share a loop.
+        """Return additional arguments of short loops over bonds, with which several parts of H can share a loop.
 
         The arguments are the address of the parameters at bonds, the sign of the direction of bonds, and whether the
         sites of the chosen colour are at the other end of the bonds.
@@ -160,7 +161,7 @@ class RowLoops:
     ) -> Iterator[ir.Function]:
         """Yield the transposes of loops that sum over bonds or pairs; see `transposed_at_ends`.
 
-        The cotangents of the sums are in arrays from ``first`` on.
+        The cotangents of the sums are in the arrays numbered from ``first`` on.
         """
         places = self.layout.step.sites.ends
         for end, bonds, transpose in transposed_at_ends(places, ends, oriented, kernel, summed=summed):
@@ -180,7 +181,7 @@ class RowLoops:
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function that fills arrays over the sites with the values of a kernel.
 
-        Sums over bonds or pairs are computed before, or at each site if nothing else needs these sums.
+        Sums over bonds or pairs are computed before or, if nothing else needs them, at each site.
         """
         gather, several = self.layout.partners.sums_of(kernel), kernel.role is Role.OBSERVABLES
         apart = ir.Constant(share(kernel)) if several else row_loops.SITES

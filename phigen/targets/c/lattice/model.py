@@ -73,51 +73,56 @@ def declarations(program: Program, step: Sweeps) -> str:
 
 
 def _differences(program: Program) -> int:
-    """Number of differences of y − x in the predictor of a stage."""
+    """Return the number of differences of y − x in the predictor of a stage."""
     return max(1, min(LatticeSweepPolicy().differences, MOST_REMEMBERED // len(program.fractions)))
 
 
 def _gathered(layout: Layout) -> int:
-    """Sums over bonds or pairs that are stored for all sites at once."""
+    """Return the number of sums over bonds or pairs that are stored for all sites."""
     partners, swept = layout.partners, [sweep.gather for sweep in layout.step.sweeps if sweep.gather]
     seen = () if layout.sums_up else partners.gathers
     return max([1, *(len(g.names) for g in (*swept, *seen))])
 
 
 def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
-    """Arrays over the sites in the memory of a solver."""
+    """Return the number of arrays over the sites in the memory of a solver."""
     program, dimension, stage = layout.program, layout.program.dimension, 0
     if layout.step.equation:
-        stage = 2 if layout.slopes else 3  # y before and after a sweep, and varied
+        stage = 2 if layout.slopes else 3  # y before and after a sweep, and its variation
         stage += len(program.fractions) * _differences(program) * has["SWEEP_PREDICTORS"]
         stage += (
             has["BANDED"]
             + (LatticeNewtonPolicy().directions + 1 + (dimension + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]
         )
-        stage = stage * dimension + has["KRYLOV"]  # one for sums over pieces
+        stage = stage * dimension + has["KRYLOV"]  # plus an array for sums over row segments
     fields = dimension + 2 * dimension * has["COMPENSATED"]  # the state before a step, and compensation terms
-    fields += bool(layout.step.sites.seams)  # and the kinds of sites
-    fields += 2 * has["MONITOR"]  # densities, and the clock
-    if layout.step.relative and has["JACOBI"]:  # positions from the first body, and their variations
+    fields += bool(layout.step.sites.seams)  # plus an array for the kinds of sites
+    fields += 2 * has["MONITOR"]  # plus arrays for densities and the clock
+    if layout.step.relative and has["JACOBI"]:  # positions relative to the first body, and their variations
         fields += len(layout.step.relative.axes) * (1 + layout.program.extras.tangent)
     return len(layout.lattice.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
 
 
 def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
-    """The members of the struct of the derivatives along parameters."""
+    """Return the members of the struct of derivatives with respect to parameters."""
     declared = [f"double {'*' * (p.at != 'all')}{member[p.name]};" for p in program.parameters]
     return declared or ["char unused;"]
 
 
 def rows_of(step: Sweeps) -> int:
-    """Rows of coefficients: one for each flow and, if these are merged, one for the last flow with the first of the
-    next step."""
+    """Return the number of rows of coefficients.
+
+    There is one row for each flow. If the last flow is merged with the first of the next step, there is one more.
+    """
     return len(step.schedule.times) if step.equation else len(_flows(step))
 
 
 def _flows(step: Sweeps) -> list[tuple[int, int]]:
-    """The flows of a step. Without noise, the first flow occurs once more: merged with the last of the step before.
-    With noise, each flow has its own increments. Flows before and after a run come last."""
+    """Return the flows of a step.
+
+    Without noise, the first flow occurs once more, merged with the last flow of the step before. With noise, flows are
+    not merged, since each has different increments. Flows before and after a run come last.
+    """
     flows = step.schedule.flows
     if step.corrected:
         return [*flows, *step.schedule.begin, *step.schedule.end]
@@ -125,7 +130,7 @@ def _flows(step: Sweeps) -> list[tuple[int, int]]:
 
 
 def _by_flow(step: Sweeps, values: Sequence[float], joined: float) -> list[float]:
-    """The values of the rows of the schedule for each flow; the last is for merged flows."""
+    """Return the values of the rows of the schedule for each flow; the last one, ``joined``, is for merged flows."""
     by_flow = [values[row] for _, row in _flows(step)]
     return by_flow if step.sites.increments or step.corrected else [*by_flow[:-1], joined]
 
@@ -143,7 +148,7 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
 
 
 def model(program: Program, step: Sweeps) -> str:
-    """Tables, and functions called before the steps."""
+    """Return the tables, and the functions that are called before the steps."""
     layout = layout_of(program, step)
     has = switches(layout)
     values = {
@@ -169,7 +174,7 @@ def model(program: Program, step: Sweeps) -> str:
 
 
 def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, int, str]]:
-    """Yield the constants of the C file: names, values and comments."""
+    """Yield the constants of the C file: name, value and comment."""
     program, step, sites, several = layout.program, layout.step, layout.step.sites, not layout.single_row
     if densities := program.observables.named:
         yield "SHARE", share(densities), "sites whose densities of observables are computed in one go"
@@ -222,7 +227,8 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
 
 
 def _tables_of_sites(layout: Layout, has: Mapping[str, bool]) -> dict[str, object]:
-    """Tables that are the same in all steps: the shape of the lattice, the neighbours that kernels read, the sweeps."""
+    """Return the tables that are the same in all steps: the shape of the lattice, the neighbours that kernels read,
+    the sweeps."""
     step, sites, several, fields = layout.step, layout.step.sites, not layout.single_row, layout.program.coordinates
     stages = [_braced(step.stage(k, fields)) for k in range(len(step.parts))] if has["BY_HAND"] else []
     return {
@@ -244,7 +250,7 @@ def _tables_of_sites(layout: Layout, has: Mapping[str, bool]) -> dict[str, objec
 
 
 def _tables_of_flows(step: Sweeps) -> dict[str, object]:
-    """Tables with an entry for each flow."""
+    """Return the tables with an entry for each flow."""
     schedule = step.schedule
     joined = schedule.times[schedule.flows[0][1]] + schedule.times[schedule.flows[-1][1]]
     multiples = _by_flow(step, schedule.multiples, schedule.multiples[0]) if schedule.multiples else ()
@@ -259,12 +265,14 @@ def _tables_of_flows(step: Sweeps) -> dict[str, object]:
 
 
 def _moments(step: Sweeps) -> list[float]:
-    """The time at which time-dependent coefficients are evaluated, as a fraction of the step, for each row."""
+    """Return the times at which time-dependent coefficients are evaluated, as fractions of the step, one for each
+    row."""
     return _by_flow(step, step.schedule.moments, 0.0)
 
 
 def _reduction(reduction: Reduction) -> tuple[int, int]:
-    """Return the codes of the runtime for the reduction of an observable, and for the set that a mean is over."""
+    """Return the codes in the runtime for the reduction of an observable, and for the set over which a mean is
+    taken."""
     return REDUCTIONS.index(reduction.kind), OVER.index(reduction.over)
 
 

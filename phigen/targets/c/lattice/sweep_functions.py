@@ -1,4 +1,4 @@
-"""The parts of a step of a lattice in C: the loops over sites of each part."""
+"""The sweeps of a step of a lattice in C: the loops over sites of each part, and the functions that call them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from phigen.targets.c.loops import commented
 
 
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
-    """All kernels as loops over sites, and the loops of each part of H."""
+    """Return all kernels as loops over sites, and the functions that make the flow of each part of H."""
     layout = layout_of(program, step)
     loops, equation = RowLoops(layout), step.equation
     texts = [
@@ -71,7 +71,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
 
 
 def parameters(program: Program, step: Sweeps) -> str:
-    """Print the functions that copy parameters at sites and bonds to the arrays that loops read."""
+    """Return the functions that copy parameters at sites and bonds to the arrays that loops read."""
     arrays = layout_of(program, step).lattice.arrays
     listed = copies(program.parameters, members(program), arrays, step.sites.at_bonds)
     return "".join(commented(copy, program) + "\n" for copy in listed)
@@ -87,9 +87,9 @@ def drivers(loops: RowLoops) -> RowDrivers:
 class _Call:
     """Call of a loop for some sites of a row segment.
 
-    The loop reads the fields in another ``order`` and the parameters at ``bonds`` likewise, if these are not empty. The
-    record of the segment has the ``colour`` and the first kind of the ``window`` of a sweep. ``shared`` is the name of
-    the loop where several parts of H call it; the ``others`` do the same.
+    The loop reads the fields in the ``order``, and the parameters at bonds in the order ``bonds``, if these are not
+    empty. The record of the segment receives the ``colour`` and the first kind of the ``window`` of a sweep. ``shared``
+    is the name of the loop if several parts of H call it; ``others`` are equivalent loops.
     """
 
     loop: ir.Function
@@ -103,14 +103,14 @@ class _Call:
     others: tuple[_Call, ...] = ()
 
 
-#: The calls of the flow of a part of H, by the forms of functions; and the names of loops by their code.
+#: The calls of the flow of a part of H, by form of functions.
 Calls = dict[str, list[_Call]]
 Names = Mapping[tuple[tuple[str, ...], ir.Block], str]
 
 
 @dataclass(frozen=True)
 class _PartLoops:
-    """The loops and drivers of all parts of H; without ``rows`` these are derivatives."""
+    """The loops and drivers of all parts of H; without ``rows`` they are those of derivatives."""
 
     loops: RowLoops
     rows: Rows | None
@@ -118,16 +118,16 @@ class _PartLoops:
 
     @property
     def varied(self) -> bool:
-        """Whether the parts update variations."""
+        """Whether the parts update variations of fields."""
         return self.rows is None
 
     @property
     def by_part(self) -> bool:
-        """Whether each part has a driver of its own, which compilers make faster where rows are short."""
+        """Whether each part has a separate driver, which is faster for short rows."""
         return self.loops.fast and not self.loops.layout.single_row and not self.varied
 
     def texts(self) -> Iterator[str]:
-        """Yield the loops and the drivers; loops of equal code are one, whichever parts need them."""
+        """Yield the loops and the drivers; loops of equal code are printed once."""
         program, layout, step = self.loops.program, self.loops.layout, self.loops.layout.step
         calls_of_parts = [self._calls_of_part(part) for part in self.parts]
         alike = _alike(calls_of_parts)
@@ -176,9 +176,9 @@ class _PartLoops:
         return commented(drivers(self.loops).driver(name, title, ["coef", *["v"] * self.varied], [case]), program)
 
     def _calls_of_part(self, part: Sequence[Sweep]) -> Calls:
-        """Return the calls for a row segment that make the flow of a part of H, in each form.
+        """Return the calls for a row segment that make the flow of a part of H, for each form.
 
-        Short code has loops that also serve with the fields in another order.
+        Short code uses one loop for several orders of the fields.
         """
         layout, program = self.loops.layout, self.loops.program
         forms = self.loops.forms(self.rows, [self.loops.sites.sweep(sweep) for sweep in part])
@@ -188,7 +188,7 @@ class _PartLoops:
             calls_of_forms[form] = []
             for sweep in part:
                 calls = [*self._calls(sweep, form, versions)]
-                # transposes gather by loops of their own
+                # transposes gather with separate loops
                 for order in () if sweep.gather and layout.step.adjoint else tried:
                     other = turned(layout.step.sites, fields, order, sweep)
                     for k, call in enumerate(self._calls(other, form, versions) if other else ()):
@@ -198,7 +198,7 @@ class _PartLoops:
         return calls_of_forms
 
     def _calls(self, sweep: Sweep, form: str, versions: Mapping[str, str]) -> Iterator[_Call]:
-        """Yield the calls of the loops of a sweep, in their order for a row segment."""
+        """Yield the calls of the loops of a sweep, in their order in a row segment."""
         layout, program = self.loops.layout, self.loops.program
         meant = over_ends(sweep.gather) if sweep.gather else []
 
@@ -230,12 +230,12 @@ class _PartLoops:
             yield _Call(loop, sites, colour=colour, window=window, shared=shared + end)
 
     def _segment(self, k: int, forms: Mapping[str, Sequence[_Call]], names: Names) -> RowSegment:
-        """Return the statements of a part of H, where the loops have ``names`` by their code."""
+        """Return the statements of a part of H; ``names`` are the names of loops by their code."""
         layout, coloured = self.loops.layout, self.loops.layout.step.by_colour
         setup = [row_drivers.member("varied", ir.fixed("v"))] * self.varied
         setup += [row_drivers.member("chosen", row_drivers.FLOW)] * bool(coloured and coloured[k])
         near = [*_near_seams(layout, self.parts[k])] if self.by_part else []
-        if layout.step.relative:  # drivers of their own compute the sums
+        if layout.step.relative:  # separate drivers compute the sums
             names_of_sums = {e.kernel.name for s in self.parts[k] if s.gather for e in s.gather.ends}
             forms = {f: [c for c in called if c.loop.name not in names_of_sums] for f, called in forms.items()}
         calls = [call for called in forms.values() for call in called]
@@ -248,7 +248,7 @@ class _PartLoops:
 
 
 def _alike(calls_of_parts: Sequence[Calls]) -> dict[tuple[tuple[str, ...], ir.Block], list[_Call]]:
-    """Return the calls of all loops by the code that is printed for them.
+    """Return the calls of all loops, by the code that is printed for the loops.
 
     A call of a loop that another loop can replace becomes a call of that loop.
     """
@@ -264,7 +264,7 @@ def _alike(calls_of_parts: Sequence[Calls]) -> dict[tuple[tuple[str, ...], ir.Bl
 
 
 def _place(numbered: tuple[int, _Call]) -> tuple[str, bool]:
-    """Return the position of a loop in the code: a loop for sites near open ends follows the one for other sites."""
+    """Return the sort key of a loop in the code: a loop for sites near open ends follows that for other sites."""
     name = numbered[1].loop.name
     return name.removesuffix(NEAR_ENDS), name.endswith(NEAR_ENDS)
 
@@ -280,7 +280,7 @@ def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[ir.Statement]
 
 
 def _statements(called: Sequence[_Call], names: Names) -> Iterator[ir.Statement]:
-    """Yield the statements that call loops, each with the fields in its order."""
+    """Yield the statements that call loops, each with the fields in the order of the loop."""
     order: tuple[str, ...] = ()
     colour: int | None = 0
     window: int | None = 0
@@ -320,10 +320,10 @@ def _arrays(order: tuple[str, ...], arrays: Sequence[ir.Value]) -> ir.Declare:
 
 
 def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[tuple[ir.Function, row_drivers.Sites]]:
-    """Return the loops with the sites that each is called for.
+    """Return the loops, each with the sites for which it is called.
 
-    There is one for all sites, or for those that boundary seams leave, or two: for sites away from open ends, and for
-    sites near them.
+    There is one loop for all sites, or for all sites away from boundary seams. With open ends there may be two: for
+    sites away from the ends, and for sites near them.
     """
     if sweep and beside_seams(sweep):
         return [(loops[0], sites) for sites in ((AWAY,) if sweep.inside else (FIRST_SITES, LAST_SITES))]
@@ -336,7 +336,7 @@ def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[t
 def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end: Kernel | None = None) -> Iterator[str]:
     """Yield the loops and the driver of a kernel of the equation of a stage.
 
-    The driver of the equation itself also treats the ``end`` of a stage, where it updates x.
+    The driver of the equation also makes the ``end`` of a stage, which updates x.
     """
     program, layout = loops.program, loops.layout
     adds, varied = kernel.role is Role.FOLLOW, kernel.reads_variations
