@@ -51,8 +51,8 @@ class Parameter:
 
     ``small`` says that the terms with this factor are a small part of H, ``nonnegative`` that the parameter is 0 or
     positive. For lattices ``at`` is ``all`` for one number, ``sites`` or ``bonds`` for an array with a value at each
-    site or bond; ``values`` are the defaults if not all are ``value``. ``unit`` is text for readers: nothing is
-    converted.
+    site or bond; ``values`` are the defaults if not all are equal, and then ``value`` is 1, and no default. ``unit`` is
+    text for readers: nothing is converted.
     """
 
     name: str

@@ -38,23 +38,23 @@ class Scope:
     def __init__(self, reserved: Reserved) -> None:
         # t12 is the name of a temporary, so a coordinate called t12 gets another identifier.
         self._reserved = Reserved(reserved.words, re.compile(rf"t\d+|{reserved.pattern.pattern}"))
-        self._taken: set[str] = set()
-        self._given: dict[str, str] = {}
+        self._identifiers: set[str] = set()
+        self._codes: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> str:
         """Return the identifier of a symbol; that of temporary 12 is ``t12``."""
-        if name not in self._given and isinstance(name, Symbol) and name.kind == TEMPORARY:
-            self._given[name] = name.replace(":", "")
-            self._taken.add(self._given[name])
+        if name not in self._codes and isinstance(name, Symbol) and name.kind == TEMPORARY:
+            self._codes[name] = name.replace(":", "")
+            self._identifiers.add(self._codes[name])
         return self.request(name, name)
 
     def request(self, name: str, preferred: str) -> str:
         """Return the identifier of a symbol: ``preferred`` if that is free."""
-        if name not in self._given:
-            self._given[name] = _free(re.sub(r"\W", "_", preferred, flags=re.ASCII), self._reserved, self._taken)
-            self._taken.add(self._given[name])
-        return self._given[name]
+        if name not in self._codes:
+            self._codes[name] = _free(re.sub(r"\W", "_", preferred, flags=re.ASCII), self._reserved, self._identifiers)
+            self._identifiers.add(self._codes[name])
+        return self._codes[name]
 
     def bind(self, name: str, code: str) -> None:
         """Use a piece of code, such as ``coef[3]``, wherever the symbol is printed."""
-        self._given[name] = code
+        self._codes[name] = code
