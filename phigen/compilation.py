@@ -60,10 +60,10 @@ class _Compiled(ABC):
     @property
     @abstractmethod
     def exact(self) -> bool:
-        """Whether a step has its structure to round-off, not only to a truncation order.
+        """Whether the structure of a step is exact to round-off, rather than up to a power of h.
 
-        For a series: whether a step starts and ends at the ends of one path. A step with forces can be exact in this
-        sense, but is no Poisson map; see `poisson`.
+        For a series, this means that a step maps α(y, p) to β(y, p) with the same y and p. With forces, a step that is
+        exact in this sense is not a Poisson map; see `poisson`.
         """
 
     @property
@@ -259,7 +259,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def exact(self) -> bool:
-        """Whether a step starts and ends at the ends of one path, to round-off."""
+        """Whether a step maps α(y, p) to β(y, p) with the same y and p, to round-off."""
         return self.realisation.exact
 
     @property

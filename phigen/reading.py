@@ -31,5 +31,5 @@ def opened(path: str | Path) -> BinaryIO:
 
 
 def opened_text(path: str | Path) -> TextIOWrapper:
-    """Open a regular file of UTF-8 text, with or without a byte order mark. Raises as `opened`."""
+    """Open a regular file of UTF-8 text, with or without a byte order mark. Raises the errors of `opened`."""
     return TextIOWrapper(opened(path), encoding="utf-8-sig")

@@ -132,7 +132,7 @@ class Evaluation:
             if op in ("number", "exact", "constant"):
                 value = a[0] if op != "constant" else c[a[0]] if len(a) == 1 else c[a[0]][a[1]]
                 x, error = arb(value), U * abs(value) * (op == "number" and Fraction(repr(value)) != value)
-                powers |= {k} if abs(math.frexp(value)[0]) == 0.5 else set()  # powers of 2 multiply exactly
+                powers |= {k} if abs(math.frexp(value)[0]) == 0.5 else set()  # multiplication by them is exact
             elif op in inputs:
                 demand((op, a[0]) not in self.inputs, "an input is read twice")
                 x, self.inputs[op, a[0]] = inputs[op][a[0]], k

@@ -66,8 +66,8 @@ class NoCertificateError(RefusedError):
 class StepProblem:
     """Problem to be certified: a solver in C, its parameters, and a domain of states and times.
 
-    ``text`` is the C; ``gauge`` are multiples of Casimirs, or e. ``ulps`` bounds the errors of libm in units in the
-    last place, and ``within`` the requested error bounds in the same unit. ``timed`` says that steps depend on the
+    ``text`` is the C; ``gauge`` are multiples of Casimirs, or e. ``ulps`` is a bound for errors of libm, and ``within``
+    the largest error bound that is accepted, both in units in the last place. ``timed`` says that steps depend on the
     time.
     """
 

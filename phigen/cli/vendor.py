@@ -95,8 +95,8 @@ def command(
     The files NAME.h, NAME.c, NAME.py are those of `phigen build`. DEST/phigen-vendor.json records the spec,
     options and version of each. Without SPEC, the solvers in DEST are generated again.
 
-    --check tests that the files are unmodified and agree with their specs and this version; without SPEC, all files of
-    DEST. If a spec is missing, phigen says that its changes cannot be checked.
+    --check tests that the files are unmodified, and agree with their specs and this version of phigen. Without SPEC, it
+    tests all files of DEST. If a spec is missing, phigen says that its changes cannot be checked.
     """
     *spec_files, last = paths
     folder = Path(last)

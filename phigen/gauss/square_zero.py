@@ -16,7 +16,7 @@ from phigen.gauss.star_algebra import StarAlgebra
 
 
 def square_zero_ideal(algebra: StarAlgebra) -> tuple[int, ...]:
-    """Return the basis elements of such an ideal N if 2 dim B does not exceed the dimension of A; else ().
+    """Return the basis elements of a square-zero ideal N with 2 dim B ≤ dim A (see the module); () if there is none.
 
     N is the radical of the form tr ab. Basis elements must span N and B, and each element of the frame must lie in N or
     in B.

@@ -325,7 +325,7 @@ def _of_order(
     statements: Sequence[ir.Statement],
     places: dict[ir.Name, ir.Value],
 ) -> ir.Function:
-    """Return the function that adds to order k + 1 of derivatives of the path, in one loop over lanes."""
+    """Return the function whose ``statements`` add to order k + 1 of derivatives of the path, in a loop over lanes."""
     pointers = {**places, TO: ir.Entry(ir.Member(E, array), ir.plus(K, 1))}
     body = (
         ir.Declare(ir.Pointer(constant=False, lanes=True), tuple((n.symbol, place) for n, place in pointers.items())),

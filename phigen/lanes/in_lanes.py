@@ -87,7 +87,7 @@ class Blocks:
     slope_terms: int = 0
 
     def grouped(self, stored: int) -> bool:
-        """Whether members are integrated in groups, by the number ``stored`` of values in the predictor of a member."""
+        """Whether members are integrated in groups, if the predictor of each member has ``stored`` values."""
         return _DOUBLE * LANES * (self.room + stored) <= MAX_STACK_BYTES
 
 
@@ -175,7 +175,7 @@ def _is_lowered(program: Program) -> bool:
     """Whether several steps or members may be computed together in lanes.
 
     With noise, the coefficients differ from step to step, so that predictors from earlier steps fail. If H depends on
-    the time, members in packs would share coefficients although these differ.
+    the time, coefficients differ too, and the members of a pack could not share them.
     """
     dated = program.time and (program.monitor or not program.step.kind.implicit)
     return program.lanes and program.offers("lanes") and not program.noise and not dated

@@ -207,7 +207,7 @@ class WholeArrays:
             yield ir.Unpack(("here", "there", "bond"), ir.Called("bonds", which, SITES))
 
     def _summed(self, s: ir.Store, selection: ir.Selection) -> ir.Value:
-        """Return the sum, or the extreme, at each site of a value of bonds or pairs."""
+        """Return the sum, or the extreme, of a value over the bonds or pairs of each site."""
         graph = self.lattice.step.others.graph
         if s.extreme:
             choose = ir.fixed({"max": "np.maximum", "min": "np.minimum"}[s.extreme])
