@@ -57,7 +57,7 @@ def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
 def with_phi(p: Vector, t: Vector, phi: Expression) -> Direction:
     """Return the element with the quaternion (1 − sφ, p/2), for any φ; φ = 0 gives the Cayley transform.
 
-    Here, ``length`` is the square of the length of the quaternion.
+    In the result, ``length`` is the square of the length of the quaternion.
     """
     s = dot(p, p)
     c = ONE - s * phi

@@ -121,7 +121,7 @@ def multiplied(a: Sequence[Expression], b: Sequence[Expression]) -> Flat:
 def flow_exponential(group: Group, p: Sequence[Expression], positive: Sequence[str]) -> Flat | None:
     """Return the entries of exp(P) − 1 in closed form; None if phigen knows no closed form.
 
-    There is one if P is a sum of commuting matrices with P³ = −sP, or such a matrix itself.
+    phigen knows it for matrices with P³ = −sP, with a number or an expression s, and for sums of commuting ones.
     """
     basis = [(pi, m) for pi, m in zip(p, group.matrices, strict=True) if not pi.is_zero]
     ratios = [_ratio(m) for _, m in basis]

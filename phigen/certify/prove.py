@@ -37,7 +37,7 @@ PASSES = 8
 GROWTH = 1.25
 
 #: Largest compensation term after a Gauss step, in 2^-53 of the largest value of the coordinate. It contains the
-#: rounding of the state and that of its change, which is at most twice as large.
+#: rounding error of the state, and the rounding error of its change, which is at most twice as large.
 GAUSS_CARRY = 3.03
 
 #: Least assumed distance of an iterate from the solution, for each unknown of a Gauss step, relative to the largest
