@@ -348,8 +348,7 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 
 
 def _turns_bodies(spec: Spec, system: System) -> bool:
-    """Whether free rigid bodies may be parts of H: always without an attitude; else if the attitude is that of the
-    bodies."""
+    """Whether free rigid bodies may be parts of H; if the spec asks for an attitude, it must be that of the bodies."""
     group = _group(spec, system, "exponential")
     if group is None:
         return True

@@ -36,8 +36,8 @@ def propagator(
     by name, whose shapes broadcast to (…); other parameters have their defaults. Results have the precision and the
     device of ``x0``.
 
-    The solver must be compiled with ``adjoint=True``. Further arguments, such as ``bonds=``, apply to all runs of the
-    function, which raises `StepError`.
+    Gradients need a solver compiled with ``adjoint=True``. Further arguments, such as ``bonds=``, apply to all runs of
+    the function, which raises `StepError`.
     """
     runs = Propagation(solver, h, steps, stride, t0, shared)
 

@@ -40,11 +40,11 @@ GROWTH = 1.25
 #: rounding error of the state, and the rounding error of its change, which is at most twice as large.
 GAUSS_CARRY = 3.03
 
-#: Least assumed distance of an iterate from the solution, for each unknown of a Gauss step, relative to the largest
-#: distance; sweeps couple all unknowns.
+#: Smallest bound for the distance of iterates from the solution, for an unknown of a Gauss step, relative to the
+#: largest of these bounds, since sweeps couple all unknowns.
 LEAST_REACH = 0.05
 
-#: Distance that is added for steps along paths, relative to the unknowns; the C uses finite differences over shorter
+#: Increase of these bounds for steps along paths, relative to the unknowns; the C uses finite differences over shorter
 #: distances.
 DIFFERENCES = arb(2) ** -20
 
@@ -195,7 +195,8 @@ def _ends(x: Any) -> list[float]:
 
 
 def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """Return for each stage the box of unknowns, the distances of iterates from the solution, and the box of paths."""
+    """Return for each stage the box of unknowns, bounds for the distance of iterates from the solution, and the box of
+    paths."""
     parts, image = list[dict[str, Any]](), X
     for stage in c["stages"]:
         parts.append(_implicit_part(c, stage, image, T) if "equation" in stage else {})

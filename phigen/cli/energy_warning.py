@@ -22,7 +22,7 @@ LEAST_COMPARED_ERROR = 1e-3
 #: Most steps of a run that is compared with RK4. For longer runs the comparison would take long, and the error of RK4
 #: grows in any case.
 MOST_STEPS = 1_000_000
-#: Factor by which RK4 must be more accurate before the warning appears; the times on which it rests are noisy.
+#: Factor by which RK4 must be more accurate before the warning appears, since the measured times are noisy.
 LEAST_RK4_ADVANTAGE = 2.0
 
 _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the start", SITES: "Σ |energy of a site|"}

@@ -68,7 +68,7 @@ def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
 
 
 def spec_files(source: str) -> Iterator[str]:
-    """Yield a spec file or a bundled spec itself; of a folder the spec files below it, without hidden ones."""
+    """Yield the spec file, or the bundled spec; for a folder, yield the spec files below it, without hidden ones."""
     path = spec_path(source)
     if not Path(path).is_dir():
         yield path

@@ -38,9 +38,9 @@ def leaf_of(
     start: Mapping[str, float],
     parameters: Mapping[str, float],
 ) -> Leaf | None:
-    """Return the leaf through the point ``start`` of the first Casimir that depends on coordinates only.
+    """Return the leaf through the point ``start`` of the first Casimir that depends on no coordinates but ``names``.
 
-    Returns None if there is no such Casimir, or if there are not three coordinates.
+    Returns None if there is no such Casimir, or if there are not three names.
     """
     for casimir in casimirs.values():
         used_names = set(symbols_of(casimir)) & set(start)

@@ -137,7 +137,7 @@ def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
         eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices without trace
     n = (isqrt(1 + 8 * m) - 1) // 4
     if n * (2 * n + 1) == m and not centre:
-        # sp(2n): the analogue of symmetric matrices
+        # sp(2n): skew-Hamiltonian matrices without trace
         eigenvalues.append((n * (2 * n - 1) - 1, Fraction(n, n + 1), False))
     for size, eigenvalue, central in sorted(eigenvalues):
         if 1 + m + size + central > MOST_UNKNOWNS:

@@ -80,7 +80,7 @@ def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> 
 
 
 def moving(system: System) -> list[str]:
-    """Return the names of those of energy and Casimirs that time, forces or noise change."""
+    """Return the names of the quantities, energy and Casimirs, that time, forces or noise change."""
     return [ENERGY, *system.pushed] if system.driven else []
 
 

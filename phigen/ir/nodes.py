@@ -195,7 +195,7 @@ class HasColour:
 
 @dataclass(frozen=True)
 class OnSeam:
-    """1 if the site at ``offset`` has the colour ``colour`` and lies on the boundary seams of the sweep, else 0."""
+    """1 if the site at ``offset`` has the colour ``colour`` and lies on the seams of the sweep's window, else 0."""
 
     number: int
     colour: int
@@ -407,9 +407,10 @@ class Append:
 class Selection:
     """Sites over which a loop runs.
 
-    They have one ``colour``, if it is not None. ``inside`` excludes the sites on boundary seams, and ``window`` is the
-    axis to whose seams the loop is restricted. Sites with numbers below ``first`` are excluded; in loops over pairs,
-    this applies to the other site. ``massive`` ends a loop with the last site that has a mass.
+    They have one ``colour``, if it is not None. ``inside`` excludes the sites near boundary seams. With a ``window``,
+    the loop runs over the sites near seams; the window is the set of axes, a bit mask, on whose seams the terms begin.
+    Sites with numbers below ``first`` are excluded; in loops over pairs, this applies to the other site. ``massive``
+    ends a loop with the last site that has a mass.
     """
 
     colour: int | None = None

@@ -187,7 +187,8 @@ def _of_newton(program: Program, step: Newton) -> Blocks | None:
 
 
 def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
-    """Return blocks of steps; or if there are none, paths in the reverse pass, which need double precision."""
+    """Return blocks of steps, or else paths in the reverse pass, which need double precision; None if there are
+    neither."""
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
         blocks = _paths(program, step, step.lanes)

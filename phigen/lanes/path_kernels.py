@@ -20,7 +20,7 @@ SLOPE_TERMS_BACK = (MAX_TERMS, 12, 8)
 
 
 def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> tuple[int, int]:
-    """Return the number of values on the stack in each lane: of a linear model, beyond those of any step, and of an
+    """Return two numbers of additional values on the stack in each lane: for each stage of a step, and for an
     expansion."""
     n, path, used = (
         dimension,

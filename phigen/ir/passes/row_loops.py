@@ -121,9 +121,9 @@ def _storing(
 class BondLoop:
     """A function for sums over bonds or pairs, on the level of sites, with its further ``arguments`` by rows.
 
-    ``oriented`` is as in `Reading`. The possible arguments are ``at_bonds``, the parameters at bonds; ``sign``, the
-    sign of the direction of bonds; and ``across``, a flag that the sites of the swept colour are at the other ends of
-    the bonds.
+    ``oriented`` is as in `Reading`. The possible arguments are ``at_bonds`` (the parameters at bonds), ``sign`` (the
+    sign of the direction of bonds) and ``across`` (a flag that the sites of the swept colour are at the other ends of
+    the bonds).
     """
 
     function: ir.Function
