@@ -28,7 +28,7 @@ class Stop:
 
 @contextmanager
 def interruptible() -> Iterator[Stop]:
-    """Context in which SIGINT and SIGTERM set the flag of a `Stop`; a second signal ends the process at once."""
+    """Context in which SIGINT and SIGTERM set the flag of a `Stop`; a second signal raises `KeyboardInterrupt`."""
     stop = Stop()
     if threading.current_thread() is not threading.main_thread():
         yield stop  # other threads do not receive signals
