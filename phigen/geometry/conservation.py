@@ -58,7 +58,8 @@ class Unit:
         return ABSOLUTE if self.kind == ABSOLUTE else RELATIVE
 
     def errors(self, values: Floats, start: float) -> Floats:
-        """Return the errors (rows,) of values (rows,) of the quantity in this unit; ``start`` is its exact value."""
+        """Return the errors (rows,) of values (rows,) of the quantity in this unit; ``start`` is the value at the
+        start."""
         with np.errstate(invalid="ignore"):  # values may be infinite or NaN
             errors: Floats = np.abs(values - start) / self.size
         return errors
@@ -108,7 +109,7 @@ def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapp
 
 
 def stated(units_by_name: Mapping[str, Unit]) -> str:
-    """Return the sentence on a figure or table that says which units its errors have, from units by name of the
+    """Return the sentence that states the units of errors in a figure or table; ``units_by_name`` has the unit of each
     quantity."""
     errors = "Errors and changes" if any(unit.moves for unit in units_by_name.values()) else "Errors"
     relative = any(unit.kind == RELATIVE for unit in units_by_name.values())

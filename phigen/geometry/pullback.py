@@ -83,8 +83,10 @@ def _expect_size(form: PullbackForm, coordinates: Sequence[str]) -> None:
 
 
 def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...]:
-    """Return x as a function of y, solved one coordinate after another, each from an equation without other
-    unknowns."""
+    """Return x as a function of y, solved one coordinate after another, each from an equation without other unknowns.
+
+    Raises `SpecError` if there is no such equation for a coordinate.
+    """
     of_affine = _of_affine_map(form, coordinates)
     if of_affine is not None:
         return of_affine

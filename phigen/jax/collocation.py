@@ -223,7 +223,10 @@ def _solved_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
 
 
 def _swept_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
-    """Return the solution L of (F′ − 1) L = side by sweeps L ← F′L − side, where ``linear`` is F′ − 1."""
+    """Return the solution L of (F′ − 1) L = side by sweeps L ← F′L − side, where ``linear`` is F′ − 1.
+
+    The result is NaN if the sweeps do not converge.
+    """
     solved_limit, rounding = unit * LINEAR_POLICY.adjoint_solved, unit * LINEAR_POLICY.adjoint_rounding
     floor = jnp.finfo(side.dtype).tiny
 
