@@ -377,7 +377,7 @@ def _compile_gauss(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
     )
 
 
-#: The function that compiles an ordinary system, for each scheme; lattices have `_swept`.
+#: The function that compiles an ordinary system, for each scheme. Lattices are compiled by `_swept`.
 SCHEME_COMPILERS: Mapping[str, Callable[[Spec, System, _Clock], Compilation]] = {
     "auto": _cheapest,
     "series": _compile_series,

@@ -121,8 +121,10 @@ def _remove_folder(folder: Path) -> None:
 
 
 def _mode(path: Path) -> int:
-    """Return the permissions of the file to be replaced, or those that a new file gets; mkstemp creates private
-    files."""
+    """Return the permissions of the file to be replaced, or of a new file if there is none.
+
+    Temporary files need them explicitly, since mkstemp creates files that only their owner can read.
+    """
     try:
         return path.stat().st_mode & 0o777
     except OSError:

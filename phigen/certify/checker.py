@@ -15,9 +15,9 @@ from typing import Any, TypeAlias
 
 from flint import arb, arb_mat, ctx, fmpq, fmpq_poly
 
-Ball: TypeAlias = Any  # flint.arb; sequences of flint.arb; flint.arb_mat
-Balls: TypeAlias = Any
-Matrix: TypeAlias = Any
+Ball: TypeAlias = Any  # flint.arb
+Balls: TypeAlias = Any  # sequences of flint.arb
+Matrix: TypeAlias = Any  # flint.arb_mat
 BITS = 80  # precision of balls in bits; doubles have 53
 U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(0), arb(1), arb(0.5)
 ROUNDED = arb("1.000001")  # margin for the rounding of sizes that the C computes and compares
@@ -305,7 +305,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inside = zip(box, K.entries(), beyond.entries(), strict=True)
     demand(all(v.contains_interior(k + BALL * r) for v, k, r in inside), KRAWCZYK)
     demand(below(missed(reach) + U * Y * solves, reach), "the iteration may diverge")
-    if stage.get("seen"):  # a series may end if two terms after one above rounding are small
+    if stage.get("seen"):  # series end after two small terms, but only once a term was larger than rounding errors
         (seen,) = centred(c, stage, X, T, leaf, box, run, "seen").entries()
         demand(seen.abs_lower() > ROUNDED * mag(run.x[stage["seen_above"]]), "a Taylor series may end early")
 

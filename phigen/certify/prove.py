@@ -44,8 +44,8 @@ GAUSS_CARRY = 3.03
 #: largest of these bounds, since sweeps couple all unknowns.
 LEAST_REACH = 0.05
 
-#: Increase of these bounds for steps along paths, relative to the unknowns; the C uses finite differences over shorter
-#: distances.
+#: Increase of the bounds for distances of iterates in steps along paths, relative to the unknowns. The finite
+#: differences of the C are over shorter distances.
 DIFFERENCES = arb(2) ** -20
 
 #: Number of bisections after which the search fails; the volume is then 2^-40 of the volume of the domain.

@@ -219,7 +219,7 @@ def run_lines_of(tuning: Tuning, run: Run) -> list[str]:
     assert tuning.winner is not None
     step = tuning.winner.point.step
     steps = max(1, round(tuning.horizon / step)) + (run.stop is not None)
-    # states of lattices are large, so no more of them are stored than the run asks for
+    # states of lattices are large, so the tuned run stores at most as many as the run of the spec
     rows = max(1, run.steps // run.stride) if tuning.sizes else _STORED_STATES
     return [f"step: {math.copysign(step, run.step)!r}", f"steps: {steps}", f"stride: {max(1, steps // rows)}"]
 

@@ -357,7 +357,7 @@ def _extra(folder: Path, entries: Mapping[str, ManifestEntry]) -> Iterator[Vendo
 
 
 def _judge(folder: Path, problems: Sequence[VendorProblem]) -> None:
-    """Raise CheckError that lists the problems and the commands that correct them; do nothing if there are none."""
+    """Raise a `CheckError` that lists the problems and the commands that correct them; do nothing if there are none."""
     if not problems:
         return
     lines = [f"{p.path}: {p.what}" for p in problems]

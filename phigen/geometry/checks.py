@@ -12,7 +12,7 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: Name of the statement from which the higher strong order follows.
+#: Name of the statement from which strong order 1 follows.
 COMMUTING = "the sources of noise commute, hence strong order 1"
 
 

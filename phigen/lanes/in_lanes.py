@@ -187,8 +187,10 @@ def _of_newton(program: Program, step: Newton) -> Blocks | None:
 
 
 def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
-    """Return blocks of steps, or else paths in the reverse pass, which need double precision; None if there are
-    neither."""
+    """Return blocks of steps if several steps can share lanes.
+
+    Otherwise return the paths in the reverse pass, in double precision only; None if these are not in lanes either.
+    """
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
         blocks = _paths(program, step, step.lanes)

@@ -41,7 +41,10 @@ def transposed_sums_name(kernel: str) -> str:
 
 @dataclass(frozen=True)
 class WholeArrays:
-    """The lowering of the functions of a lattice, which follows the pass `phigen.ir.passes.temporaries`."""
+    """The lowering of the functions of a lattice to operations on whole arrays.
+
+    It follows the pass `phigen.ir.passes.temporaries`.
+    """
 
     lattice: LatticeLoops
 
@@ -222,7 +225,7 @@ class WholeArrays:
         return ir.Called("_over_others", (s.value, SITES))
 
     def _reads(self, function: ir.Function) -> Iterator[ir.Statement]:
-        """Yield the declarations of a function, then those in its loop."""
+        """Yield the lowered declarations of a function, then those in its loop."""
         for s in (*function.body, *function.loop.body):
             match s:
                 case ir.Declare(items=((name, value),)):
