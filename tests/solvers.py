@@ -123,6 +123,11 @@ class RawC:
         """``NAME_integrate``."""
         return self.call("integrate", ctypes.c_int, self.here, ctypes.c_double(h), ctypes.c_size_t(steps))
 
+    def kick(self, change: Sequence[float]) -> int:
+        """``NAME_kick``."""
+        array = np.array(change, dtype=float)
+        return self.call("kick", ctypes.c_int, self.here, ctypes.c_void_p(array.ctypes.data))
+
     @precisely
     def exact_state(self) -> list[Any]:
         """x + carry, in many digits."""

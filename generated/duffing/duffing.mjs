@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ff4d0a870391bed3258107151c72ca1826bcf9a3100e8b81bf4dc1c6bc6e867f
+ * body-sha256: 8a908064c1a77497cc1aa0c67a5c2e2200017a859d7234be08fec41bc43239d0
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -407,7 +407,8 @@ export class Solver {
    * @returns {this}
    */
   setState(x) {
-    return this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    return this;
   }
 
   /**

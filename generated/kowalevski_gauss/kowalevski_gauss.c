@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 592410526d5c9ed4db1003d44aac628f909803a1c259746945b64118b59dc9f6
+ * body-sha256: 3fb070fee1055138b57049102ec5e98648ed874d9a9bab773c61852927815e54
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -166,7 +166,8 @@ static const double kowalevski_gauss_mixing[kowalevski_gauss_NODES][kowalevski_g
 };
 
 enum { kowalevski_gauss_PREDICTORS = 3 };
-/* Predictors of the stages of a step, from the stage increments of the last step, then of the step before. */
+/* Predictors of the stages of a step, from the stage increments of the last step, then of the step before.
+   The last one reads the last step only. */
 static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kowalevski_gauss_EARLIER
     * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH] = {
     {
@@ -519,15 +520,15 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, double point[k
     const double end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes *increments)
 {
     kowalevski_gauss_history *past = &s->history;
-    const int older = past->latest, latest = kowalevski_gauss_EARLIER - 1 - older;
+    const int older = past->latest;
+    past->latest = kowalevski_gauss_EARLIER - 1 - older;
     if (memcmp(&s->h, &past->h, sizeof s->h) != 0) past->count = 0; /* predictors read steps of one size */
     past->h = s->h;
     past->kicked = 0;
     kowalevski_gauss_lanes last[kowalevski_gauss_UNKNOWNS];
     memcpy(last, past->increments[older], sizeof last);
     kowalevski_gauss_to_next_frame(s, point, end, last, past->increments[older]);
-    kowalevski_gauss_to_next_frame(s, point, end, increments, past->increments[latest]);
-    past->latest = latest;
+    kowalevski_gauss_to_next_frame(s, point, end, increments, past->increments[past->latest]);
     if (past->count < kowalevski_gauss_EARLIER) ++past->count;
 }
 
@@ -584,7 +585,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
     kowalevski_gauss_lanes *now = increments;
     kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
     kowalevski_gauss_set_factors(s->h, factors);
-    if (past->count < 1 || memcmp(&s->h, &past->h, sizeof s->h) != 0) {
+    if (past->count == 0 || memcmp(&s->h, &past->h, sizeof s->h) != 0) {
         memset(z, 0, sizeof z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h))
             kowalevski_gauss_predict_at(past, s->h / past->h, z);
@@ -714,7 +715,8 @@ kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solv
     size_t count, double *x)
 {
     if (s == NULL || fraction == NULL || x == NULL) return kowalevski_gauss_BAD_ARGUMENT;
-    if (s->history.count == 0 || s->history.kicked) return kowalevski_gauss_BAD_ARGUMENT;
+    const kowalevski_gauss_history *past = &s->history;
+    if (past->count == 0 || past->kicked) return kowalevski_gauss_BAD_ARGUMENT;
     double factor[kowalevski_gauss_NODES], z[kowalevski_gauss_UNKNOWNS], point[kowalevski_gauss_POINT],
         change[kowalevski_gauss_DIM];
     kowalevski_gauss_start(s, point);
@@ -723,7 +725,7 @@ kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solv
         for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) {
             z[k] = 0.0;
             for (int j = 0; j < kowalevski_gauss_NODES; ++j)
-                z[k] += factor[j] * s->history.increments[s->history.latest][k][j];
+                z[k] += factor[j] * past->increments[past->latest][k][j];
         }
         kowalevski_gauss_stage_change(s->coef, point, z, change);
         for (int i = 0; i < kowalevski_gauss_DIM; ++i)

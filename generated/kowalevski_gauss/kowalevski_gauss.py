@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 4dad8c3924cddf7a5a492e6e962c19b081968f5ec15ab677cb4d32e98689d01e
+# body-sha256: dd78b878b3aab6d7cb0c9a22e6ebbd0e22649f2c29719abf2ac49079d1631b15
 import numpy as np
 
 VERSION = "0.1.0"
@@ -219,18 +219,6 @@ MIXING = np.array([
     [1.005482808253216, 0.9912514332308027, 1.012225914113298, 0.9830238267636289, 1.0247213458032003, 0.9599572962220551, 1.0818949631055814, 0.5],
 ])
 
-# Predictor of the stages of a step from the stage increments of the last one, then of the one before.
-PREDICTION = np.array([
-    [-1.0562883573249242, 0.17011181557929392, 0.7189655620887281, -0.6150695348288924, 0.33139841769889067, -0.09534494773332663, -0.14867438516875472, 0.6823888891627402, -0.023078953897651754, 0.04791703496477633, -0.10012678273506714, 0.21708501855891152, -0.44552757668699566, 0.6606482299785122, -0.018703785014926044, -1.1568474266637105],
-    [1.1236784141627987, -4.349276640604241, -2.395153324266041, 5.848209751460516, -6.799368708038393, 7.453913949427919, -8.914030157184168, 10.636277329542175, -0.32755775531306414, 0.5384236309829313, -0.753029294034664, 0.8686760702749455, -0.35880181316653914, -1.800710703232361, 3.1869876382437132, 5.347314969048372],
-    [5.0848641038758515, -74.62332435388342, -33.73968253840068, 94.85154068773407, -110.43884505214427, 113.76463063802224, -115.6350429003608, 100.64646241205422, -6.510304096332957, 10.8716481380434, -15.76616090178194, 19.90931606315355, -14.33855877271771, -21.667573138274747, 56.84692059566806, 78.56172233766412],
-    [281.4119054944364, -913.2359919768037, -559.3713547251529, 1237.4113397130202, -1313.0937364146876, 1225.235629201064, -1093.1827797626263, 817.3051550107181, -76.33240113232466, 125.64369293593548, -176.24298600578734, 205.0707578491596, -93.36808963306676, -384.96030593509425, 680.5796085091905, 1168.8992372438427],
-    [3542.643018332994, -6941.029624974229, -5165.279408973958, 9883.011867232579, -9810.072061717841, 8555.865815929577, -7067.641456468408, 4916.481282763816, -557.471742576356, 904.834245411404, -1227.099045931679, 1301.0259445540344, -167.08043319070322, -3707.4982183308925, 5071.963134051628, 10215.457682425043],
-    [22476.332543730132, -32709.93856824393, -28007.385187897802, 48577.33491814007, -45956.82578742851, 38305.86762574196, -30212.917999951333, 20236.81600940853, -2506.5939425921733, 4010.7558912984973, -5246.567177692984, 4963.566820237874, 1572.6027759384035, -20757.634302164173, 23434.03118614151, 53612.69075370039],
-    [78148.1986319992, -95328.96329261537, -89519.44463570009, 146036.57133306228, -133918.63286450363, 108525.16659120435, -83328.19364020127, 54687.030719482595, -6996.243265997881, 11057.24311563159, -13999.491746764175, 11745.341627041988, 9931.357698229382, -67769.49450151643, 67187.58111935604, 168189.57747063978],
-    [154728.26460009732, -172415.18562406432, -170197.79184448332, 268919.1093003448, -242547.87659446234, 193706.0111108098, -146749.65892535693, 95371.08087939216, -12293.912543345854, 19274.382132844315, -23870.006603584094, 18248.371676407914, 23748.4252838844, -130324.50777207095, 120286.32880576182, 316817.7890450205],
-])
-
 # Unknowns that are offsets of coordinates, or the time; the others are those of group elements, of size 1.
 PLAIN = 4
 
@@ -297,31 +285,29 @@ def _factors_at(fractions):
 
 
 def _interpolated(stage, x, increments, fractions):
-    """Return states at fractions of a step that ends at x, (fractions, DIM), from its increments in the frame of x.
-
-    Increments of the step before may follow.
-    """
-    offsets = np.moveaxis(increments[..., : len(NODES)] @ _factors_at(fractions).T, -1, 1)[:, :, 0]
+    """Return states at fractions of a step that ends at x, (fractions, DIM), from its increments in the frame of x."""
+    offsets = np.moveaxis(increments @ _factors_at(fractions).T, -1, 1)[:, :, 0]
     return x + _stage_change(stage[0], _point(stage, np.repeat(x, len(fractions), axis=0))[:, 0], offsets)
 
 
+# Predictor of the stages of a step from the stage increments of the last one.
+PREDICTION = _factors_at(1 + NODES)
+
+
 def _with_new_step(memory, ratio):
-    """Return the predictor of a step of another size, that of the last one times a ratio: predicted unknowns."""
+    """Return the predictor of a step of another size, that of the last one times a ratio, or after a kick: predicted
+    unknowns."""
+    if memory[1].ndim == 4 and ratio == 1:
+        return memory
     if memory[1].ndim != 3 or not abs(ratio) <= 1:
         return (np.zeros((1, 1)),) * 2
-    return (_extrapolated(memory[1][..., : len(NODES)], ratio)[np.newaxis],) * 2
-
-
-def _extrapolated(increments, ratio):
-    """Return predicted unknowns of a step, the last one times a ratio, by the collocation polynomial of the last step."""
-    return np.matmul(increments, _factors_at(1 + ratio * NODES).T)
+    return (np.matmul(memory[1], _factors_at(1 + ratio * NODES).T)[np.newaxis],) * 2
 
 
 def _predicted(memory):
     """Return predicted unknowns, (unknowns, members, stages), or None before the first step."""
     if memory[1].ndim == 3:
-        two = memory[1].shape[-1] == PREDICTION.shape[1]
-        return memory[1] @ PREDICTION.T if two else _extrapolated(memory[1], 1)
+        return memory[1] @ PREDICTION.T
     return memory[1][0] if memory[1].ndim > 3 else None
 
 
@@ -334,8 +320,7 @@ def _in_next_frame(stage, x, end, increments):
 def _advance(stage, x, carry, memory):
     """Make one step of all members.
 
-    `memory` holds the stage increments of the last step, and those of up to two steps in the frame of the end of the
-    last, or the start of the sweeps.
+    `memory` holds the stage increments of the last step, then the same in the frame of its end, or the start of the sweeps.
     """
     predicted = _predicted(memory)
     anew = np.zeros((8, len(x), len(WEIGHTS)))
@@ -347,8 +332,7 @@ def _advance(stage, x, carry, memory):
     end = np.sum(increments, axis=-1)
     following, rest = _sum(x, carry, _stage_change(stage[0], _point(stage, x)[:, 0], end))
     good = np.isfinite(following).all(axis=-1)
-    known = [increments, memory[1][..., : len(NODES)]] if memory[1].ndim == 3 else [increments]
-    next_increments = _in_next_frame(stage, x, end, np.concatenate(known, axis=-1))
+    next_increments = _in_next_frame(stage, x, end, increments)
     next_increments = np.where((good & (status == ""))[:, np.newaxis], next_increments, 0.0)
     return following, rest, (increments, next_increments), np.where(good | (status != ""), status, "NOT_FINITE")
 

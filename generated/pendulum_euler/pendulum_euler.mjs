@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ae5d7351d5ea4488b66e0812736207f173748c922d17b4d51e50164e484286e0
+ * body-sha256: d7230410e5cf77b8a521987cdfe07abba392cfb1bee2c32e87e605380656a5bd
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -287,7 +287,8 @@ export class Solver {
    * @returns {this}
    */
   setState(x) {
-    return this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    return this;
   }
 
   /**

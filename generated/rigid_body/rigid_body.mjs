@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d7d59cdcf204fa5c20c4dfc7abd2c14f8ccecc5e873a30fde70afd09cabd9bc0
+ * body-sha256: 9a6e030639720455f84271eb3e54fa8f126203e38bb0a49d9b583d4ec306ce6e
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -707,7 +707,8 @@ export class Solver {
    * @returns {this}
    */
   setState(x) {
-    return this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    return this;
   }
 
   /**

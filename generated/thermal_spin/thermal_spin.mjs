@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3ce1bc6fcdb6c461de15da47082e9c9bc432303959ce4d7f17acd80c8bb2a3eb
+ * body-sha256: 6782b1719b1170da1e1bcb9a2ba834a1f87fd9f258b577673ee88125b166b1a2
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -513,7 +513,8 @@ export class Solver {
    * @returns {this}
    */
   setState(x) {
-    return this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    return this;
   }
 
   /**

@@ -25,18 +25,13 @@ MOST_STAGES = 8
 BAND = Fraction(1, 4)
 
 
-#: Largest number of previous steps that predictors read.
+#: Largest number of previous steps that the predictors of vectorised C read.
 EARLIER = 2
 
 #: Bands of several predictors, as `BAND`, with the number of previous steps that each reads. Vectorised C uses the
 #: predictor that was best in recent steps. Errors of predicted slopes of the Kowalevski top with steps of 0.1, 0.25,
 #: 0.5 and 1 are 3e-10, 4e-8, 8e-5 and 0.1; with `BAND` alone they are 3e-5, 6e-5, 3e-4 and 0.2.
 BANDS = ((Fraction(3, 32), EARLIER), (Fraction(3, 16), EARLIER), (Fraction(3, 8), 1))
-
-
-#: Index in `BANDS` of the predictor that other solvers use for all steps. With eight stages, its errors are 1e-8 for
-#: frequencies up to 1.2/h, and 5e-4 at 2/h. With `BAND` and one previous step they are 1e-4 and 8e-4.
-SOLE_BAND = 1
 
 
 @dataclass(frozen=True)
@@ -101,6 +96,20 @@ def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
         tuple(map(tuple, _floats(doubled))),
         tuple(map(float, times)),
     )
+
+
+@cache
+def continuation(stages: int) -> list[list[float]]:
+    """Return the matrix like ``prediction`` of `Tableau` that evaluates the collocation polynomial of the last step.
+
+    Solvers with loops over the stages use it: C, JavaScript and NumPy. On ten systems at orders 4 to 16 it takes as
+    many sweeps as the second of `BANDS`, within 6 %, and up to 25 % less at small steps. It needs no change of frame of
+    the step before, and no kick spoils it.
+    """
+    weights, _ = _exact(stages)
+    nodes = gauss_nodes(stages)
+    basis = _lagrange(nodes)
+    return _floats([[_integral(p, 1 + c) / b - 1 for p, b in zip(basis, weights, strict=True)] for c in nodes])
 
 
 @cache

@@ -109,23 +109,21 @@ class NumpySession:
 
     def place(self, x: Floats) -> None:
         self._stand(x[np.newaxis].copy(), np.zeros((1, len(x))))
+        if hasattr(self._module, "_with_new_step"):
+            self._memory = [(np.zeros_like(self._x),) * 2] * len(self._stages)
 
     def kick(self, change: Floats) -> None:
         self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
+        if hasattr(self._module, "_with_new_step"):  # the last step does not lead to the state, but predicts the next
+            self._memory = [self._module._with_new_step(pair, 1.0) for pair in self._memory]
 
     def _stand(self, x: Floats, carry: Floats) -> None:
-        """Replace the state and its compensation term.
-
-        Predictors are offsets from the state, and are not changed. Those of Gauss methods are discarded, since the last
-        step does not lead to the new state.
-        """
+        """Replace the state and its compensation term. Predictors are offsets from the state, and are not changed."""
         monitored = hasattr(self._module, "_refused")
         if not np.isfinite(x).all() or (monitored and len(self._module._refused(self._values(), x))):
             raise BackendError("BAD_ARGUMENT", self.steps, self._x.copy())
         element = None if self._turned is None else self.element()
         self._x, self._carry = x, carry
-        if hasattr(self._module, "_interpolated"):
-            self._memory = [(np.zeros_like(x),) * 2] * len(self._stages)
         if monitored:  # e = -H
             self._gauge = self._module.gauge(x[0], **self._parameters)
             if np.isfinite(self._h):

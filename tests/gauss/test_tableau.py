@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from phigen.gauss.statements import check
-from phigen.gauss.tableau import DOUBLE, SINGLE, gauss_nodes, tableau
+from phigen.gauss.tableau import DOUBLE, SINGLE, continuation, gauss_nodes, tableau
 
 STAGES = range(1, 9)
 
@@ -54,6 +54,16 @@ def test_prediction_extrapolates_slow_signals(stages):
     c, b = np.array(method.nodes), np.array(method.weights)
     offsets = np.array(method.prediction) @ (b * np.cos(omega * (c - 1)))
     assert offsets == pytest.approx(np.sin(omega * c) / omega, abs={2: 0.1, 4: 3e-3, 8: 1e-4}[stages])
+
+
+@pytest.mark.parametrize("stages", STAGES)
+def test_continuation_is_exact_for_polynomials(stages):
+    """Of f = t^k with k < s, t from the end of the last step, the next step's offsets are c^{k+1}/(k+1)."""
+    method = tableau(stages)
+    c, b = np.array(method.nodes), np.array(method.weights)
+    for k in range(stages):
+        offsets = np.array(continuation(stages)) @ (b * (c - 1) ** k)
+        assert offsets == pytest.approx(c ** (k + 1) / (k + 1), abs=1e-16 * np.abs(continuation(stages)).max() + 1e-15)
 
 
 def test_coefficients_that_are_rounded_one_by_one_are_refuted():

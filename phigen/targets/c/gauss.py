@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from phigen.gauss.tableau import DOUBLE, EARLIER, SINGLE, SOLE_BAND, Tableau, predictors, tableau
+from phigen.gauss.tableau import DOUBLE, EARLIER, SINGLE, Tableau, continuation, predictors, tableau
 from phigen.lanes.in_lanes import Lanes, Stages
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.policies import POLICIES, GaussPolicy
@@ -44,7 +44,7 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
         ("NODES", step.tableau.stages, "stages of a step"),
         ("WIDTH", width, "of an array over the stages" + ", those that fill a vector" * (width > step.tableau.stages)),
         ("UNKNOWNS", step.unknowns, "of a stage"),
-        ("EARLIER", EARLIER, "steps that predictors read"),
+        *([("EARLIER", EARLIER, "steps that predictors read")] if isinstance(lanes, Stages) else []),
     ]
 
 
@@ -88,9 +88,8 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
         table = tableau(table.stages, SINGLE)  # rounded to float, the sums of coefficients would differ from 1
     staged = isinstance(lanes, Stages)
     predictions = predictors(table.stages, precision, integrated=staged and bool(step.reduced))
-    if not staged:
-        by_one = [[list(row) for row in table.prediction]] if step.adjoint else []
-        predictions = [predictions[SOLE_BAND], *by_one]
+    if not staged:  # in single precision the continuation would magnify rounding errors to the size of increments
+        predictions = [[list(row) for row in table.prediction] if program.single else continuation(table.stages)]
     terms = [f"matrix[{j}][lane] * increment[{j}]" for j in range(table.stages)]
     older = [f"matrix[{table.stages + j}][lane] * before[{j}]" for j in range(table.stages)]
     of_members = [f"matrix[{j}][i] * increments[{j}][k][lane]" for j in range(table.stages)]
@@ -99,8 +98,9 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
         "nodes": _row(table.nodes, table.stages),
         "weights": _row(table.weights, width),
         "mixing": _columns(table.mixing, width),
-        "predictors": len(predictions),
         "predicted": "integrals up to the stages" if staged and step.reduced else "the stages",
+        "predictors": len(predictions),
+        "prediction": _columns(predictions[0], width),
         "predictions": [_columns(rows, width) for rows in predictions],
         "terms": _in_chains(terms) if staged else "",
         "terms_of_two": _in_chains([*terms, *older]) if staged else "",

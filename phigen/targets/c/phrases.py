@@ -636,14 +636,15 @@ DEVICE_PREDICTOR = Choice(
 )
 
 STAGE_PREDICTORS = Choice(
-    "Gauss steps with their stages in lanes choose a predictor. Others use one, once it has the steps that it reads.",
+    "Gauss steps with their stages in lanes choose a predictor, of one step or two. Others have one, of the last step.",
     ("STAGED",),
     {
         "PREDICT(past, z)": (
             "phi_predict(past, past->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : past->predictor, z)",
-            "phi_predict(past, z)",
+            "phi_mixed(phi_prediction, past->increments, z)",
         ),
-        "NEEDED": ("1", "PHI_EARLIER"),
+        "PREDICTOR_BY_ONE": ("phi_prediction[PHI_PREDICTORS - 1]", "phi_prediction"),
+        "LAST_INCREMENTS(past)": ("past->increments[past->latest]", "past->increments"),
     },
 )
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from phigen.gauss.tableau import SOLE_BAND, predictors
 from phigen.ir.path_functions import TERMS, PathFunctions, PathLayout, tangent_program
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
@@ -82,7 +81,6 @@ def _collocation(program: Program, step: Gauss) -> list[str]:
         "nodes": json.dumps(table.nodes),
         "weights": json.dumps(table.weights),
         "mixing": [json.dumps(row) for row in table.mixing],
-        "prediction": [json.dumps(row) for row in predictors(table.stages)[SOLE_BAND]],
     }
     return [render("js", "gauss.mjs", values)]
 

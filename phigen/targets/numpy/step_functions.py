@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from phigen.gauss.tableau import SOLE_BAND, predictors
 from phigen.ir import nodes as ir
 from phigen.ir.path_functions import PathFunctions, PathLayout, tangent_program
 from phigen.scheme.kernel import Kernel
@@ -158,8 +157,6 @@ def _gauss_values(step: Gauss) -> dict[str, object]:
         "nodes": listed(step.tableau.nodes),
         "weights": listed(step.tableau.weights),
         "mixing": [", ".join(map(repr, row)) for row in step.tableau.mixing],
-        "prediction": [", ".join(map(repr, row)) for row in predictors(step.tableau.stages)[SOLE_BAND]],
-        "prediction_by_one": [", ".join(map(repr, row)) for row in step.tableau.prediction],
         "framed": step.frame is not None,
         "plain": step.plain,
         "unknowns": step.unknowns,

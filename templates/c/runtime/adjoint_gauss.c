@@ -118,7 +118,7 @@ static void phi_predict_back(const phi_solver *s, double point[PHI_POINT], const
     memset(reversed, 0, sizeof reversed);
     for (int k = 0; k < PHI_UNKNOWNS; ++k)
         for (int i = 0; i < PHI_NODES; ++i) reversed[k][i] = after[k][PHI_NODES - 1 - i];
-    phi_mixed(phi_prediction[PHI_PREDICTORS - 1], reversed, after); /* the last predictor reads one step */
+    phi_mixed(PHI_PREDICTOR_BY_ONE, reversed, after);
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {
         for (int lane = 0; lane < PHI_WIDTH; ++lane) increments_bar[k][lane] = end_bar[k];
         for (int i = 0; i < PHI_NODES; ++i) increments_bar[k][i] += after[k][PHI_NODES - 1 - i];

@@ -15,7 +15,8 @@ static phi_status phi_record_steps(phi_solver *s, size_t steps, phi_step_tape *t
 #if PHI_FRAMED
     memcpy(tape[0] + PHI_DIM, s->history.solved, sizeof s->history.solved);
 #else
-    memcpy(tape[0] + PHI_DIM, s->history.increments[s->history.latest], sizeof s->history.increments[0]);
+    const phi_history *past = &s->history;
+    memcpy(tape[0] + PHI_DIM, PHI_LAST_INCREMENTS(past), sizeof PHI_LAST_INCREMENTS(past));
 #endif
     if (status != PHI_OK) *s = before;
     return status;

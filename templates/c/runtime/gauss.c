@@ -131,19 +131,6 @@ static int phi_best_predictor(phi_history *past, double scale, phi_lanes *reads)
     return best;
 }
 
-#else
-/* Predict the unknowns from the increments of the last two steps. */
-static void phi_predict(phi_history *past, phi_lanes *z)
-{
-    double(*last)[PHI_WIDTH] = past->increments[past->latest], (*older)[PHI_WIDTH] = past->increments[1 - past->latest];
-    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        PHI_CLEAR_STAGE(z[k]);
-        for (int j = 0; j < PHI_NODES; ++j)
-            for (int i = 0; i < PHI_NODES; ++i)
-                z[k][i] += phi_prediction[0][j][i] * last[k][j] + phi_prediction[0][PHI_NODES + j][i] * older[k][j];
-    }
-}
-
 #endif
 #if PHI_FRAMED
 /* Stage increments in the frame of the end of a step from a point, where the next step starts. */
@@ -169,8 +156,11 @@ static void phi_to_next_frame(const phi_solver *s, double point[PHI_POINT], cons
 static void phi_remember(phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments)
 {
     phi_history *past = &s->history;
-    const int older = past->latest, latest = PHI_EARLIER - 1 - older;
+#if PHI_STAGED
+    const int older = past->latest;
+    past->latest = PHI_EARLIER - 1 - older;
     if (PHI_DIFFERS(s->h, past->h)) past->count = 0; /* predictors read steps of one size */
+#endif
     past->h = s->h;
     past->kicked = 0;
 #if PHI_FRAMED
@@ -178,20 +168,21 @@ static void phi_remember(phi_solver *s, double point[PHI_POINT], const double en
     phi_lanes last[PHI_UNKNOWNS];
     memcpy(last, past->increments[older], sizeof last);
     phi_to_next_frame(s, point, end, last, past->increments[older]);
-#else
-    phi_to_next_frame(s, point, end, past->increments[older], past->increments[older]);
 #endif
-    phi_to_next_frame(s, point, end, increments, past->increments[latest]);
+    phi_to_next_frame(s, point, end, increments, PHI_LAST_INCREMENTS(past));
 #if PHI_ADJOINT
     PHI_COPY_STAGES(past->solved, increments, past->solved);
 #endif
 #else
     (void)point;
     (void)end;
-    PHI_COPY_STAGES(past->increments[latest], increments, past->increments[latest]);
+    PHI_COPY_STAGES(PHI_LAST_INCREMENTS(past), increments, PHI_LAST_INCREMENTS(past));
 #endif
-    past->latest = latest;
+#if PHI_STAGED
     if (past->count < PHI_EARLIER) ++past->count;
+#else
+    past->count = 1;
+#endif
 }
 
 #include "gauss_policy.h"
@@ -229,10 +220,12 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
     PHI_ITERATES(now, increments)
     phi_progress progress = { HUGE_VAL, 0, 0 };
     phi_set_factors(s->h, factors);
-    if (past->count < PHI_NEEDED || PHI_DIFFERS(s->h, past->h)) {
+    if (past->count == 0 || PHI_DIFFERS(s->h, past->h)) {
         PHI_CLEAR_STAGES(z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h)) phi_predict_at(past, s->h / past->h, z);
+#if PHI_STAGED
         if (past->count > 1) past->count = 1;
+#endif
         past->rate = 0.5;
         past->sweeps = 2;
     } else {

@@ -16,7 +16,7 @@ static void phi_predict_at(phi_history *past, double ratio, phi_lanes *z)
     for (int i = 0; i < PHI_NODES; ++i) {
         phi_factors_at(1.0 + ratio * phi_nodes[i], factor);
         for (int k = 0; k < PHI_UNKNOWNS; ++k)
-            for (int j = 0; j < PHI_NODES; ++j) z[k][i] += factor[j] * past->increments[past->latest][k][j];
+            for (int j = 0; j < PHI_NODES; ++j) z[k][i] += factor[j] * PHI_LAST_INCREMENTS(past)[k][j];
     }
 }
 #endif

@@ -4,7 +4,9 @@
    only. */
 typedef struct {
     int count;     /* steps in increments */
+#if PHI_STAGED
     int latest;    /* index of the last step in increments */
+#endif
     int sweeps;    /* number of the first sweep over the stages whose change is measured */
 #if PHI_STAGED
     int predictor; /* row of phi_prediction that predicts the next step */
@@ -13,7 +15,11 @@ typedef struct {
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int kicked;    /* whether the state was changed since the last step */
     double h;      /* size of the last step */
+#if PHI_STAGED
     double increments[PHI_EARLIER][PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last steps, in the frame of the end of the last one */
+#else
+    double increments[PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last step, in the frame of its end */
+#endif
 #if PHI_FRAMED && PHI_ADJOINT
     double solved[PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last step in the frame of its start, for the tape */
 #endif

@@ -12,7 +12,8 @@ export function weigh(sites) {
   const m = sites.params[MASS];
   sites.mass = m.reduce((sum, mass) => sum + mass, 0);
   if (!(m[0] > 0) || m.some((mass) => mass < 0) || !Number.isFinite(sites.mass)) {
-    const message = "masses must not be negative, their sum must be finite, and the first body must have a mass";
+    const message =
+      "masses must not be negative, their sum must be finite, and the first body must have a mass";
     throw new StepError("BAD_ARGUMENT", 0, message);
   }
   expectMasses(m);

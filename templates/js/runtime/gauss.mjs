@@ -1,6 +1,6 @@
 import { advance } from "./algebra.mjs";
 import { MOST_RISING, NEARLY_ROUNDING, ROUNDING, SOLVED, STALLED } from "./gauss_policy.mjs";
-import { DIM, MAX_SWEEPS, MIXING, PLACES, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
+import { DIM, MAX_SWEEPS, MIXING, PLACES, PLAIN, POINT, UNKNOWNS, WEIGHTS } from "./model.mjs";
 import { stageChange, stageField } from "./model.mjs";
 import { turnStage } from "./attitude_stages.mjs";
 import { storeIncrement } from "./gauss_framed.mjs";
@@ -16,35 +16,32 @@ export function stages() {
   return Array.from({ length: NODES }, () => new Float64Array(UNKNOWNS));
 }
 
-/** Predictor: results of the last two steps, from which the next one starts. Affects the speed only. */
+/** Predictor: results of the last step, from which the next one starts. Affects the speed only. */
 export class History {
-  /** Steps whose increments are stored. */
-  count = 0;
+  /** Whether a step is stored, and whether the state was changed since that step. */
+  stored = false;
+  kicked = false;
   /** Sweeps of the last step, and the factor by which their changes shrink. */
   sweeps = 2;
   rate = 0.5;
   /** Increments of the stages of the last step, in the frame of its end, and its size. */
   increments = stages();
   h = NaN;
-  /** Increments of the step before, in the same frame. */
-  older = stages();
 
   /** Clear the predictor. */
   clear() {
-    this.count = 0;
+    this.stored = false;
   }
 
-  /** Clear the predictor, after the state has been changed. */
+  /** Kick: increments of the last step still predict those of the next one, but do not lead to the state. */
   shift() {
-    this.clear();
+    this.kicked = true;
   }
 
   /** An independent copy. */
   copy() {
     const twin = Object.assign(new History(), this);
-    for (const steps of ["increments", "older"]) {
-      twin[steps] = this[steps].map((increment) => Float64Array.from(increment));
-    }
+    twin.increments = this.increments.map((increment) => Float64Array.from(increment));
     return twin;
   }
 }
@@ -86,11 +83,11 @@ export function startOf({ x, t }) {
   return point;
 }
 
-/** The unknowns of all stages: weighted sums of the stage increments, of one step or more. */
+/** The unknowns of all stages: weighted sums of the stage increments. */
 export function mixed(matrix, increments, z) {
   for (let i = 0; i < NODES; i++) {
     z[i].fill(0);
-    for (let j = 0; j < increments.length; j++) {
+    for (let j = 0; j < NODES; j++) {
       const factor = matrix[i][j];
       for (let k = 0; k < UNKNOWNS; k++) z[i][k] += factor * increments[j][k];
     }
@@ -127,6 +124,9 @@ function changeOf(start, before, after) {
   return Math.sqrt(largest);
 }
 
+/** Predictor of the stages of a step of the same size, from the increments of the last one. */
+const PREDICTION = PLACES.map((place) => factorsAt(1 + place));
+
 const predicted = stages();
 const mixedIncrements = stages();
 
@@ -138,11 +138,11 @@ export function collocate(solver, stage, start, history, increments) {
   let last = Infinity;
   let rising = 0;
   let rises = 0;
-  if (history.count > 1 && solver.h === history.h) {
-    mixed(PREDICTION, [...history.increments, ...history.older], predicted);
+  const ratio = history.stored ? solver.h / history.h : NaN;
+  if (ratio === 1) {
+    mixed(PREDICTION, history.increments, predicted);
   } else {
-    const ratio = solver.h / history.h;
-    if (history.count > 0 && Math.abs(ratio) <= 1) {
+    if (Math.abs(ratio) <= 1) {
       mixed(PLACES.map((place) => factorsAt(1 + ratio * place)), history.increments, predicted);
     } else {
       for (const row of predicted) row.fill(0);
@@ -202,11 +202,10 @@ function attempt(solver, stage) {
   if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
   pass(solver, time);
   for (let i = 0; i < NODES; i++) {
-    storeIncrement(solver.coef[stage], start, end, history.increments[i], history.older[i]);
     storeIncrement(solver.coef[stage], start, end, work.now[i], history.increments[i]);
   }
-  // predictors read steps of one size
-  history.count = solver.h === history.h ? Math.min(history.count + 1, 2) : 1;
+  history.stored = true;
+  history.kicked = false;
   history.h = solver.h;
   turnStage(solver, stage, end);
   return "OK";
@@ -215,7 +214,7 @@ function attempt(solver, stage) {
 /** Make one step; returns a status. If it fails from the prediction, it is tried again without one. */
 export function makeStage(solver, stage) {
   const status = attempt(solver, stage);
-  if (status === "OK" || solver.history[stage].count === 0) return status;
+  if (status === "OK" || !solver.history[stage].stored) return status;
   solver.history[stage].clear();
   return attempt(solver, stage);
 }

@@ -16,7 +16,9 @@ export class Interpolation {
    */
   interpolate(fractions) {
     const [history] = this.history;
-    if (!history.count) throw new StepError("BAD_ARGUMENT", this.steps, "no step leads to this state");
+    if (!history.stored || history.kicked) {
+      throw new StepError("BAD_ARGUMENT", this.steps, "no step leads to this state");
+    }
     const start = startOf(this);
     const change = new Float64Array(DIM);
     return fractions.map((fraction) => {

@@ -1,4 +1,5 @@
 import { finite } from "./errors.mjs";
+import { forgetSteps } from "./gauss.mjs";
 import { shiftHistory } from "./history_shifted.mjs";
 import { takeLevel } from "./level_of_new_state.mjs";
 import { restartAttitude } from "./attitude_gauge.mjs";
@@ -14,7 +15,9 @@ export class Kicks {
    * @returns {this}
    */
   setState(x) {
-    return this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    this.#place(finite(x, DIM, "x"), new Float64Array(DIM));
+    forgetSteps(this);
+    return this;
   }
 
   /**

@@ -1,4 +1,4 @@
-/* The implicit midpoint rule as a Gauss method of one stage, which is predicted by the last two, or by the last one. */
+/* The implicit midpoint rule as a Gauss method of one stage, which is predicted by the last step. */
 #ifndef GAUSS_TABLES_H
 #define GAUSS_TABLES_H
 #include <string.h>
@@ -6,11 +6,7 @@
 static const double phi_nodes[PHI_NODES] = { 0.5 };
 static const double phi_weights[PHI_WIDTH] = { 1.0 };
 static const double phi_mixing[PHI_NODES][PHI_WIDTH] = { { 0.5 } };
-enum { PHI_PREDICTORS = 2 };
-static const double phi_prediction[PHI_PREDICTORS][PHI_EARLIER * PHI_NODES][PHI_WIDTH] = {
-    { { 1.0 }, { -0.5 } },
-    { { 0.5 } }
-};
+static const double phi_prediction[PHI_NODES][PHI_WIDTH] = { { 0.5 } };
 
 enum { PHI_ITERATED = PHI_UNKNOWNS, PHI_READS = PHI_UNKNOWNS, PHI_FACTORS = 1 };
 
