@@ -209,6 +209,7 @@ def module(cards=1):
         "multiProcessorCount": 4,
         "totalGlobalMem": 1 << 30,
         "sharedMemPerBlock": 49_152,
+        "maxThreadsPerBlock": 1024,
     }
     cupy.cuda = SimpleNamespace(
         runtime=SimpleNamespace(

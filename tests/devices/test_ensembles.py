@@ -137,6 +137,23 @@ def test_work_groups_are_smaller_where_shared_memory_is_little(body, x0, monkeyp
     np.testing.assert_array_equal(again.ensemble(x0, 0.1, 20, stride=4), device.ensemble(x0, 0.1, 20, stride=4))
 
 
+@pytest.mark.slow
+def test_work_groups_are_no_larger_than_a_device_can_run(x0, monkeypatch):
+    """Of members with and without predictors in shared memory, and of lattices."""
+    device, compiled = opencl.device(), []
+    build = device.compiled
+    monkeypatch.setattr(device, "group", 40)
+    monkeypatch.setattr(device, "compiled", lambda text, defined: compiled.append(defined) or build(text, defined))
+    for source in (compile_text(BODY), "pendulum_euler"):
+        ours, c = both(source)
+        start = x0[:, : ours.interface.dimension]
+        np.testing.assert_allclose(ours.ensemble(start, 0.1, 5), c.ensemble(start, 0.1, 5), rtol=0, atol=1e-13)
+    ours, c = both("toda")
+    start = 0.1 + np.zeros((2, 50))
+    np.testing.assert_allclose(ours.integrate(start, 0.1, 5).x, c.integrate(start, 0.1, 5).x, rtol=0, atol=1e-13)
+    assert [n for macros in compiled for name, n in macros.items() if name.endswith("_GROUP")] == [32] * len(compiled)
+
+
 def test_failed_members_have_the_statuses_of_c(body, x0):
     x0[3], x0[50] = 1e200, 1e60
     errors = []

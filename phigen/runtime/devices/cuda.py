@@ -32,7 +32,7 @@ class CUDADevice:
         facts = cupy.cuda.runtime.getDeviceProperties(index)
         self.name, self.units = facts["name"].decode(), facts["multiProcessorCount"]
         self.memory = self.largest = facts["totalGlobalMem"]
-        self.shared = facts["sharedMemPerBlock"]
+        self.shared, self.group = facts["sharedMemPerBlock"], facts["maxThreadsPerBlock"]
 
     def __repr__(self) -> str:
         return f"<CUDA device: {self.name}, {self.memory >> 20} MiB>"

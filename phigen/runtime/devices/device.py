@@ -31,6 +31,7 @@ class Device(Protocol):
     memory: int  # bytes of device memory
     largest: int  # bytes of the largest possible array
     shared: int  # bytes of shared memory of a work group
+    group: int  # most work items in a group
     units: int  # compute units, each of which runs many work items
     double: bool  # whether double precision is supported
     is_card: bool  # whether it is a graphics card: values beyond its registers lie in slow memory

@@ -19,11 +19,18 @@ _REDUCED = 64
 _KINDS = {"sum": 0, "mean": 0, "product": 1, "max": 2, "min": 3}
 
 
+#: Most work items in a group of generated code, unless a macro defines another number.
+_GROUP = 128
+
+
 class Kernels:
-    """The kernels of a compiled program by name; each is created on first use."""
+    """The kernels of a compiled program by name, in groups that the device can run; each is created on first use."""
 
     def __init__(self, device: Device, text: str, name: str, defined: Mapping[str, int]) -> None:
         self._device, self._name = device, name
+        group = f"{name}_GROUP"
+        if device.group < defined.get(group, _GROUP):
+            defined = {**defined, group: 1 << device.group.bit_length() - 1}
         self._program = device.compiled(text, defined)
         self._kernels: dict[str, Any] = {}
 

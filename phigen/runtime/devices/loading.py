@@ -21,7 +21,7 @@ def backend(files: Mapping[str, str], interface: Interface, target: str, index: 
     device = device_of(target, index)
     if not (device.double or interface.single):
         hint = "write real: float in the spec, or set PHIGEN_DEVICE to another device"
-        raise DeviceError(f"{device.name} has no numbers in double precision; {hint}")
+        raise DeviceError(f"{device.name} does not support double precision; {hint}")
     if isinstance(interface, LatticeInterface):
         return DeviceLattice(files, interface, target, index=index)
     return DeviceSolver(files, interface, target, host.load(files, interface), index=index)

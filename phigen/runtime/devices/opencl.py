@@ -31,7 +31,7 @@ class OpenCLDevice:
         self._queue = cl.CommandQueue(self._context)
         self.name, self.units = f"{device.name.strip()}, {device.platform.name.strip()}", device.max_compute_units
         self.memory, self.largest = device.global_mem_size, device.max_mem_alloc_size
-        self.shared = device.local_mem_size
+        self.shared, self.group = device.local_mem_size, device.max_work_group_size
         self.double = bool(device.double_fp_config)
         self.is_card = not device.type & cl.device_type.CPU
 
