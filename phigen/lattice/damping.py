@@ -102,7 +102,7 @@ def _sums(cell: Cell) -> tuple[BondSum, ...]:
     sums = site_sums(cell) if cell.relation == GRAPH else ()
     for base, offset in cell.places(*(e for s in sums for e in s.values.values())).values():
         if base in cell.fields and offset == ("a",):
-            raise _NoFlowError(f"what a bond adds depends on {base} of the site itself")
+            raise _NoFlowError(f"the damping along a bond depends on {base} of the damped site")
     return tuple(replace(s, chosen="here") for s in sums)
 
 

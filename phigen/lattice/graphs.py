@@ -111,7 +111,7 @@ class GraphSearch(PartSearch):
             moving = {"a": equation.rates.keys(), "b": equations[neighbour_place].rates.keys()}
             for base, offset in self.cell.places(*(e for s in equation.gathered for e in s.values.values())).values():
                 if base in moving[str(offset[0])]:
-                    raise NoPartError(terms[0].expression, f"what a bond adds depends on {base}, which moves")
+                    raise NoPartError(terms[0].expression, f"the force along a bond depends on {base}, which moves")
             yield self._solved_motion(equation.rates, equation.forces, equation.gathered, 0, part)
 
 

@@ -35,7 +35,7 @@ from phigen.symbolic.neighbours import ENDS
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: M_i, an array over the bodies that the solver computes from the masses.
+#: The central masses M_i of Kepler motions, an array over bodies that the solver computes from the masses.
 INNER_MASS = Symbol("inner", "mass")
 
 #: Key of specs for relative coordinates, and the name of Jacobi coordinates, in which B is a function of positions.

@@ -89,7 +89,7 @@ def _row_times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fr
     forwards = run.step > 0
     ordered = sorted((_number(t, "at") for t in times), reverse=not forwards)
     if not ordered:
-        raise ValueError("at has no times")
+        raise ValueError("at: there are no times")
     if (ordered[0] < run.start) if forwards else (ordered[0] > run.start):
         raise ValueError(f"at: {float(ordered[0])!r} is before the start, {float(run.start)!r}")
     if known_end:

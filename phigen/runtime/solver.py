@@ -119,7 +119,7 @@ class Solver(Named[Backend, Interface]):
             rows = arguments.increments(increments, self.interface)
             followed, steps = PrescribedNoise(session, rows), len(rows) if steps is None else steps
             if steps > len(rows) or until is not None:
-                raise ValueError(f"increments are those of {len(rows)} steps")
+                raise ValueError(f"increments are given for {len(rows)} steps only")
         course = Retrying(followed, retry)
         times, elements = dict[int, float](), dict[int, Floats]()
 

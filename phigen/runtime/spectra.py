@@ -191,9 +191,9 @@ def equal_times(t: Floats, h: float, after: float | None) -> Floats:
     if len(frames) > 2 and abs(frames[-1] - 2 * frames[-2] + frames[-3]) > _EQUAL * abs(frames[1] - frames[0]):
         frames = frames[:-1]
     if len(frames) < LEAST_FRAMES:
-        raise ValueError(f"a spectrum needs {LEAST_FRAMES} frames that are equal times apart, not {len(frames)}")
+        raise ValueError(f"a spectrum needs {LEAST_FRAMES} frames at equal intervals of time, not {len(frames)}")
     if np.ptp(np.diff(frames)) > _EQUAL * abs(frames[1] - frames[0]):
-        raise ValueError("a spectrum needs frames that are equal times apart")
+        raise ValueError("a spectrum needs frames at equal intervals of time")
     return frames
 
 

@@ -132,7 +132,7 @@ def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
         if part == carrier:
             clock += Fraction(schedule.times[row])
         elif moments.setdefault(row, clock) != clock:
-            raise ValueError(f"row {row} would need two times")
+            raise ValueError(f"row {row} occurs at two times")
     pattern = tuple(flow for flow in schedule.pattern if flow[0] < parts)
     fractions = tuple(float(moments.get(row, Fraction(0))) for row in range(len(schedule.times)))
     return replace(schedule, pattern=pattern, moments=fractions)

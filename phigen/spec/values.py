@@ -66,7 +66,7 @@ def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> 
     if kind == "sphere" and not whole:
         reader.error(entries["random"][1], "random: sphere is for all fields of a site together", _WHOLE_SPHERE)
     if mean is not None and kind == "sphere":
-        reader.error(mean, "mean: not for random: sphere, which is centred at 0")
+        reader.error(mean, "mean: random: sphere has the mean 0")
         mean = None
     factor = Fraction(1) if scale is None else declared.number(scale, declared.numbers())
     around = declared.formula(mean, declared.site_numbers())

@@ -176,8 +176,8 @@ def moved(x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Exp
 def identities() -> Iterator[tuple[str, Expression]]:
     """Yield the residuals that vanish if the increments are the flow, in independent symbols x_i, α_i and S.
 
-    Let E_m be the largest. Then σ_m = 1 and Ṡ = σ_j σ_k, which is CD for the elliptic functions, and σ_j, σ_k are roots
-    of 1 − (E_m − E_j)S². The factors σ_j σ_k − D are compared with their form for small S.
+    Let E_m be the largest E_i. Then σ_m = 1 and Ṡ = σ_j σ_k, which is CD for the elliptic functions, and σ_j, σ_k are
+    roots of 1 − (E_m − E_j)S². The factors σ_j σ_k − D are compared with their form for small S.
     """
     names = [Symbol("body", kind, i) for kind in ("x", "a") for i in range(3)]
     x, factors = ([symbol(name) for name in symbol_names] for symbol_names in (names[:3], names[3:]))

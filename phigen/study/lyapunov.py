@@ -161,7 +161,8 @@ def lattice_spectrum(
     x = np.asarray(x0, dtype=float)
     if not 1 <= count <= x.size:
         raise ValueError(f"a lattice of these sizes has 1 to {x.size} exponents, not {count}")
-    expect_room(f"the arrays of {count} tangent vectors", 3 * 8 * count * x.size)  # drawn; copy in qr; result
+    # There are the vectors drawn, their copy in qr, and the result of qr.
+    expect_room(f"the arrays of {count} tangent vectors", 3 * 8 * count * x.size)
     frame = np.linalg.qr(np.random.default_rng(0).normal(size=(x.size, count)))[0]
     growth = FrameGrowth(x.size, h, frame)
     options: Any = {"t0": t0, "parameters": parameters, **draws}

@@ -174,7 +174,7 @@ def _sweep_of(
         known = ", ".join([*KEPT, *spec.recorded, *(f"{of}({n})" for n in spec.recorded for of in STATISTICS)])
         raise ValueError(f"cannot keep {strange[0]!r}; there are {known}")
     if "crossings" in sweep.keep and spec.lattice:
-        raise ValueError("crossings: sweeps keep those of ordinary systems; keep observables: M, mean(M), std(M)")
+        raise ValueError("crossings: sweeps of lattices cannot keep them; keep observables: M, mean(M), std(M)")
     if "crossings" in sweep.keep and run.section is None:
         raise ValueError(f"crossings: the run {run.name} has no section")
     if "energy_error" in sweep.keep and spec.time:

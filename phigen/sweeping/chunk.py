@@ -64,7 +64,7 @@ def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
 
 @contextlib.contextmanager
 def _exclusive_lock(name: str) -> Iterator[None]:
-    """Return a context in which no other process of this machine is at the same time."""
+    """Return a context that only one process of this machine at a time can enter."""
     try:
         import fcntl
     except ImportError:  # Windows has no such lock; several processes may then compile

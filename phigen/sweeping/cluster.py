@@ -81,11 +81,13 @@ def make_all(client: Any, slots: int, store: str, digest: str, chunks: Sequence[
             again = following()
         except distributed.scheduler.KilledWorker as error:
             if tries[number] >= TRIES:
-                raise SweepError(f"chunk {number}: {tries[number]} workers died with it; {error}") from None
+                raise SweepError(
+                    f"chunk {number}: {tries[number]} workers ended while they computed it; {error}"
+                ) from None
             again = [submit(number)]
         except (distributed.client.FuturesCancelledError, distributed.CancelledError, distributed.comm.CommClosedError):
             raise SweepError(
-                "the scheduler went away\n  hint: repeat the command to continue where it stopped"
+                "the connection to the scheduler was lost\n  hint: repeat the command to continue where it stopped"
             ) from None
         except OSError as error:
             hint = "repeat the command to continue where it stopped"

@@ -75,8 +75,8 @@ def agreed(
         raise CheckError(
             f"no reference solution for the orbit: an error of {accuracy:.1e} is to be measured, but two methods at "
             f"small steps agree to that only up to {clock} = {spacing * int(np.argmax(apart)):.4g} of {span:.6g}\n"
-            "  hint: chaotic motion and rounding both do that; ask for a shorter --horizon or less accuracy, or "
-            "let --measure be energy"
+            "  hint: the motion is chaotic, or the error is at rounding level; ask for a shorter --horizon or less "
+            "accuracy, or let --measure be energy"
         )
     return Reference(first, h, difference, clock)
 

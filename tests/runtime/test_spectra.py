@@ -84,7 +84,7 @@ def test_what_has_no_spectrum_is_told():
     )
     with pytest.raises(ValueError, match="'w' is not a coordinate; there are x, y, z"):
         run.spectrum(["w"])
-    with pytest.raises(ValueError, match="needs 4 frames that are equal times apart, not 2"):
+    with pytest.raises(ValueError, match="needs 4 frames at equal intervals of time, not 2"):
         run.spectrum(["x"], after=0.3)
     with pytest.raises(ValueError, match="up_to must be from 0 to 5"):
         run.correlation("x", up_to=6)
@@ -143,8 +143,8 @@ def test_times_that_give_no_spectrum_are_refused_before_the_run(tmp_path, monkey
     (tmp_path / "waves.yaml").write_text(ASKING)
     (tmp_path / "folder.zarr").mkdir()
     for options, message in (
-        (["--at", "3,4,6,7"], "a spectrum needs frames that are equal times apart"),
-        (["--until", "3"], "needs 4 frames that are equal times apart, not 2"),
+        (["--at", "3,4,6,7"], "a spectrum needs frames at equal intervals of time"),
+        (["--until", "3"], "needs 4 frames at equal intervals of time, not 2"),
         (["--until", "50"], "there are no frames from t = 60.0 on"),
         (["-o", "folder.zarr"], "folder.zarr exists, and is not a Zarr store"),
     ):

@@ -601,7 +601,7 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
         phigen.sweep(specs.loads(CHAIN), over={"x": [1.0]})
     with pytest.raises(ValueError, match="needs a run of the spec"):
         phigen.sweep(specs.loads(CHAIN), initial=[1, 0, 0])
-    with pytest.raises(phigen.SpecError, match="crossings: sweeps keep those of ordinary systems"):
+    with pytest.raises(phigen.SpecError, match="crossings: sweeps of lattices cannot keep them"):
         specs.loads(CHAIN.replace("keep: [final", "keep: [crossings"))
 
 
