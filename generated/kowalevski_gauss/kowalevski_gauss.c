@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 3fb070fee1055138b57049102ec5e98648ed874d9a9bab773c61852927815e54
+ * body-sha256: 0f62fa8f2b69652be796fe69694f885fa09624f516d353d40ecb7f4852199fe6
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -371,7 +371,8 @@ static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double
 }
 
 /* ---- The implicit step, by Gauss collocation ---- */
-/* Start of a step: the coordinates, and the time if H depends on it. */
+/* Start of a step: the coordinates, the time if H depends on it, and frames of group elements if there are
+   any. */
 static void kowalevski_gauss_start(const kowalevski_gauss_solver *s, double point[kowalevski_gauss_POINT])
 {
     memcpy(point, s->x, sizeof s->x);
@@ -452,10 +453,10 @@ static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowal
     return 1.0 / square;
 }
 
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for
-   group elements. */
-static inline double kowalevski_gauss_change_of(double scale, int count, kowalevski_gauss_lanes *before,
-    kowalevski_gauss_lanes *after)
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, |F| or
+   1 for group elements. */
+static inline double kowalevski_gauss_change_of(double scale, double element_scale, int count,
+    kowalevski_gauss_lanes *before, kowalevski_gauss_lanes *after)
 {
     kowalevski_gauss_lanes sum = { 0.0 };
     for (int k = 0; k < count; ++k) {
@@ -464,9 +465,9 @@ static inline double kowalevski_gauss_change_of(double scale, int count, kowalev
         for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane)
             sum[lane] += (now[lane] - old[lane]) * (now[lane] - old[lane]);
         if (k + 1 == (count < kowalevski_gauss_PLAIN ? count : kowalevski_gauss_PLAIN))
-            for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane) sum[lane] *= scale;
+            for (int lane = 0; lane < kowalevski_gauss_WIDTH; ++lane) sum[lane] *= scale / element_scale;
     }
-    return kowalevski_gauss_total(sum) / (double)kowalevski_gauss_NODES;
+    return element_scale * (kowalevski_gauss_total(sum) / (double)kowalevski_gauss_NODES);
 }
 
 /* Predict the values that sweeps read, from the increments of the last steps. */
@@ -487,7 +488,7 @@ static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int 
 
 /* Number of the predictor that would have come nearest to the values that the last sweep of a step has
    read. */
-static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale,
+static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale, double element_scale,
     kowalevski_gauss_lanes *reads)
 {
     kowalevski_gauss_lanes predicted[kowalevski_gauss_READS];
@@ -495,7 +496,8 @@ static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, doubl
     int best = kowalevski_gauss_PREDICTORS - 1;
     for (int predictor = 0; predictor < kowalevski_gauss_PREDICTORS; ++predictor) {
         kowalevski_gauss_predict(past, predictor, predicted);
-        const double change = kowalevski_gauss_change_of(scale, kowalevski_gauss_READS, predicted, reads);
+        const double change = kowalevski_gauss_change_of(scale, element_scale, kowalevski_gauss_READS,
+            predicted, reads);
         if (change < least) {
             least = change;
             best = predictor;
@@ -600,8 +602,9 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
         const int tested = sweep >= past->sweeps;
         kowalevski_gauss_slopes(s, point, factors, z, tested ? next : now);
         if (tested) {
-            const double scale = kowalevski_gauss_scale(s->x, next),
-                square = kowalevski_gauss_change_of(scale, kowalevski_gauss_ITERATED, now, next);
+            const double scale = kowalevski_gauss_scale(s->x, next), element_scale = 1.0;
+            const double square = kowalevski_gauss_change_of(scale, element_scale, kowalevski_gauss_ITERATED,
+                now, next);
             const int solved = square * (past->rate * past->rate) <= kowalevski_gauss_SOLVED
                 * kowalevski_gauss_SOLVED;
             const int judgement = solved ? 1 : kowalevski_gauss_judge(&past->rate, &past->sweeps, &progress,
@@ -616,7 +619,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
                     ? sweep - 1 : sweep;
                 if (past->sweeps < 2) past->sweeps = 2;
                 if (past->count == kowalevski_gauss_EARLIER && past->age++ % kowalevski_gauss_TRIALS == 0)
-                    past->predictor = kowalevski_gauss_best_predictor(past, scale, z);
+                    past->predictor = kowalevski_gauss_best_predictor(past, scale, element_scale, z);
                 s->evaluations += (size_t)sweep;
                 return kowalevski_gauss_OK;
             }

@@ -12,6 +12,7 @@ from phigen.symbolic.expression import topological
 from phigen.symbolic.numeric import evaluate
 from phigen.symbolic.remainders import QUOTIENTS, REMAINDERS
 from phigen.symbolic.universal import ANOMALY
+from phigen.targets.c.gauss import with_frames
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
@@ -68,6 +69,9 @@ def _expect_covered(program: Program, spec: Spec) -> None:
         refusals.append((("noise",), "certificates do not cover noise", "a spec without it"))
     if program.single:
         refusals.append((("solver",), "certificates are of C in double precision", "leave out real: float"))
+    if with_frames(program) is not program:
+        message = f"certificates do not cover steps of order {program.order} in frames that move along"
+        refusals.append((("order",), message, "order: 12, or profile: small"))
     flows = {_FLOWS[e.op] for kernel in program.kernels for e in topological(kernel.roots) if e.op in _FLOWS}
     for flow in sorted(flows):
         hint = "scheme: series, or composition: suzuki, which splits it" if flow in _SPLIT else "scheme: series"

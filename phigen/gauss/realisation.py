@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from phigen.gauss.enveloping import enveloping
+from phigen.gauss.lift import Copy, quaternion_copies
 from phigen.gauss.logarithms import Rates, logarithmic
 from phigen.gauss.matrices import of_matrices
 from phigen.gauss.quaternionic import quaternionic
@@ -57,6 +58,7 @@ class AlgebraBlock:
     x_i + ``shift``_i is a momentum map of the star algebra ``algebra``. If ``central`` is set, the last basis element
     of the Lie algebra has no coordinate, and the constant value 1. ``ideal`` are the basis elements of a square-zero
     ideal whose components of G are replaced by functionals (`phigen.gauss.square_zero`); () if there is none.
+    ``copies`` are copies of the quaternions, if G starts from F in place of 1 (`phigen.gauss.lift`).
     """
 
     indices: tuple[int, ...]
@@ -65,6 +67,7 @@ class AlgebraBlock:
     shift: tuple[Expression, ...]
     central: bool = False
     ideal: tuple[int, ...] = ()
+    copies: tuple[Copy, ...] = ()
 
     @property
     def subalgebra(self) -> tuple[int, ...]:
@@ -103,6 +106,17 @@ class Realisation:
         these."""
         parts = (replace(part, ideal=()) if isinstance(part, AlgebraBlock) else part for part in self.parts)
         return Realisation(tuple(parts), self.exact)
+
+    @property
+    def lifted(self) -> Realisation | None:
+        """The same with the frames F of `phigen.gauss.lift` for all group elements; None if one has none."""
+        parts: list[Part] = []
+        for part in self.parts:
+            copies = quaternion_copies(part.algebra) if isinstance(part, AlgebraBlock) and not part.central else ()
+            if isinstance(part, AlgebraBlock) and not copies:
+                return None
+            parts.append(replace(part, copies=copies) if isinstance(part, AlgebraBlock) else part)
+        return Realisation(tuple(parts), self.exact) if self.groups else None
 
     @property
     def label(self) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from phigen.gauss.lift import momentum_form
 from phigen.gauss.realisation import AlgebraBlock, Plain, Realisation
 from phigen.gauss.star_algebra import StarAlgebra, Vector, combined
 from phigen.geometry.field import Scalar
@@ -29,8 +30,8 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.symbols import Symbol
 
-#: The kind of the symbols that stand for unknowns.
-OFFSET = "z"
+#: The kinds of the symbols that stand for unknowns, and for components of the frames F of group elements.
+OFFSET, FRAME = "z", "frame"
 
 
 @dataclass(frozen=True)
@@ -67,8 +68,19 @@ class StageMap:
 
     @property
     def start(self) -> tuple[str, ...]:
-        """The names of the symbols at the start of a step: coordinates, then the time."""
-        return (*self.system.coordinates, *self.system.times)
+        """The names of the symbols at the start of a step: coordinates, the time, then frames of group elements."""
+        return (*self.system.coordinates, *self.system.times, *self.frames)
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The names of the components of frames of group elements, in the order of the last unknowns."""
+        groups = zip(self.realisation.groups, self.places, strict=True)
+        return tuple(frame_symbol(k) for group, places in groups if group.copies for k in places)
+
+
+def frame_symbol(place: int) -> str:
+    """Return the symbol of the component of a frame that belongs to an unknown."""
+    return Symbol(FRAME, place)
 
 
 def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) -> StageMap:
@@ -89,7 +101,7 @@ def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) 
     for i, offset in points.logarithms.items():
         change[i] = symbol(system.coordinates[i]) * call("expm1", offset)
     for group, at in zip(realisation.groups, places, strict=True):
-        values = _momentum_change(group, group_values(system, group), offsets_of(points, at))
+        values = _momentum_change(points, group, at)
         for i, value in zip(group.indices, values, strict=False):
             change[i] = value
     return replace(points, change=tuple(change))
@@ -147,9 +159,11 @@ def _scaled(group: AlgebraBlock, x: Sequence[Expression]) -> _Scaled:
     def first(coefficients: Iterable[Scalar]) -> Scalar:
         return next(iter(coefficients), unit) if algebra.field.is_rational else unit
 
-    q = first(c for form in algebra.functional for c in form.values())
+    q = unit if group.copies else first(c for form in algebra.functional for c in form.values())
     starred = [algebra.starred({j: unit}) for j in range(algebra.dimension)]
     scales = [first(c for s in starred for c in algebra.product(f, s).values()) for f in algebra.frame]
+    if group.copies:
+        scales = [first(momentum_form(algebra, group.copies, f).values()) for f in algebra.frame]
     return _Scaled(
         [_combined(algebra, combined([form], {0: unit / q}), x) for form in algebra.functional],
         [combined([f], {0: unit / c}) for f, c in zip(algebra.frame, scales, strict=True)],
@@ -163,22 +177,33 @@ def offset_element(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[E
     return [components.get(k, ZERO) for k in range(group.algebra.dimension)]
 
 
-def _element_at(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[Expression]:
-    """Return the components of G = 1 + w from the unknowns of a group; components of w in its ideal count as 0."""
+def _start_of(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
+    """Return the components of a group element at the start of a step: 1, or its frame F."""
+    if group.copies:
+        return [symbol(frame_symbol(k)) for k in places]
     unit = group.algebra.unit
-    return [
-        w + (_scalar(group.algebra, unit[k]) if k in unit else ZERO)
-        for k, w in enumerate(offset_element(group, offsets))
-    ]
+    return [_scalar(group.algebra, unit[k]) if k in unit else ZERO for k in range(group.algebra.dimension)]
 
 
-def _momentum_change(group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Expression]) -> list[Expression]:
+def _element_at(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
+    """Return the components of G = 1 + w, or F + w, from the unknowns of a group; those in its ideal count as 0."""
+    offsets = offset_element(group, offsets_of(points, places))
+    return [w + start for w, start in zip(offsets, _start_of(points, group, places), strict=True)]
+
+
+def _momentum_change(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
     """Return x̃(G E_a G*) − x_a for G = 1 + w and all a.
 
     This is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. For E_a in a subalgebra with a functional λ = x̃ + u, it is
     u(E_a) + λ(E_a w*).
     """
-    algebra, scaled, w = group.algebra, _scaled(group, x), offset_element(group, offsets)
+    algebra, offsets = group.algebra, offsets_of(points, places)
+    scaled, w = _scaled(group, group_values(points.system, group)), offset_element(group, offsets)
+    if group.copies:
+        start = _start_of(points, group, places)
+        forms = [momentum_form(algebra, group.copies, f) for f in scaled.frame]
+        at_frame = [_form_change(algebra, form, start, w) for form in forms]
+        return [_combined(algebra, parts, at_frame) for parts in scaled.combination]
     left = _functional_times(algebra, scaled, w)
     linear, quadratic = [number(2) * value for value in left], list(left)
     if group.ideal:
@@ -188,27 +213,43 @@ def _momentum_change(group: AlgebraBlock, x: Sequence[Expression], offsets: Sequ
     return [_combined(algebra, parts, at_frame) for parts in scaled.combination]
 
 
-def _momentum(group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Expression]) -> list[Expression]:
-    """Return x̃(G E_a G*) for a group element G and all a; ``offsets`` are the unknowns of the group."""
-    at_frame, combination = _at_frame(group, x, offsets)
+def _form_change(
+    algebra: StarAlgebra,
+    form: Mapping[tuple[int, int], Scalar],
+    start: Sequence[Expression],
+    w: Sequence[Expression],
+) -> Expression:
+    """Return the change of a quadratic form from ``start`` to start + w."""
+    terms = ((c, w[i] * (start[j] + w[j]) + w[j] * start[i]) for (i, j), c in form.items())
+    return total(_scalar(algebra, c) * change for c, change in terms)
+
+
+def _momentum(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
+    """Return x̃(G E_a G*) for a group element G and all a; ``places`` are those of the unknowns of the group."""
+    at_frame, combination = _at_frame(points, group, places)
     return [_combined(group.algebra, parts, at_frame) for parts in combination]
 
 
-def _at_frame(
-    group: AlgebraBlock, x: Sequence[Expression], offsets: Sequence[Expression]
-) -> tuple[list[Expression], list[Vector]]:
+def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> tuple[list[Expression], list[Vector]]:
     """Return multiples of x̃(G f G*) for the frame elements f, and the coefficients that combine them to x̃(G E_a
     G*)."""
-    algebra, scaled = group.algebra, _scaled(group, x)
-    left, g = _left(group, scaled, offsets), _element_at(group, offsets)
+    algebra, g = group.algebra, _element_at(points, group, places)
+    scaled = _scaled(group, group_values(points.system, group))
+    if group.copies:
+        forms = [momentum_form(algebra, group.copies, f) for f in scaled.frame]
+        values = [total(_scalar(algebra, c) * (g[i] * g[j]) for (i, j), c in form.items()) for form in forms]
+        return values, scaled.combination
+    left = _left(points, group, places)
     return [_with_star(algebra, f, left, g) for f in scaled.frame], scaled.combination
 
 
-def _left(group: AlgebraBlock, scaled: _Scaled, offsets: Sequence[Expression]) -> list[Expression]:
+def _left(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
     """Return x̃(Gb)/q for the basis elements b of the algebra; if there is an ideal, λ(b)/q for those in the
     subalgebra."""
-    left = _functional_times(group.algebra, scaled, _element_at(group, offsets))
+    scaled = _scaled(group, group_values(points.system, group))
+    left = _functional_times(group.algebra, scaled, _element_at(points, group, places))
     if group.ideal:
+        offsets = offsets_of(points, places)
         for k, u in zip(group.subalgebra, offsets[len(group.subalgebra) :], strict=True):
             left[k] = scaled.at_basis[k] + u
     return left
@@ -244,7 +285,7 @@ def at_unknowns(points: StageMap) -> dict[str, Expression]:
         system.coordinates[i]: symbol(system.coordinates[i]) * call("exp", z) for i, z in points.logarithms.items()
     }
     for group, at in zip(points.realisation.groups, points.places, strict=True):
-        momenta = _momentum(group, group_values(system, group), offsets_of(points, at))
+        momenta = _momentum(points, group, at)
         for i, value, shift in zip(group.indices, momenta, group.shift, strict=False):
             stage_values[system.coordinates[i]] = value - shift
     return stage_values | {t: symbol(t) + symbol(points.unknowns[len(points.moved)]) for t in system.times}
@@ -313,11 +354,10 @@ def _derivatives(
     points: StageMap, group: AlgebraBlock, places: Sequence[int], velocity: Sequence[Expression]
 ) -> list[Expression]:
     """Return the derivatives of the unknowns of a group, from its ``velocity``, a component for each basis element."""
-    offsets = offsets_of(points, places)
-    of_element = _multiplied(group.algebra, _element_at(group, offsets), velocity)
+    of_element = multiplied(group.algebra, _element_at(points, group, places), velocity)
     if not group.ideal:
         return of_element
-    left = _left(group, _scaled(group, group_values(points.system, group)), offsets)
+    left = _left(points, group, places)
     return [*(of_element[k] for k in group.subalgebra), *_pulled_back(group, velocity, left)]
 
 
@@ -346,7 +386,7 @@ def _collected(
     system, algebra = points.system, group.algebra
     names = [system.coordinates[i] for i in group.indices]
     state = {*system.coordinates, *system.times}
-    at_frame, combination = _at_frame(group, group_values(system, group), offsets_of(points, places))
+    at_frame, combination = _at_frame(points, group, places)
     components = _element(algebra, algebra.basis, [slopes[i] for i in group.indices])
     sums: list[Expression | None] = []
     for component, row in zip(components, sparse_derivatives(components, names), strict=True):
@@ -371,7 +411,7 @@ def _logarithmic_rate(points: StageMap, i: int, slopes: Sequence[Expression]) ->
     return total(rate * slopes[j] for j, rate in rates if not slopes[j].is_zero)
 
 
-def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
+def multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
     """Return the components of the product of two elements."""
     terms: list[list[Expression]] = [[] for _ in range(algebra.dimension)]
     for (i, j), row in sorted(algebra.table.items()):
@@ -380,6 +420,16 @@ def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expre
         for k, c in row.items():
             terms[k].append(_scalar(algebra, c) * (a[i] * b[j]))
     return [total(t) for t in terms]
+
+
+def lifted_functionals(points: StageMap) -> list[Expression]:
+    """Return y with x̃(q) = y·Im q on each copy of the quaternions, in the order of i, j, k: F*kF = y at the start."""
+    values: list[Expression] = []
+    for group in points.realisation.groups:
+        x = group_values(points.system, group)
+        for copy in group.copies:
+            values += [_combined(group.algebra, group.algebra.functional[i], x) for i in copy[1:]]
+    return values
 
 
 def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) -> list[Expression]:
@@ -393,10 +443,10 @@ def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) ->
         algebra, offsets, k = group.algebra, offsets_of(points, places), [slopes[i] for i in places]
         element = offset_element(group, k)
         star = _element(algebra, algebra.star, offset_element(group, offsets))
-        turned = [a + b for a, b in zip(element, _multiplied(algebra, star, element), strict=True)]
+        turned = [a + b for a, b in zip(element, multiplied(algebra, star, element), strict=True)]
         in_frame = [turned[i] for i in group.subalgebra]
         if group.ideal:
-            in_frame += _functional_in_next_frame(points, group, offsets, k[len(group.subalgebra) :], turned)
+            in_frame += _functional_in_next_frame(points, group, places, k[len(group.subalgebra) :], turned)
         for i, value in zip(places, in_frame, strict=True):
             values[i] = value
     return values
@@ -405,7 +455,7 @@ def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) ->
 def _functional_in_next_frame(
     points: StageMap,
     group: AlgebraBlock,
-    offsets: Sequence[Expression],
+    places: Sequence[int],
     k: Sequence[Expression],
     turned: Sequence[Expression],
 ) -> list[Expression]:
@@ -415,15 +465,15 @@ def _functional_in_next_frame(
     from nb + gn* = 0 at the end of a step.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
-    left = _left(group, _scaled(group, group_values(points.system, group)), offsets)
-    g, n = _element_at(group, offsets), range(algebra.dimension)
+    left = _left(points, group, places)
+    g, n = _element_at(points, group, places), range(algebra.dimension)
     units = [{i: algebra.field.one} for i in n]
     at_symmetric = [ZERO] * algebra.dimension
     for i in group.subalgebra:
         at_symmetric[i] = _with_star(algebra, combined([units[i], algebra.star[i]], {0: half, 1: half}), left, g)
     moved = dict(zip(group.subalgebra, k, strict=True))
     at_basis = [moved.get(i, ZERO) for i in n]
-    w = offset_element(group, offsets)
+    w = offset_element(group, offsets_of(points, places))
     shears = _pulled_back(group, turned, at_symmetric)
     return [
         moved[i] + _with_star(algebra, units[i], at_basis, w) - shear

@@ -8,15 +8,17 @@ step in x is a Poisson map.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 
 from phigen.gauss.realisation import AlgebraBlock, Realisation
 from phigen.gauss.stage_map import (
     StageMap,
     at_unknowns,
+    frame_symbol,
     functional_offsets,
     group_values,
+    multiplied,
     offsets_of,
     stage_map,
     vector_field,
@@ -59,6 +61,9 @@ def check(
         yield _momentum_map(system, group)
     if any(group.ideal for group in realisation.groups):
         yield _functionals(system, points)
+    lifted = realisation.lifted
+    if lifted:
+        yield _frames(system, points, stage_map(discretised, lifted, pace))
     field = discretised.vector_field() if pace is ONE else [pace * f for f in system.vector_field()]
     yield from _follows(system, points, field)
 
@@ -150,16 +155,46 @@ def _functionals(system: System, points: StageMap) -> Statement:
     """
     complete = stage_map(points.system, points.realisation.with_elements, points.pace)
     values = _unknowns_by_elements(points, complete)
+    residuals = _differences(system, points, complete, values, {})
+    return decide_zero("g and λ(b) = x̃(gb) + 2x̃(nb) make the step of G = g + n", residuals, system.positive)
+
+
+def _frames(system: System, points: StageMap, lifted: StageMap) -> Statement:
+    """Decide that unknowns U − F make the same step as G − 1 if x̃(q) = k̃(FqF*), with U = FG."""
+    others = points.unknowns[: len(points.unknowns) - len(lifted.frames)]
+    values = {name: symbol(name) for name in others}
+    for group, places in zip(lifted.realisation.groups, lifted.places, strict=True):
+        frame = [symbol(frame_symbol(k)) for k in places]
+        components = multiplied(group.algebra, frame, offsets_of(points, places))
+        values |= dict(zip((lifted.unknowns[k] for k in places), components, strict=True))
+    names = {system.coordinates[i] for group in lifted.realisation.groups for i in group.indices}
+    at_start = {name: e for name, e in at_unknowns(lifted).items() if name in names}
+    states = dict(zip(at_start, substitute([*at_start.values()], dict.fromkeys(lifted.unknowns, ZERO)), strict=True))
+    residuals = _differences(system, lifted, points, values, states)
+    return decide_zero("U = FG makes the step of G, where x̃(q) = k̃(FqF*)", residuals, system.positive)
+
+
+def _differences(
+    system: System,
+    points: StageMap,
+    reference: StageMap,
+    values: Mapping[str, Expression],
+    states: Mapping[str, Expression],
+) -> list[tuple[str, Expression]]:
+    """Return differences of changes and of velocities, for any ∇H, of two sets of unknowns.
+
+    ``values`` are the unknowns of ``points`` in terms of those of ``reference``; ``states`` replace coordinates.
+    """
     slopes = [symbol(Symbol("slope", i)) for i in range(system.dimension)]
-    complete_rates = vector_field(complete, at_unknowns(complete), slopes=slopes)
-    rates_by_name = dict(zip(complete.unknowns, complete_rates, strict=True))
-    changes = zip(system.coordinates, substitute(points.change, values), complete.change, strict=True)
-    residuals = [(name, a - b) for name, a, b in changes]
+    reference_rates = substitute(vector_field(reference, at_unknowns(reference), slopes=slopes), states)
+    rates_by_name = dict(zip(reference.unknowns, reference_rates, strict=True))
+    changes = substitute(points.change, values), substitute(reference.change, states)
+    residuals = [(name, a - b) for name, a, b in zip(system.coordinates, *changes, strict=True)]
     rates = substitute(vector_field(points, at_unknowns(points), slopes=slopes), values)
-    rows = sparse_derivatives([values[name] for name in points.unknowns], complete.unknowns)
+    rows = sparse_derivatives([values[name] for name in points.unknowns], reference.unknowns)
     for name, rate, row in zip(points.unknowns, rates, rows, strict=True):
         residuals.append((name, rate - total(rates_by_name[z] * e for z, e in row.items())))
-    return decide_zero("g and λ(b) = x̃(gb) + 2x̃(nb) make the step of G = g + n", residuals, system.positive)
+    return residuals
 
 
 def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Expression]:

@@ -16,7 +16,7 @@ from phigen.scheme.adjoint import completed, gauss_adjoint, level_adjoint
 from phigen.scheme.discretisation import expect_few
 from phigen.scheme.forces import force_facts
 from phigen.scheme.gauge import Gauge
-from phigen.scheme.gauss_kernels import change_kernel, elapsed_kernel, field_kernel, frame_kernel
+from phigen.scheme.gauss_kernels import change_kernel, elapsed_kernel, field_kernel, frame_kernel, lift_kernel
 from phigen.scheme.gauss_reduction import reduced_sweeps
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import observables
@@ -25,7 +25,7 @@ from phigen.scheme.monitor import monitor_facts, rate_kernel
 from phigen.scheme.order import Order
 from phigen.scheme.program import About, Monitor, Program
 from phigen.scheme.staging import Coefficients
-from phigen.scheme.steps import Gauss, GaussTangent, ReducedSweeps
+from phigen.scheme.steps import Gauss, GaussTangent, Lift, ReducedSweeps
 from phigen.spec.model import Spec
 from phigen.symbolic.expression import derivatives
 from phigen.symbolic.symbols import STEP
@@ -132,6 +132,8 @@ def build_gauss(
         {"params": system.parameter_names, **gauge.inputs, "h": (STEP,)},
         (Output("coef", tuple(coefficients.values)),),
     )
+    plain_run = not (spec.extras.tangent or spec.extras.adjoint or gauge.monitor or group)
+    lifted = _lifted(points, coefficients) if plain_run else None
     slope, change = _full(slope, coefficients), _full(change, coefficients)
     adjoint = None
     if spec.extras.adjoint:
@@ -149,6 +151,8 @@ def build_gauss(
         adjoint=adjoint,
         reduced=reduced and _with_all_coefficients(reduced, coefficients),
     )
+    if lifted:
+        step = replace(step, lifted=_lifted_step(step, lifted, coefficients))
     for kernel in step.kernels:
         expect_few(system, kernel, other="")
     facts = [fact for fact in _facts(system, realisation, order, gauge, step) if fact]
@@ -172,6 +176,27 @@ def build_gauss(
         attitude=coefficients.settled(attitude),
         truncated=not realisation.exact,
     )
+
+
+def _lifted(points: StageMap, coefficients: Coefficients) -> tuple[Kernel, Kernel, Lift] | None:
+    """Return the vector field, the change and the frames of steps from F, or None if group elements have no frames."""
+    realisation = points.realisation.lifted
+    if realisation is None:
+        return None
+    lifted = stage_map(points.system, realisation, points.pace)
+    first, copies = min(k for places in lifted.places for k in places), []
+    for group, places in zip(realisation.groups, lifted.places, strict=True):
+        for u, i, j, k in group.copies:
+            copies.append((places[u] - first, places[i] - first, places[j] - first, places[k] - first))
+    lift = Lift(lift_kernel(lifted, coefficients), tuple(copies), len(lifted.frames))
+    return field_kernel(lifted, coefficients), change_kernel(lifted, coefficients), lift
+
+
+def _lifted_step(step: Gauss, lifted: tuple[Kernel, Kernel, Lift], coefficients: Coefficients) -> Gauss:
+    slope, change, lift = lifted
+    lift = replace(lift, functionals=_full(lift.functionals, coefficients))
+    slope, change = _full(slope, coefficients), _full(change, coefficients)
+    return replace(step, slope=slope, change=change, frame=None, lift=lift)
 
 
 def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -> Monitor | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from phigen.gauss.stage_map import StageMap, at_unknowns, derivatives_in_next_frame, vector_field
+from phigen.gauss.stage_map import StageMap, at_unknowns, derivatives_in_next_frame, lifted_functionals, vector_field
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import operation_counts
 from phigen.scheme.staging import Coefficients
@@ -88,13 +88,23 @@ def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
     )
 
 
+def lift_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
+    """Return the kernel of the functionals y of copies of the quaternions, of which the frames F are lifts."""
+    return Kernel(
+        "functionals",
+        "y = F* k F for the frame F of each group element at the start of a step",
+        {"coef": coefficients.slots, "x": points.system.coordinates},
+        (Output("values", tuple(coefficients.hoist(lifted_functionals(points)))),),
+    )
+
+
 def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
     """Return the kernel of the derivatives of group elements in the frame of the next step: G* = G⁻¹ times the
     derivatives.
 
     None without group elements.
     """
-    if not points.realisation.groups:
+    if all(group.copies for group in points.realisation.groups):
         return None
     slopes = tuple(Symbol(SLOPE, k) for k in range(len(points.unknowns)))
     values = derivatives_in_next_frame(points, [symbol(s) for s in slopes])

@@ -107,6 +107,16 @@ class _Staged:
         return None
 
     @property
+    def lift(self) -> Lift | None:
+        """Frames of group elements that move from step to step; None if there are none."""
+        return None
+
+    @property
+    def lifted(self) -> Gauss | None:
+        """The same step in such frames, if there is one."""
+        return None
+
+    @property
     def reduced(self) -> ReducedSweeps | None:
         """Sweeps over some of the unknowns of a step, if the other unknowns follow from them; else None."""
         return None
@@ -354,6 +364,19 @@ class ReducedSweeps:
 
 
 @dataclass(frozen=True)
+class Lift:
+    """Frames F of group elements, components of which follow the coordinates and the time in the start of a step.
+
+    ``functionals`` gives y = F* k F, three numbers for each copy of the quaternions; ``copies`` are the places of its
+    basis 1, i, j, k among the ``size`` components, which belong to the last unknowns.
+    """
+
+    functionals: Kernel
+    copies: tuple[tuple[int, int, int, int], ...]
+    size: int
+
+
+@dataclass(frozen=True)
 class Gauss(_Staged):
     """Step by Gauss collocation.
 
@@ -361,7 +384,7 @@ class Gauss(_Staged):
     unknowns Z are offsets, 0 at the start of the step. ``slope`` is f; its input x is the point, with the time as the
     last entry if f depends on the time. ``change`` is D. ``frame`` transforms the L_j of a step to the frame of the
     next step, if that differs. The first ``plain`` unknowns have the scale of the state; the others, of group elements,
-    have the scale 1.
+    have the scale 1. ``lifted`` makes the same step in frames that move along, its ``lift``.
     """
 
     slope: Kernel
@@ -372,6 +395,8 @@ class Gauss(_Staged):
     most_sweeps: int = 100
     tangent: GaussTangent | None = None
     reduced: ReducedSweeps | None = None
+    lift: Lift | None = None
+    lifted: Gauss | None = None
 
     kind = GAUSS
 
@@ -395,7 +420,10 @@ class Gauss(_Staged):
         """All kernels, each once."""
         varied = (self.tangent.slope, self.tangent.change) if self.tangent else ()
         reduced = (self.reduced.slope, self.reduced.follow) if self.reduced else ()
-        return _present((self.prepare, self.slope, *reduced, self.change, self.frame, *varied, *self.transposed))
+        lifted = (self.lifted.slope, self.lifted.change) if self.lifted else ()
+        return _present(
+            (self.prepare, self.slope, *reduced, self.change, self.frame, *varied, *self.transposed, *lifted)
+        )
 
 
 class _Scheduled(_Staged):

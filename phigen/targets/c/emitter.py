@@ -21,6 +21,7 @@ from phigen.targets.c import functions
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.gauss import policy as gauss_policy
+from phigen.targets.c.gauss import with_frames
 from phigen.targets.c.kernels import declaration, function
 from phigen.targets.c.lanes import KNOTS, remembered, travels
 from phigen.targets.c.lanes import printed as kernels_in_lanes
@@ -48,6 +49,7 @@ FEW_SCREENS = 240
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
     """Return file names and their contents. With ``single_file`` only `NAME.c` is returned, which then needs no
     header."""
+    program = with_frames(program)
     name, lines = program.name, header_lines(program, command)
     amalgam, header, code = runtime_of(program)
     declarations, definitions = amalgam.texts(header, code)

@@ -45,6 +45,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("UNROLLED_TRANSPOSE", lambda p: p.step.eliminate_transposed and not blocked, ("UNROLLED", "ADJOINT"))
     yield Feature("STAGED", lambda p: stages, part="lanes")
     yield Feature("REDUCED", lambda p: p.step.reduced, ("STAGED",))
+    yield Feature("LIFTED", lambda p: p.step.lift, ("STAGED",))
     yield Feature("STAGE_GROUPS", lambda p: stages and stages.batched, ("STAGED", "ENSEMBLE", "EACH"))
     yield Feature("NARROW", lambda p: isinstance(lanes, Stages | Traces) and lanes.narrow)
     yield Feature("ALONG", lambda p: p.step.back and p.step.back.used, ("TRACED",))

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from phigen.gauss.tableau import DOUBLE, EARLIER, SINGLE, Tableau, continuation, predictors, tableau
-from phigen.lanes.in_lanes import Lanes, Stages
+from phigen.lanes.in_lanes import Lanes, Stages, in_lanes
 from phigen.scheme.kernel import Kernel
+from phigen.scheme.lowering import operation_counts
 from phigen.scheme.policies import POLICIES, GaussPolicy
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss
@@ -45,6 +46,7 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
         ("WIDTH", width, "of an array over the stages" + ", those that fill a vector" * (width > step.tableau.stages)),
         ("UNKNOWNS", step.unknowns, "of a stage"),
         *([("EARLIER", EARLIER, "steps that predictors read")] if isinstance(lanes, Stages) else []),
+        *([("LIFT", step.lift.size, "components of frames of group elements")] if step.lift else []),
     ]
 
 
@@ -54,8 +56,9 @@ def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
         ("PLAIN", step.plain, "unknowns that are offsets of coordinates; others are those of group elements"),
         (
             "POINT",
-            program.dimension + bool(program.time),
-            "numbers that define the start of a step: coordinates, and the time if H depends on it",
+            program.dimension + bool(program.time) + (step.lift.size if step.lift else 0),
+            "numbers that define the start of a step: coordinates, and the time if H depends on it"
+            + ", and frames" * bool(step.lift),
         ),
         ("MAX_SWEEPS", step.most_sweeps, "largest number of sweeps over the stages of a step"),
     ]
@@ -66,6 +69,7 @@ def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
     together."""
     at_stages = [] if staged else [step.slope, step.frame]
     at_stages += [step.reduced.follow] if staged and step.reduced else []
+    at_stages += [step.lift.functionals] if step.lift else []
     varied = [step.tangent.slope, step.tangent.change] if step.tangent else []
     transposed = step.adjoint.steps if step.adjoint else ()
     back = [k for k in transposed if not (staged and k in step.stage_transposes)]
@@ -107,9 +111,24 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
         "member_terms": _in_chains(of_members) if batched else "",
         "total": _halved([f"values[{j}]" for j in range(table.stages)]),
         "reduced": False,
+        "copy_count": len(step.lift.copies) if step.lift else 0,
+        "copies": [_listed(copy) for copy in step.lift.copies] if step.lift else [],
         **(_reduced(step, table, width) if staged and step.reduced else {}),
     }
     return rendered(program, "gauss.c", values)
+
+
+def with_frames(program: Program) -> Program:
+    """Return the program with steps in frames that move along, where single trajectories have their stages in lanes.
+
+    Batches of members, whose steps are those of single trajectories, have other frames.
+    """
+    step = program.step.lifted
+    lanes = in_lanes(program) if step else None
+    if step is None or not isinstance(lanes, Stages) or lanes.batched or program.single:
+        return program
+    about = replace(program.about, operations=operation_counts(step.slope.roots))
+    return replace(program, step=step, about=about)
 
 
 def _reduced(step: Gauss, table: Tableau, width: int) -> dict[str, object]:

@@ -661,6 +661,12 @@ SWEEPS = Choice(
     },
 )
 
+LIFTS = Choice(
+    "Weight of squared changes of group elements, which are near 1, or near frames that move along.",
+    ("LIFTED",),
+    {"ELEMENT_SCALE(s)": ("phi_element_scale(s)", "1.0")},
+)
+
 _SHIFT = "for (int i = 0; i < PHI_DIM; ++i) {}.difference[0][i] += s->x[i] - from[i];"
 SHIFTED = Choice(
     "The shift of the predictors with the state, if this is set or kicked.",
@@ -726,6 +732,7 @@ ALL = (
     FAR,
     STAGE_PREDICTORS,
     SWEEPS,
+    LIFTS,
     PREDICTORS,
     SHIFTED,
     MEMORY,

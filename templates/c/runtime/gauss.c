@@ -20,12 +20,15 @@ typedef double phi_lanes[PHI_WIDTH]; /* one value for each stage */
 #endif
 
 /* ---- The implicit step, by Gauss collocation ---- */
-/* Start of a step: the coordinates, and the time if H depends on it. */
+/* Start of a step: the coordinates, the time if H depends on it, and frames of group elements if there are any. */
 static void phi_start(const phi_solver *s, double point[PHI_POINT])
 {
     PHI_COPY(point, s->x, s->x, PHI_DIM);
 #if PHI_TIMED
     point[PHI_DIM] = s->t;
+#endif
+#if PHI_LIFTED
+    memcpy(point + PHI_POINT - PHI_LIFT, s->history.frame, sizeof s->history.frame);
 #endif
 }
 
@@ -76,6 +79,7 @@ static void phi_factors_at(double fraction, double factor[PHI_NODES])
 
 #include "gauss_reduced.c"
 #include "gauss_all_unknowns.c"
+#include "gauss_lifted.c"
 
 /* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
 static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
@@ -88,9 +92,9 @@ static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
     return 1.0 / square;
 }
 
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for group
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, |F| or 1 for group
    elements. */
-static inline double phi_change_of(double scale, int count, phi_lanes *before, phi_lanes *after)
+static inline double phi_change_of(double scale, double element_scale, int count, phi_lanes *before, phi_lanes *after)
 {
     phi_lanes sum = { 0.0 };
     for (int k = 0; k < count; ++k) {
@@ -98,9 +102,9 @@ static inline double phi_change_of(double scale, int count, phi_lanes *before, p
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] += (now[lane] - old[lane]) * (now[lane] - old[lane]);
         if (k + 1 == (count < PHI_PLAIN ? count : PHI_PLAIN))
-            for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] *= scale;
+            for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] *= scale / element_scale;
     }
-    return phi_total(sum) / (double)PHI_NODES;
+    return element_scale * (phi_total(sum) / (double)PHI_NODES);
 }
 
 #if PHI_STAGED
@@ -115,14 +119,14 @@ static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads
 }
 
 /* Number of the predictor that would have come nearest to the values that the last sweep of a step has read. */
-static int phi_best_predictor(phi_history *past, double scale, phi_lanes *reads)
+static int phi_best_predictor(phi_history *past, double scale, double element_scale, phi_lanes *reads)
 {
     phi_lanes predicted[PHI_READS];
     double least = HUGE_VAL;
     int best = PHI_PREDICTORS - 1;
     for (int predictor = 0; predictor < PHI_PREDICTORS; ++predictor) {
         phi_predict(past, predictor, predicted);
-        const double change = phi_change_of(scale, PHI_READS, predicted, reads);
+        const double change = phi_change_of(scale, element_scale, PHI_READS, predicted, reads);
         if (change < least) {
             least = change;
             best = predictor;
@@ -235,7 +239,8 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
         const int tested = sweep >= past->sweeps;
         PHI_SWEEP(s, point, factors, z, tested ? next : now);
         if (tested) {
-            const double scale = phi_scale(s->x, next), square = phi_change_of(scale, PHI_ITERATED, now, next);
+            const double scale = phi_scale(s->x, next), element_scale = PHI_ELEMENT_SCALE(s);
+            const double square = phi_change_of(scale, element_scale, PHI_ITERATED, now, next);
             const int solved = square * (past->rate * past->rate) <= PHI_SOLVED * PHI_SOLVED;
             const int judgement = solved ? 1 : phi_judge(&past->rate, &past->sweeps, &progress, sweep, sqrt(square));
             PHI_COPY_STAGES(now, next, next);
@@ -246,7 +251,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
                 if (solved) past->sweeps = square <= 16.0 * PHI_SOLVED * PHI_SOLVED ? sweep - 1 : sweep;
                 if (past->sweeps < 2) past->sweeps = 2;
 #if PHI_STAGED
-                if (past->count == PHI_EARLIER && past->age++ % PHI_TRIALS == 0) past->predictor = phi_best_predictor(past, scale, z);
+                if (past->count == PHI_EARLIER && past->age++ % PHI_TRIALS == 0) past->predictor = phi_best_predictor(past, scale, element_scale, z);
 #endif
                 s->evaluations += (size_t)sweep;
                 phi_complete_stages(s, point, factors, now, z, increments);
@@ -287,6 +292,7 @@ static phi_status phi_attempt(phi_solver *s)
 {
     double point[PHI_POINT], end[PHI_UNKNOWNS], change[PHI_DIM];
     phi_lanes increments[PHI_UNKNOWNS];
+    phi_lift(s);
     phi_start(s, point);
     const phi_status status = phi_collocate(s, point, increments);
     if (status != PHI_OK) return status;
@@ -298,6 +304,7 @@ static phi_status phi_attempt(phi_solver *s)
     if (!(elapsed * s->h > 0.0)) return PHI_NOT_FINITE;
 #endif
     if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
+    phi_move_frames(s, end);
     PHI_PASS(s, elapsed)
     phi_remember(s, point, end, increments);
 #if PHI_ATTITUDE

@@ -15,6 +15,10 @@ typedef struct {
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int kicked;    /* whether the state was changed since the last step */
     double h;      /* size of the last step */
+#if PHI_LIFTED
+    int lifted;    /* whether frame is that of the state */
+    double frame[PHI_LIFT], frame_carry[PHI_LIFT]; /* frames of group elements, and their compensation terms */
+#endif
 #if PHI_STAGED
     double increments[PHI_EARLIER][PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last steps, in the frame of the end of the last one */
 #else

@@ -26,6 +26,7 @@
 #define PHI_STAGED 0
 #define PHI_FRAMED 0
 #define PHI_REDUCED 0
+#define PHI_LIFTED 0
 enum { PHI_NODES = 1, PHI_WIDTH = 1, PHI_UNKNOWNS = 2, PHI_DIFFERENCES = 9 };
 #ifndef PHI_COMPOSED
 #define PHI_COMPOSED 0

@@ -1,0 +1,66 @@
+"""Frames of group elements in which functionals of quaternions are constant.
+
+A copy of the quaternions in a star algebra, with the basis 1, i, j, k, has x̃(q) = y·Im q, and y = F* k F for some
+quaternion F. With U = FG in place of G, momenta x̃(GaG*) = k̃(UaU*), k̃(q) = (Im q)_3, take no products with x̃, and the
+element U at the end of a step is that from which the next one starts. Left multiplication commutes with the field, so
+the step is the same. F is arbitrary up to a left factor exp(tk), and any F is good: it moves with U.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phigen.gauss.star_algebra import StarAlgebra, Vector
+from phigen.geometry.field import Scalar
+
+#: Basis elements 1, i, j, k of a copy of the quaternions.
+Copy = tuple[int, int, int, int]
+
+
+def quaternion_copies(algebra: StarAlgebra) -> tuple[Copy, ...]:
+    """Return the copies of the quaternions that an algebra is a sum of, in its basis; none if it is no such sum."""
+    field, n = algebra.field, range(algebra.dimension)
+    if not field.is_rational or algebra.dimension % 4:
+        return ()
+    copies: list[Copy] = []
+    for u in sorted(algebra.unit):
+        skew = [i for i in n if i != u and algebra.table.get((u, i))]
+        if len(skew) != 3:
+            return ()
+        a, b, c = skew
+        copy: Copy = (u, a, b, c) if algebra.table.get((a, b), {}).get(c, field.zero) == field.one else (u, b, a, c)
+        copies.append(copy)
+    expected = {at: row for copy in copies for at, row in _products(copy, field.one).items()}
+    products = {at: row for at, row in algebra.table.items() if row}
+    starred = all(algebra.star[i] == {i: field.one if i in algebra.unit else -field.one} for i in n)
+    sums = algebra.unit == dict.fromkeys((copy[0] for copy in copies), field.one)
+    real = not any(algebra.functional[copy[0]] for copy in copies)
+    return tuple(copies) if sums and real and starred and products == expected else ()
+
+
+def _products(copy: Copy, one: Scalar) -> dict[tuple[int, int], Vector]:
+    """Return the products of 1, i, j, k."""
+    u, i, j, k = copy
+    products = {(u, u): {u: one}}
+    for a, b, c in ((i, j, k), (j, k, i), (k, i, j)):
+        products |= {(u, a): {a: one}, (a, u): {a: one}, (a, a): {u: -one}, (a, b): {c: one}, (b, a): {c: -one}}
+    return products
+
+
+def momentum_form(
+    algebra: StarAlgebra, copies: Sequence[Copy], element: Mapping[int, Scalar]
+) -> dict[tuple[int, int], Scalar]:
+    """Return the quadratic form k̃(U a U*) of the components of U, by pairs of these in ascending order."""
+    unit, last = algebra.field.one, {copy[3] for copy in copies}
+    form: dict[tuple[int, int], Scalar] = {}
+    for i in range(algebra.dimension):
+        left = algebra.product({i: unit}, element)
+        for j in range(algebra.dimension):
+            value = sum(
+                (v for k, v in algebra.product(left, algebra.starred({j: unit})).items() if k in last),
+                algebra.field.zero,
+            )
+            if value != 0:
+                at = (min(i, j), max(i, j))
+                form[at] = form.get(at, algebra.field.zero) + value
+    return {at: v for at, v in form.items() if v != 0}

@@ -1,0 +1,159 @@
+"""Frames of group elements that move from step to step, in C with stages in lanes: the same step, fewer products."""
+
+import ctypes
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import RawC, compile_text, solver, spec_of
+
+from phigen.compiler import compile_spec, emit, examine
+from phigen.errors import SpecError
+from phigen.gauss import statements
+from phigen.gauss.lift import quaternion_copies
+from phigen.gauss.quaternionic import quaternionic
+from phigen.geometry.families import named
+from phigen.scheme.lowering import operation_counts
+from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.verdict import REFUTED
+
+#: so(3) beside constant brackets, with parameters and the time; the opposite sign, with shifted momenta.
+MIXED = """coordinates: [x, y, z, q, p]
+parameters: {a: 0.4}
+time: t
+poisson: {brackets: {x: {y: z, z: -y}, y: {z: x}, q: {p: 1}}}
+hamiltonian: x**2/2 + y**2/3 + a*z**2 + p**2/2 + q**2/2 + cos(q)*x + a*sin(q + t)*y*z
+"""
+SHIFTED = """coordinates: [x, y, z]
+poisson: {brackets: {x: {y: -z - 2, z: y}, y: {z: 1 - x}}}
+hamiltonian: exp(x/3) + y**2*z/5 + sin(z)
+"""
+#: Systems with frames, and the step.
+CASES = {
+    "rigid_body": (lambda **more: with_order_16(spec_of("rigid_body"), **more), 0.8),
+    "so4_manakov": (lambda **more: with_order_16(spec_of("so4_manakov"), **more), 3.0),
+    "spin_chain5": (lambda **more: with_order_16(spec_of("spin_chain5"), **more), 0.5),
+    "mixed": (lambda **more: compile_text(f"{MIXED}scheme: gauss\n", 16, **more), 0.3),
+    "shifted": (lambda **more: compile_text(f"{SHIFTED}scheme: gauss\n", 16, **more), 0.3),
+}
+
+
+def with_order_16(spec, **more):
+    return compile_spec(
+        replace(spec, profile="fast", reconstruct="", composition="auto").overridden(order=16, scheme="gauss", **more)
+    )
+
+
+def start_of(compilation):
+    return 0.7 * np.cos(1.0 + np.arange(compilation.system.dimension))
+
+
+def has_frames(compilation):
+    return any("_lift(" in text for text in emit(compilation.program, "c", "").values())
+
+
+@pytest.mark.parametrize(
+    ("family", "size", "count"), [("so", 3, 1), ("so", 4, 2), ("se", 3, 0), ("sl", 2, 0), ("gl", 2, 0)]
+)
+def test_copies_of_the_quaternions_are_found(family, size, count):
+    assert len(quaternion_copies(quaternionic(named(family, size)))) == count
+
+
+@pytest.mark.parametrize(("name", "most"), [("rigid_body", 28), ("so4_manakov", 56), ("spin_chain5", 136)])
+def test_products_of_a_stage_are_few(name, most):
+    """Without frames there are 43, 91 and 211."""
+    assert operation_counts(CASES[name][0]().program.step.lifted.slope.roots)["multiplications"] <= most
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_steps_are_those_of_the_frame_at_1(name):
+    """Solvers with tangents start from 1 in each step, and their tangents prove that steps are Poisson maps."""
+    make, h = CASES[name]
+    compilation, reference = make(), make(tangent=True)
+    assert has_frames(compilation)
+    assert not has_frames(reference)
+    ends = [solver(c, "c").integrate(start_of(c), h, 20).x for c in (compilation, reference)]
+    assert np.abs(np.subtract(*ends)).max() <= 2e-13
+
+
+@pytest.mark.parametrize(
+    "start", [[0.0, 0.0, 0.0], [0.0, 0.0, 0.6], [0.0, 0.0, -0.6], [0.8, 0.0, 0.0], [0.0, -0.5, -0.0]]
+)
+def test_states_on_the_axes_have_frames(start):
+    compilation, reference = CASES["rigid_body"][0](), CASES["rigid_body"][0](tangent=True)
+    ends = [solver(c, "c").integrate(start, 0.5, 5).x[-1] for c in (compilation, reference)]
+    assert ends[0] == pytest.approx(ends[1], abs=2e-15)
+
+
+@pytest.mark.parametrize("scale", [1e-7, 1e7])
+def test_sweeps_do_not_depend_on_the_size_of_the_state(scale):
+    """The time is scaled by as much, since H is quadratic."""
+    counts = []
+    for factor in (1.0, scale):
+        raw = RawC(CASES["rigid_body"][0]())
+        raw.init(factor * np.array([0.4, -0.8, 0.5]))
+        for _ in range(200):
+            raw.step(0.8 / factor)
+        counts.append(int(raw.counters[1]))
+    assert counts[1] == pytest.approx(counts[0], rel=0.03)
+
+
+def test_states_between_steps_and_after_kicks_are_right():
+    make, h = CASES["so4_manakov"]
+    states = []
+    for compilation in (make(), make(tangent=True)):
+        method = solver(compilation, "c")
+        session = method.backend.start(start_of(compilation), method.backend.interface.parameters)
+        session.advance(h, 10)
+        before = session.state()
+        session.advance(h, 1)
+        first, middle = session.interpolated([0.0, 0.4])
+        assert first == pytest.approx(before, abs=4e-15)
+        for _ in range(20):
+            session.kick(1e-3 * np.sin(np.arange(6.0)))
+            session.advance(h, 1)
+        states.append([middle, session.state()])
+    assert np.abs(np.subtract(*states)).max() <= 5e-14
+
+
+def test_kicks_do_not_cost_sweeps():
+    """A kick brings a new frame, aligned with the old one, from which the increments of the last step predict."""
+    make, h = CASES["so4_manakov"]
+    counts = []
+    for kicked in (False, True):
+        raw = RawC(make())
+        raw.init(start_of(make()))
+        change = np.full(6, 1e-12)
+        for _ in range(100):
+            if kicked:
+                raw.call("kick", ctypes.c_int, raw.here, ctypes.c_void_p(change.ctypes.data))
+            raw.step(h)
+        counts.append(int(raw.counters[1]))
+    assert counts[1] == pytest.approx(counts[0], rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["so4_manakov", "spin_chain5"])
+def test_casimirs_do_not_drift(name):
+    """Over many steps Casimirs wander by rounding only, though frames move apart from the state."""
+    make, h = CASES[name]
+    steps = 40_000
+    run = solver(make(), "c").integrate(start_of(make()), h, steps, stride=100)
+    for values in run.casimirs.values():
+        assert np.ptp(values) <= 2e-15 * np.sqrt(steps) * max(np.abs(values).max(), 0.5)
+
+
+def test_check_proves_that_frames_make_the_step(monkeypatch):
+    name = "U = FG makes the step of G, where x̃(q) = k̃(FqF*)"
+    for checked in ("rigid_body", "so4_manakov"):
+        spec = replace(spec_of(checked), scheme="gauss", composition="auto", reconstruct="")
+        assert next(s for s in examine(spec).statements if s.name == name).verdict == "proved"
+    monkeypatch.setattr(statements, "frame_symbol", lambda k: Symbol("frame", k ^ 1))
+    assert next(s for s in examine(spec).statements if s.name == name).verdict == REFUTED
+
+
+def test_certificates_refuse_moving_frames():
+    from phigen.certify.problem import _expect_covered
+
+    compilation = CASES["rigid_body"][0]()
+    with pytest.raises(SpecError, match="frames that move along"):
+        _expect_covered(compilation.program, compilation.spec)
