@@ -32,8 +32,8 @@ OSCILLATORS = (
     "phigen: 1\nname: bench\ncoordinates: [x, y, px, py]\npoisson: {canonical: {q: [x, y], p: [px, py]}}\n"
     "hamiltonian: (px**2 + py**2 + x**2 + y**2)/2 + x**2*y - y**3/3\norder: 4\nscheme: splitting\n"
 )
-#: Steps of a short run; a long one has three times as many.
-STEPS, LONGER = 200, 3
+#: Least and largest numbers of steps of a short run; a long one has three times as many.
+STEPS, MOST_STEPS, LONGER = 200, 51_200, 3
 #: Largest number of members: a card has its full throughput with fewer.
 MOST_MEMBERS = 10_000_000
 #: Numbers of blocks that a multiprocessor of CUDA shall run at once; 1 leaves all registers to a thread.
@@ -78,7 +78,7 @@ CASES = (
 
 @dataclass(frozen=True)
 class Effort:
-    """Seconds of a short run that is timed, its rounds, and sites on an edge of the cube."""
+    """Seconds that a long run shall take beyond a short one, rounds of both, and sites on an edge of the cube."""
 
     seconds: float
     rounds: int
@@ -89,7 +89,7 @@ def measured(target: str | None, quick: bool, say: Callable[[str], None]) -> Ite
     """The parts of the page, one by one. Raises `DeviceError` or `MissingPackageError` where there is no device."""
     target = target or default_target()
     device = device_of(target)
-    effort = Effort(0.1, 1, 16) if quick else Effort(1.0, 5, 128 if device.is_card else 32)
+    effort = Effort(0.1, 1, 16) if quick else Effort(1.0, 3, 128 if device.is_card else 32)
     say(f"{target}: {device.name}")
     yield f"{device!r}, target {target}, beside one core of {machine()}; phigen {phigen.__version__}."
     for part in (_ensembles, _spins, _peers):
@@ -120,13 +120,22 @@ def members_of(run: Run, seconds: float) -> int:
     return MOST_MEMBERS
 
 
-def per_step(run: Run, members: int, rounds: int) -> tuple[float, float]:
+def steps_of(run: Run, members: int, seconds: float) -> int:
+    """Steps of a short run that a long one exceeds by the given time: copies of many members take a second too."""
+    steps = STEPS
+    while steps < MOST_STEPS and run(members, LONGER * steps) - run(members, steps) < seconds:
+        steps *= 2
+    return steps
+
+
+def per_step(run: Run, members: int, effort: Effort) -> tuple[float, float]:
     """Picoseconds for a member and step, medians: by the difference of two runs, and in all of the longer one."""
-    steps, differences, whole = LONGER * STEPS, [], []
-    for _ in range(rounds):
-        short, long = run(members, STEPS), run(members, steps)
-        differences.append(1e12 * (long - short) / members / (steps - STEPS))
-        whole.append(1e12 * long / members / steps)
+    short_steps, differences, whole = steps_of(run, members, effort.seconds), [], []
+    long_steps = LONGER * short_steps
+    for _ in range(effort.rounds):
+        short, long = run(members, short_steps), run(members, long_steps)
+        differences.append(1e12 * (long - short) / members / (long_steps - short_steps))
+        whole.append(1e12 * long / members / long_steps)
     return median(differences), median(whole)
 
 
@@ -160,7 +169,7 @@ def _rows(case: Case, target: str, effort: Effort, say: Callable[[str], None]) -
     compilation = compilation_of(specs.loads(case.spec, "bench.yaml"))
     core = phigen.compile(compilation, "c")
     alone = ensemble_run(core, case.starts, threads=1)
-    core_ps = per_step(alone, members_of(alone, effort.seconds / 2), effort.rounds)[0]
+    core_ps = per_step(alone, members_of(alone, effort.seconds), effort)[0]
     for blocks in BLOCKS if target == "cuda" else (1,):
         try:
             solver = phigen.compile(compilation, target)
@@ -169,7 +178,7 @@ def _rows(case: Case, target: str, effort: Effort, say: Callable[[str], None]) -
             same = difference(solver, compilation, case.starts(1000))
             run = ensemble_run(solver, case.starts)
             members = members_of(run, effort.seconds)
-            ps, whole = per_step(run, members, effort.rounds)
+            ps, whole = per_step(run, members, effort)
         except PhigenError as error:
             yield [case.title, str(blocks), "", f"failed: {_one_line(error)}", *[""] * 5]
             continue
@@ -274,7 +283,7 @@ def _peers(target: str, effort: Effort, say: Callable[[str], None]) -> str:
     x0, rows = SPLITTING.starts(1000), []
     runs = [("phigen, splitting, order 4", ensemble_run(ours, SPLITTING.starts), ours.ensemble(x0, STEP, 100))]
     runs += [("diffrax, Dopri5", peer_run, solve(x0, 100)[0])]
-    times = [per_step(run, members_of(run, effort.seconds), effort.rounds)[0] for _, run, _ in runs]
+    times = [per_step(run, members_of(run, effort.seconds), effort)[0] for _, run, _ in runs]
     for (name, _, ends), ps in zip(runs, times, strict=True):
         rows.append([name, f"{ps:.3g}", f"{ps / times[0]:.3g}", f"{energy_error(x0, ends):.1e}"])
     head = ("Hénon–Heiles", "ps a member and step", "over phigen", f"energy error at t = {100 * STEP:g}")

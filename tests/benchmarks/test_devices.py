@@ -34,10 +34,17 @@ def cells(text, title):
 
 
 def test_times_of_steps_leave_out_what_all_runs_have():
-    """Half a second of copies, and 70 ps for a member and step."""
-    steps, whole = devices.per_step(lambda members, steps: 0.5 + 70e-12 * members * steps, 10**6, 3)
-    assert steps == pytest.approx(70)
-    assert whole == pytest.approx(70 + 0.5e12 / 1e6 / (devices.LONGER * devices.STEPS))
+    """Half a second of copies, and 70 ps for a member and step: 7,143 steps more take half a second too."""
+    runs = []
+
+    def run(members, steps):
+        runs.append(steps)
+        return 0.5 + 70e-12 * members * steps
+
+    ps, whole = devices.per_step(run, 10**6, Effort(0.5, 3, 4))
+    assert ps == pytest.approx(70)
+    assert whole == pytest.approx(70 + 0.5e12 / 1e6 / runs[-1])
+    assert runs[-6:] == 3 * [6_400, 19_200]
 
 
 @pytest.mark.parametrize(("cost", "members"), [(1e-9, 1_000_000), (1e-13, devices.MOST_MEMBERS), (1e-3, 256)])
