@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from phigen.errors import SpecError
 from phigen.lattice.array_files import bonds_in, values_in
 from phigen.memory import expect_room
-from phigen.spec.model import LatticeRunSettings, Parameter, Run, Spec, Values
+from phigen.spec.model import LatticeRunSettings, MatrixForm, Parameter, Run, Spec, Values
 from phigen.symbolic.arrays import evaluate
+from phigen.symbolic.expression import symbols_of
 
 Floats = NDArray[np.float64]
 Bonds = NDArray[np.int64]
@@ -94,17 +95,31 @@ class _Reader:
         return Start(sizes, self._state(sizes), parameters, bonds, bool(self.lattice.graph))
 
     def _expect_in_bound(self, p: Parameter, values: Floats) -> None:
-        """Raise `SpecError` if values at sites or bonds are outside the declared bounds of a parameter."""
+        """Raise `SpecError` if values at sites or bonds are outside of the declared bound of a parameter."""
         if values.size and p.refuses(float(np.min(values))):
-            worst = np.unravel_index(np.argmin(values), values.shape)
-            place, noun = ", ".join(map(str, worst)), p.at.removesuffix("s")
-            where = f"{float(values[worst]):g} at {noun} {place if len(worst) == 1 else f'({place})'}"
-            message = f"the parameter is {p.bound} by declaration, but {where}"
+            raise self._out_of_bound(p, values, f"the parameter is {p.bound} by declaration")
+        if self.spec.coordinates_from and p.at == "sites":
+            # the only parameter at sites is the mass: further terms of H are refused
+            self._expect_masses(p, values)
+
+    def _expect_masses(self, p: Parameter, values: Floats) -> None:
+        """Raise `SpecError` if bodies cannot have these masses in relative coordinates."""
+        begin, form = f"with coordinates_from: {self.spec.coordinates_from}", self.spec.poisson
+        if not values.flat[0] > 0:
+            message = f"{begin} the first body needs a mass, which is {values.flat[0]:g}"
             raise self.arrays.refused(p.name, message)
-        if self.spec.coordinates_from and p.at == "sites" and values.flat[0] == 0:
-            # Only the mass can be a parameter at sites here: other terms of H are refused before.
-            message = f"with coordinates_from: {self.spec.coordinates_from} the first body needs a mass, which is 0"
-            raise self.arrays.refused(p.name, message)
+        entries = [e for row in form.entries for e in row] if isinstance(form, MatrixForm) else []
+        if (least := np.min(values)) < 0:
+            raise self._out_of_bound(p, values, f"{begin} masses are nonnegative")
+        if least == 0 and p.name not in symbols_of(*entries):  # the bracket of velocities has the mass
+            raise self._out_of_bound(p, values, f"{begin} bodies with momenta have positive masses")
+
+    def _out_of_bound(self, p: Parameter, values: Floats, rule: str) -> SpecError:
+        """Return the error for values that break a rule, with the least of them."""
+        worst = np.unravel_index(np.argmin(values), values.shape)
+        place, noun = ", ".join(map(str, worst)), p.at.removesuffix("s")
+        where = f"{float(values[worst]):g} at {noun} {place if len(worst) == 1 else f'({place})'}"
+        return self.arrays.refused(p.name, f"{rule}, but {where}")
 
     def _expect_room(self, sizes: Sequence[int]) -> None:
         """Raise `SpecError` if the arrays over sites do not fit into memory together."""

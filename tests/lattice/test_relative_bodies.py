@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from ctypes import CDLL
 from functools import cache
 from pathlib import Path
@@ -350,15 +351,25 @@ def test_bodies_are_verified_on_a_few_of_them_with_the_first(masses: str) -> Non
     assert f"Poisson identity on {min(count, 3)} sites" in {c.name.split(",")[0] for c in verification.checks}
 
 
-def test_a_first_body_without_mass_is_refused_at_its_place() -> None:
-    run = "runs: {one: {initial: {x: [0, 1], y: 0, vx: 0, vy: [0, 1]}, step: 0.1, steps: 3}}\n"
-    spec = phigen.spec.loads(text(axes="xy").replace("value: 0", "value: [0, 1]") + run)
-    with pytest.raises(SpecError, match="the first body needs a mass, which is 0") as caught:
-        start_of(spec, spec.runs["one"])
+@pytest.mark.parametrize(
+    ("masses", "momenta", "message"),
+    [
+        ("[0, 1]", False, "the first body needs a mass, which is 0"),
+        ("[-1, 1]", False, "the first body needs a mass, which is -1"),
+        ("[1, -1]", False, "masses are nonnegative, but -1 at site 1"),
+        ("[1, 0]", True, "bodies with momenta have positive masses, but 0 at site 1"),
+    ],
+)
+def test_masses_of_runs_are_refused_at_their_place(masses: str, momenta: bool, message: str) -> None:
+    spec = text(axes="xy", momenta=momenta).replace(UNBOUNDED[momenta], "")
+    spec = re.sub("value: [01]", f"value: {masses}", spec)
+    run = RUN.replace("POSITIONS", "0, 1").replace("SPEEDS", "0, 1")
+    loaded = phigen.spec.loads(spec + (run.replace("vx", "px").replace("vy", "py") if momenta else run))
+    with pytest.raises(SpecError, match=message) as caught:
+        start_of(loaded, loaded.runs["one"])
     assert caught.value.diagnostics[0].location.line == 5
 
 
-@pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_collision_is_an_error_and_a_hyperbola_is_not(change: str, target: str) -> None:
