@@ -182,7 +182,7 @@ def _expect_supported(cell: Cell, spec: Spec) -> None:
         if present:
             hint = f"remove {KEY}" if key == "lattice" else f"remove {KEY}, or {key}"
             if key == "adjoint":
-                hint = f"phigen show --expand RUN prints an ordinary spec, to which {KEY} can be added"
+                hint = f"phigen show --expand RUN prints an ordinary spec, which takes {KEY} if it has momenta"
             raise SpecError([spec.diagnostic((KEY,), f"{KEY}: not together with {key}: {reason}", hint)])
 
 

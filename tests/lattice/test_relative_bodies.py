@@ -404,6 +404,22 @@ def test_threads_do_not_change_the_bits(change: str) -> None:
     assert all(np.array_equal(first, other) for other in others)
 
 
+@pytest.mark.parametrize(("change", "most"), [("jacobi", 920), ("democratic_heliocentric", 890)])
+def test_short_code_makes_the_same_steps_by_any_number_of_threads(change: str, most: int) -> None:
+    x, m = orbits(1200), np.zeros(1200)
+    m[:3] = 1, 1e-3, 5e-4
+    spec = text(change, composition="saba-4-2", order=2)
+    short = compile_spec(phigen.spec.loads(spec), profile="small")
+    lines = [line for part in emit(short.program, "c", "phigen").values() for line in part.splitlines()]
+    assert len(lines) <= most
+    assert not [line for line in lines if "omp barrier" in line]
+    one = lattice_solver_of(short, "c")
+    expected = solver(spec).integrate(x, h=0.2, steps=5, stride=5, m=m).x[-1]
+    first, *others = with_threads(lambda: one.integrate(x, h=0.2, steps=5, stride=5, m=m).x[-1])
+    np.testing.assert_allclose(first, expected, rtol=0, atol=1e-12)
+    assert all(np.array_equal(first, other) for other in others)
+
+
 def test_runs_continue_and_steps_backward_return() -> None:
     x, one = orbits(), solver(text("jacobi"))
     session = one.session(x, m=MASSES)
@@ -438,3 +454,9 @@ def test_what_does_not_fit_is_refused_at_its_place(name: str) -> None:
     assert message in diagnostic.message
     assert diagnostic.location
     assert diagnostic.hint
+
+
+def test_devices_are_refused() -> None:
+    with pytest.raises(SpecError, match="devices have no steps in relative coordinates") as raised:
+        emit(compiled(text()).program, "device", "")
+    assert raised.value.diagnostics[0].hint

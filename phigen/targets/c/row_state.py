@@ -67,7 +67,10 @@ LATTICE = (
     StateBlock(
         "massive",
         "BODIES",
-        ("ptrdiff_t massive;         /* number of bodies up to the last one with a mass */",),
+        (
+            "ptrdiff_t massive;         /* number of bodies up to the last one with a mass */",
+            "double mass;               /* of all bodies */",
+        ),
     ),
     StateBlock(
         "bonds",

@@ -15,19 +15,17 @@
 static int phi_weigh(phi_solver *s)
 {
     const double *m = s->x[PHI_MASS];
-    double sum = 0.0;
-    s->massive = 0;
     for (ptrdiff_t i = 0; i < s->length; ++i) {
         if (m[i] < 0.0 PHI_OR_NO_MASS(m[i])) return 0;
         if (m[i] > 0.0) s->massive = i + 1;
-        sum += m[i];
+        s->mass += m[i];
 #if PHI_JACOBI
-        s->x[PHI_INNER][i] = sum;
+        s->x[PHI_INNER][i] = s->mass;
 #else
         s->x[PHI_INNER][i] = m[0];
 #endif
     }
-    return m[0] > 0.0 && isfinite(sum);
+    return m[0] > 0.0 && isfinite(s->mass);
 }
 
 #if PHI_JACOBI
@@ -93,15 +91,6 @@ static double phi_moment(const phi_solver *s, const double *q)
     return sum;
 }
 
-/* The mass of all bodies. */
-static double phi_whole_mass(const phi_solver *s)
-{
-    const double *m = s->x[PHI_MASS];
-    double sum = m[0];
-    for (ptrdiff_t i = 1; i < s->massive; ++i) sum += m[i];
-    return sum;
-}
-
 /* Add a value to that of each body but the first. */
 static void phi_shift_bodies(const phi_solver *s, double *q, double value)
 {
@@ -130,24 +119,18 @@ static void phi_to_relative(const phi_solver *s, double *const *x)
         phi_make_relative(s, q);
         phi_make_relative(s, v);
 #else
-        const double mass = phi_whole_mass(s), star = v[0];
+        const double star = v[0];
         phi_shift_bodies(s, q, -q[0]);
         phi_shift_bodies(s, v, -v[0]);
-        q[0] += phi_moment(s, q) / mass;
-        v[0] += phi_moment(s, v) / mass;
+        q[0] += phi_moment(s, q) / s->mass;
+        v[0] += phi_moment(s, v) / s->mass;
         phi_shift_bodies(s, v, star - v[0]);
 #endif
     }
 }
 
-/* Transform the state to relative coordinates. */
-static void phi_begin_relative(phi_solver *s)
-{
-    phi_to_relative(s, s->x);
-#if PHI_COMPENSATED
-    phi_clear_carry(s);
-#endif
-}
+/* Clear the compensation terms, which belong to other coordinates. */
+static void phi_clear_other_carry(phi_solver *s) { phi_clear_carry(s); }
 
 /* Transform relative coordinates back. */
 static void phi_to_cartesian(const phi_solver *s, double *const *x)
@@ -159,7 +142,7 @@ static void phi_to_cartesian(const phi_solver *s, double *const *x)
         phi_make_cartesian(s, v);
 #else
         const double recoil = phi_moment(s, v) / s->x[PHI_MASS][0];
-        q[0] -= phi_moment(s, q) / phi_whole_mass(s);
+        q[0] -= phi_moment(s, q) / s->mass;
         phi_shift_bodies(s, q, q[0]);
         phi_shift_bodies(s, v, v[0]);
         v[0] -= recoil;
@@ -170,6 +153,7 @@ static void phi_to_cartesian(const phi_solver *s, double *const *x)
     }
 }
 
+#if PHI_SHARED
 /* Compute what the part B of H reads of other bodies, by all threads. */
 static void phi_gather_pulls(const phi_solver *s, const double *coef, size_t first, size_t end)
 {
@@ -179,13 +163,20 @@ static void phi_gather_pulls(const phi_solver *s, const double *coef, size_t fir
 #endif
     phi_gather_rows(s, coef, first, end);
     phi_wait();
-#if PHI_JACOBI
     if (PHI_THREAD == 0) phi_join_pulls(s, 0);
-#else
     if (PHI_THREAD == 0) phi_join_shifts(s, s->x, PHI_BODY_AXES);
-#endif
     phi_wait();
 }
+#else
+/* Compute what the part B of H reads of other bodies. */
+static void phi_gather_pulls(const phi_solver *s, const double *coef)
+{
+    phi_place_bodies(s, s->x, s->placed);
+    phi_gather_part(s, coef);
+    phi_join_pulls(s, 0);
+    phi_join_shifts(s, s->x, PHI_BODY_AXES);
+}
+#endif
 
 #if PHI_TANGENT
 /* The same for a tangent vector v. */
@@ -201,11 +192,8 @@ static void phi_gather_varied_pulls(const phi_solver *s, const double *coef, dou
     phi_gather_tangent_rows(s, coef, v, first, end);
 #endif
     phi_wait();
-#if PHI_JACOBI
     if (PHI_THREAD == 0) phi_join_pulls(s, PHI_BODY_AXES);
-#else
     if (PHI_THREAD == 0) phi_join_shifts(s, v, 2 * PHI_BODY_AXES);
-#endif
     phi_wait();
 }
 #endif

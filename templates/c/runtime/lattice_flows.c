@@ -193,7 +193,8 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    if (!s->open) phi_begin_relative(s);
+    if (!s->open) phi_to_relative(s, s->x);
+    if (!s->open) phi_clear_other_carry(s);
     phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* an open flow is merged with the next */
 #endif
     status = phi_march(s, steps);

@@ -6,6 +6,10 @@
 /* Apply flow `number` of a step; number PHI_FLOWS is the last merged with the first. */
 static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
 {
+#if PHI_BODIES && !PHI_SHARED
+    if (phi_flow_parts[number] == PHI_REMAINDER) phi_gather_pulls(s, s->coef + number * PHI_ROW);
+    else phi_move_centre(s->x, phi_times[number] * s->h);
+#endif
 #if PHI_RENEWED
     double coef[PHI_ROW];
     phi_renew(s, number, steps, coef);
@@ -14,7 +18,7 @@ static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
     (void)steps;
     phi_sweep_part(s, phi_flow_parts[number], s->coef + number * PHI_ROW PHI_AND_FAR(s->far > 0));
 #endif
-#if PHI_BODIES
+#if PHI_BODIES && PHI_SHARED
     if (phi_flow_parts[number] == PHI_REMAINDER || PHI_THREAD > 0) return;
     phi_move_centre(s->x, phi_times[number] * s->h);
 #if PHI_TANGENT

@@ -26,7 +26,8 @@ phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t c
         for (size_t f = 0; f < PHI_DIM; ++f) phi_put(s, fields[f], v + (k * PHI_DIM + f) * s->sites);
         phi_to_relative(s, fields);
     }
-    phi_begin_relative(s);
+    phi_to_relative(s, s->x);
+    phi_clear_other_carry(s);
     s->vectors = count;
     for (; steps > 0 && status == PHI_OK; --steps) {
         phi_copy(s->before, s->x, s);

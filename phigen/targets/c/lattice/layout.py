@@ -126,8 +126,7 @@ def switches(layout: Layout) -> dict[str, bool]:
         "SLOPES": layout.slopes,
         "SHARED": bool(step.adjoint)
         or (step.equation is None and (program.profile == "fast" or program.extras.tangent))
-        or step.rates is not None
-        or step.relative is not None,
+        or step.rates is not None,
         "ONE_ROW": len(step.sites.axes) == 1,
         "SWEEP_PREDICTORS": step.equation is not None and program.offers("recurrences"),
     }

@@ -157,23 +157,24 @@ class _PartLoops:
             blocks: dict[str, ir.Block] = {form: (ir.Call(f"rows{k + 1}{form}", arguments),) for form in forms}
             cases.append(row_drivers.in_forms(blocks))
         if step.relative:
-            yield self._gathering(step.relative.remainder)
+            yield self._gathering(step.relative.remainder, threads)
         title = "a flow" if coloured else "the flow of a part of H"
         title = f"Derivative of {title} along a tangent vector" if self.varied else title[0].upper() + title[1:]
         yield commented(build.driver(name, title, parameters, cases, threads=threads), program)
 
-    def _gathering(self, remainder: int) -> str:
-        """Return the driver of the sums over pairs of bodies in relative coordinates."""
+    def _gathering(self, remainder: int, threads: int) -> str:
+        """Return the driver of the sums over pairs of bodies in relative coordinates, for ``driver(threads=…)``."""
         layout, program = self.loops.layout, self.loops.program
         gathers = [sweep.gather for sweep in self.parts[remainder] if sweep.gather]
         calls = tuple(ir.Call(e.kernel.name, (COEF, SEGMENT)) for gather in gathers for e in gather.ends)
         placed = ir.Member(S, "placed") if switches(layout)["JACOBI"] else STATE
         setup = [row_drivers.member("x", placed)]
         setup += [row_drivers.member("varied", ir.fixed("v"))] * self.varied
-        name = "gather_tangent_rows" if self.varied else "gather_rows"
+        name = "gather_tangent_rows" if self.varied else "gather_part" if threads else "gather_rows"
         title = "The sums over other bodies" + ", and their variations" * self.varied
         case = RowSegment(calls, tuple(setup))
-        return commented(drivers(self.loops).driver(name, title, ["coef", *["v"] * self.varied], [case]), program)
+        parameters = ["coef", *["v"] * self.varied]
+        return commented(drivers(self.loops).driver(name, title, parameters, [case], threads=threads), program)
 
     def _calls_of_part(self, part: Sequence[Sweep]) -> Calls:
         """Return the calls for a row segment that make the flow of a part of H, for each form.
