@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members: implicit
  *   steps; Ensembles
- * body-sha256: 5aaa4beda1b21d28b5e05286897099df85590c6856087ebc476fc2c1c7614146
+ * body-sha256: 806ed91219f7bcfd607b3dce156028bda48c4aa4ae4b7a280c3dfd4e5322b7b6
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -2028,7 +2028,8 @@ static void rigid_body_group_frame(const rigid_body_group *group, const rigid_bo
     }
 }
 
-/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
+/* Write the results of a member. Steps that the group did not make for it are made by single steps; if one
+   fails, all steps of the member are, so that status and last state are those of a member by itself. */
 static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int lane,
     const rigid_body_members *all, size_t m, rigid_body_status status)
 {
@@ -2038,9 +2039,13 @@ static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int
     if (status != rigid_body_OK) {
         rigid_body_end_member(all, m, 0, NULL, status);
     } else if (group->steps_left[lane] > 0) {
-        const rigid_body_status begun = rigid_body_begin_member(all, m, x, group->gauge[lane], &s);
+        rigid_body_status begun = rigid_body_begin_member(all, m, x, group->gauge[lane], &s);
         for (int i = 0; i < rigid_body_DIM && begun == rigid_body_OK; ++i) s.carry[i] = group->carry[i][lane];
         status = rigid_body_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
+        if (status != rigid_body_OK) {
+            begun = rigid_body_take_member(all, m, x, &s);
+            status = rigid_body_end_member(all, m, 0, &s, begun);
+        }
         if (begun == rigid_body_OK) memcpy(x, s.x, sizeof x);
     }
     rigid_body_put_member(all, m, x, status);
