@@ -197,7 +197,7 @@ class _Problem:
         return [[(t, x) for t, x in event_crossings if (t - last) * sign <= 0] for event_crossings in by_event], stop
 
     def _crossings(self, event: Event, h: float) -> list[tuple[float, Floats]]:
-        """Return the times and states at which an event changes its sign in its direction."""
+        """Return the times and states at which an event changes its sign, in the direction that it states."""
         direction_of_change = np.sign(getattr(event, "direction", 0)) * np.sign(
             self.end - self.begin
         )  # SciPy's directions refer to the direction of integration, those of CrossingFinder to increasing time.

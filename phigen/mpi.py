@@ -37,10 +37,11 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.writing import replacing
 
 #: Steps between two checks for finite values, and steps with full-range functions after a failed check. Both are the
-#: same as in templates/c/runtime/lattice.c, whose results runs on several processes reproduce bit by bit.
+#: same as in templates/c/runtime/lattice.c, so that runs on one and on several processes are bitwise equal.
 STRETCH, FAR_STEPS = 32, 64
 
-#: Arguments that only runs in one process have: they need parts of steps, or copies of the solver.
+#: Arguments of `LatticeSolver.integrate` that several processes do not support: they need parts of steps, or copies of
+#: the solver.
 _WHOLE_ONLY = ("until", "every", "at", "stop", "section", "retry")
 
 #: An array over the whole lattice, or a function f(first, end) that returns the planes first … end − 1.

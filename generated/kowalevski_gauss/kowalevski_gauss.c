@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 0f62fa8f2b69652be796fe69694f885fa09624f516d353d40ecb7f4852199fe6
+ * body-sha256: e6f478866a40bb0de25640eb56cf7ffba64bb3e1cf788368b57681dbb9c617cd
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -486,7 +486,7 @@ static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int 
             reads[r]);
 }
 
-/* Number of the predictor that would have come nearest to the values that the last sweep of a step has
+/* Number of the predictor whose prediction is nearest to the values that the last sweep of a step has
    read. */
 static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale, double element_scale,
     kowalevski_gauss_lanes *reads)
@@ -506,7 +506,8 @@ static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, doubl
     return best;
 }
 
-/* Stage increments in the frame of the end of a step from a point, where the next step starts. */
+/* Transform stage increments of a step to the frame of its end, where the next step starts. The step begins
+   at point. */
 static void kowalevski_gauss_to_next_frame(const kowalevski_gauss_solver *s,
     double point[kowalevski_gauss_POINT], const double end[kowalevski_gauss_UNKNOWNS],
     kowalevski_gauss_lanes *increments,
@@ -567,7 +568,7 @@ static int kowalevski_gauss_judge(double *usual, int *first, kowalevski_gauss_pr
     if (rate >= 1.0 && change <= kowalevski_gauss_NEARLY_ROUNDING) ++sweeps->rises;
     sweeps->last = change;
     if ((slow && change <= kowalevski_gauss_ROUNDING) || sweeps->rises > 1) {
-        /* or the first change was at rounding level */
+        /* the first measured change may have been at rounding level already */
         *first = (sweep == *first || rate > 2.0 * *usual ? *first : sweep) - 1;
         return 1;
     }
@@ -613,7 +614,8 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
             if (!isfinite(square)) return kowalevski_gauss_NOT_FINITE;
             if (judgement < 0) return kowalevski_gauss_NO_CONVERGENCE;
             if (judgement > 0) {
-                /* the remaining error of the sweep before was about the latest change */
+                /* the latest change is about the error before the last sweep: if it is small, that sweep was
+                   not needed */
                 if (solved)
                     past->sweeps = square <= 16.0 * kowalevski_gauss_SOLVED * kowalevski_gauss_SOLVED
                     ? sweep - 1 : sweep;

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: dd78b878b3aab6d7cb0c9a22e6ebbd0e22649f2c29719abf2ac49079d1631b15
+# body-sha256: 3bc985015d45904eb76c31d47d8ed83e9de89540d04f553f98367a3013b00c71
 import numpy as np
 
 VERSION = "0.1.0"
@@ -205,7 +205,7 @@ ROUNDING = 4e-16  # ... and is below this; a fraction of 0.4 let Casimirs drift;
 NEARLY_ROUNDING = 2e-14  # ... or with the second change below this that is not smaller than the one before
 TRIALS = 32  # steps between comparisons of the predictors; a comparison costs as much as two sweeps
 
-# Gauss collocation: nodes, weights, and the matrix mu = A diag(1/b); mu + mu.T is exactly 1 everywhere.
+# Gauss collocation: nodes, weights, and the matrix mu = A diag(1/b). All entries of mu + mu.T are exactly 1.
 NODES = np.array((0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681,))
 WEIGHTS = np.array((0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.181341891689181, 0.181341891689181, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813,))
 MIXING = np.array([
@@ -295,8 +295,10 @@ PREDICTION = _factors_at(1 + NODES)
 
 
 def _with_new_step(memory, ratio):
-    """Return the predictor of a step of another size, that of the last one times a ratio, or after a kick: predicted
-    unknowns."""
+    """Return `memory` for a step after a kick, or of another size: the predicted unknowns.
+
+    `ratio` is the size relative to that of the last step.
+    """
     if memory[1].ndim == 4 and ratio == 1:
         return memory
     if memory[1].ndim != 3 or not abs(ratio) <= 1:
@@ -320,7 +322,8 @@ def _in_next_frame(stage, x, end, increments):
 def _advance(stage, x, carry, memory):
     """Make one step of all members.
 
-    `memory` holds the stage increments of the last step, then the same in the frame of its end, or the start of the sweeps.
+    `memory` is a pair: the stage increments of the last step, and the same in the frame of its end. The second may
+    instead be the starting values of the sweeps.
     """
     predicted = _predicted(memory)
     anew = np.zeros((8, len(x), len(WEIGHTS)))

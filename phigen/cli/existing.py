@@ -31,7 +31,10 @@ force_option = click.option(
 
 
 def expect_replaceable(path: Path, option: str | None = None) -> None:
-    """Raise `click.BadParameter` for an existing file that phigen did not write, unless ``--force`` was given."""
+    """Raise `click.BadParameter` for an existing file that phigen did not write, unless ``--force`` was given.
+
+    A file that may be replaced is noted, so that the command can say which files it replaced.
+    """
     if not path.is_file() or path.stat().st_size == 0:
         return
     meta = click.get_current_context().meta

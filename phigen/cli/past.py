@@ -146,7 +146,10 @@ def begun(solver: Solver, experiment: Experiment) -> Session:
 
 
 def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
-    """Return the experiment that continues a finished run, whose rows are in the file ``path``."""
+    """Return the experiment that continues a finished run, whose rows are in the file ``path``.
+
+    Raises a `click.UsageError` for the file of another run, and for a run that its file cannot continue.
+    """
     names = solver.interface
     if experiment.run.record:
         message = f"the run {experiment.run.name} has record:, and its file lacks values that a continuation needs"

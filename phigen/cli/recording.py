@@ -341,9 +341,11 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
 
 
 @contextmanager
-def _disk_errors_as_interrupts(recorder: Recorder) -> Iterator[None]:
-    """Context in which an error of the disk, such as lack of space, becomes a `FileError` that says how to resume the
-    run."""
+def _disk_errors_with_hint(recorder: Recorder) -> Iterator[None]:
+    """Context in which an error of the disk, such as lack of space, becomes a `FileError` with a hint how to resume.
+
+    Errors of a run without a checkpoint are not changed.
+    """
     try:
         yield
     except OSError as error:
@@ -361,7 +363,7 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
     experiment, session, start = recorder.experiment, recorder.session, time.perf_counter()
     run, growth, failure = experiment.run, recorder.growth, None
     label = f"{recorder.solver.interface.name}, order {recorder.solver.order}"
-    with _disk_errors_as_interrupts(recorder), interruptible() as stop, console.progress(label, run.steps) as progress:
+    with _disk_errors_with_hint(recorder), interruptible() as stop, console.progress(label, run.steps) as progress:
         see_tangent = growth.see if growth else None
         flags = {"is_started": recorder.watch.begun, "goes_on": experiment.has_part}
         pieces = march(session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, **flags)

@@ -408,7 +408,7 @@ class Selection:
     """Sites over which a loop runs.
 
     They have one ``colour``, if it is not None. ``inside`` excludes the sites near boundary seams. With a ``window``,
-    the loop runs over the sites near seams; the window is the set of axes, a bit mask, on whose seams the terms begin.
+    a bit mask of axes, the loop runs over the sites near seams that terms on the seams of these axes reach.
     Sites with numbers below ``first`` are excluded; in loops over pairs, this applies to the other site. ``massive``
     ends a loop with the last site that has a mass.
     """

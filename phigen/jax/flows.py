@@ -117,7 +117,10 @@ def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None
 
 
 def _real_state(x0: Any, bracket: System) -> Any:
-    """Return x0 as a real array in its own precision, or in the default precision of JAX for Python numbers."""
+    """Return x0 as a real array in its own precision, or in the default precision of JAX for Python numbers.
+
+    Raises `TypeError` for complex values, and `ValueError` for a wrong shape.
+    """
     x = jnp.asarray(x0)
     if jnp.iscomplexobj(x):
         raise TypeError("x0 must be real")

@@ -1,4 +1,4 @@
-// A panel inside another page: it says how high it is, and follows the theme of that page.
+// A panel in a frame of another page: it sends its height to that page, and follows the theme of that page.
 if (parent !== window) {
   document.documentElement.classList.add("framed");
   new ResizeObserver(() => {

@@ -1,6 +1,7 @@
-// What the live panel draws of a system of coordinates: its motion in space or in a plane, on what it cannot leave.
+// Pictures of the live panel for ordinary systems: the motion in space or in a plane, on the surface or curve to which
+// a conserved quantity restricts it.
 
-// What an error of a quantity is divided by: its value, or its terms where that is nearly 0.
+// The unit for errors of a quantity: its value or, if this is nearly 0, the magnitude of its terms.
 function unitOf(quantity, x) {
   const value = Math.abs(quantity(x));
   let terms = 0;
@@ -12,13 +13,13 @@ function unitOf(quantity, x) {
   return value > 1e-3 * terms ? value : terms || 1;
 }
 
-// A point between two steps, by the cubic with their slopes.
+// Coordinate i at the fraction s between two states, by the cubic polynomial with their slopes.
 function between(a, b, s, i) {
   const r = 1 - s;
   return r * r * (1 + 2 * s) * a.x[i] + r * r * s * a.slope[i] + s * s * (3 - 2 * s) * b.x[i] - s * s * r * b.slope[i];
 }
 
-// Lines of f = 0 over a grid in a plane, as ends [u, v, u, v]; not those along which f only changes its sign at a pole.
+// The lines f = 0 over a grid in a plane, as ends [u, v, u, v]. Sign changes of f at poles are left out.
 function contour(f, [u0, u1], [v0, v1], count) {
   const u = (i) => u0 + ((u1 - u0) * i) / count, v = (j) => v0 + ((v1 - v0) * j) / count;
   const values = Array.from({ length: count + 1 }, (_, i) => Array.from({ length: count + 1 }, (_, j) => f(u(i), v(j))));
@@ -45,7 +46,8 @@ function makeView(panel) {
   const spaces = sides.map((side) => inSpace(at(side), view, () => panel.draw(), reset));
   let bounds, net;
 
-  // The solver, what is to be integrated beside it, and what is conserved; throws what the solver does not take.
+  // The race of a new solver and RK4, with the errors of conserved quantities. Throws the errors of the solver for
+  // values that it does not accept.
   function begin({ Solver, rateAt }, given) {
     const solver = new Solver({ x0: given.start, t0: data.t0, params: given.params });
     const field = (x, t) => {
@@ -64,14 +66,14 @@ function makeView(panel) {
     return new Race(solver, { h: given.h, parts: given.parts, field, groups, remember: (runner) => remember(runner, field, given.h) });
   }
 
-  // The steps behind a method, with the slopes at their ends.
+  // Append the state of a runner to its trail, with the slope multiplied by the step.
   function remember(runner, field, h) {
     const slope = field(runner.x, runner.t).x.map((v) => v * h);
     (runner.trail ??= []).push({ x: runner.x, slope });
     if (runner.trail.length > MOST) runner.trail.shift();
   }
 
-  // The first steps, and the box that they stay in.
+  // A race of some steps, with the least and the largest coordinates of the solver.
   function bounded(given, steps, milliseconds) {
     let low, high;
     const trial = tried(given, steps, milliseconds, ({ x }) => {
@@ -81,8 +83,8 @@ function makeView(panel) {
     return { trial, low, high };
   }
 
-  // How many steps are to be seen in a second, so many that the motion is neither a blur nor at rest, and what part of
-  // the picture is crossed in that second.
+  // A speed in steps per second at which the motion is easy to follow, with the longest step and the length of the
+  // motion in a second, both relative to the picture.
   function pace(given) {
     const { trial, low, high } = bounded(given, 60, 100), { axes } = data.groups[0];
     const chords = trial.ours.trail.slice(1).map(({ x }, k) => {
@@ -93,7 +95,8 @@ function makeView(panel) {
     return { longest: Math.max(...chords), moved: chord * speed, speed };
   }
 
-  // The box around the motion, and in it what the motion cannot leave: a surface, or a curve of one energy.
+  // Compute the box around the motion, and the surface or curve in it on which the motion stays: the level of a Casimir
+  // or of the energy.
   function look() {
     const { settings, race } = panel, { low, high } = bounded(settings, 400, 60);
     const { axes, leaf } = data.groups[settings.group], { solver, start } = race;
@@ -115,7 +118,7 @@ function makeView(panel) {
     net = drawnOn(off, bounds);
   }
 
-  // The box of all points at which a function is zero, if that is within a box and does not reach its sides.
+  // The box around all zeros of a function in a box; null if they reach its sides.
   function wholeIn(box, f) {
     const points = drawnOn(f, box).filter(Boolean);
     const inner = box.map((axis, k) => {
@@ -127,7 +130,7 @@ function makeView(panel) {
     return inner.every(Boolean) ? inner : null;
   }
 
-  // Where a function of two or three coordinates is zero: points, and null where a line ends.
+  // Lines of zeros of a function of two or three coordinates, as points, with null after each line.
   function drawnOn(f, box) {
     const [u, v, w] = box.map(({ low, high }) => [low, high]), lines = [];
     if (!w) {
@@ -146,7 +149,7 @@ function makeView(panel) {
     return lines;
   }
 
-  // A map from the axes of the box to a canvas.
+  // The place of a plane picture on a canvas, with the map `place` from coordinates to the canvas.
   function plane(canvas) {
     const roomy = canvas.clientWidth > 260, left = roomy ? 44 : 16, below = roomy ? 30 : 16;
     const [u, v] = bounds, width = canvas.clientWidth - left - 10, height = canvas.clientHeight - below - 10;
@@ -176,7 +179,7 @@ function makeView(panel) {
     write(end(v, v.high), left - 5, 10, "right", "top");
   }
 
-  // The trail up to a part of the last step, as points on the screen.
+  // The trail of a runner as points on the screen; of the last step, only the part that was shown so far.
   function trailOf(runner, axes, place) {
     const points = [], { trail } = runner, { waiting } = panel, parts = 6;
     for (let k = 1; k < trail.length; k++) {

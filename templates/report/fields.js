@@ -1,6 +1,6 @@
-// What the live panel draws of a lattice: fields over space and time, in a plane or on a graph, or sites that move.
+// Pictures of the live panel for lattices: fields over space and time, in a plane or on a graph, or moving sites.
 
-// Numbers from 0 to 1 in an order that a seed fixes.
+// A generator of random numbers from 0 to 1, the same for the same seed.
 function randomNumbers(seed) {
   let state = seed >>> 0;
   return () => {
@@ -11,7 +11,8 @@ function randomNumbers(seed) {
   };
 }
 
-// Values as a spec gives them: a number, a list, random ones, or a formula of the indices and the sizes.
+// The values of a field or parameter from their description in a spec: a number, a list, random values, or a formula of
+// the indices and the sizes.
 function valuesOf(given, name, sizes, length) {
   if (given.number !== undefined) return new Float64Array(length).fill(given.number);
   if (given.listed) return Float64Array.from(given.listed);
@@ -24,7 +25,7 @@ function valuesOf(given, name, sizes, length) {
   return Float64Array.from({ length }, (_, site) => liveValues[name](...places(site), ...sizes));
 }
 
-// The fields of all sites at the start, one after the other.
+// The initial fields, each with the values of all sites, one field after the other.
 function startOf(data, sizes, count) {
   const whole = data.initial[""], fields = data.coordinates.length;
   if (!whole) return Float64Array.from(data.coordinates.flatMap((name) => [...valuesOf(data.initial[name], name, sizes, count)]));
@@ -34,7 +35,7 @@ function startOf(data, sizes, count) {
   return drawn.map((v, k) => (whole.scale * v) / length(k % count));
 }
 
-// Colours of values from 0 to 1: from one to another, or to both sides of the middle, which is that of the page.
+// Colours for values from 0 to 1. LIGHT and DARK are for values of both signs: the middle is the colour of the page.
 const VIRIDIS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 const LIGHT = [[5, 70, 140], [94, 160, 205], [246, 247, 248], [235, 130, 90], [150, 12, 30]];
 const DARK = [[130, 205, 255], [35, 110, 170], [28, 34, 41], [190, 85, 45], [255, 200, 150]];
@@ -43,15 +44,15 @@ function mixed(stops, part) {
   return stops[k].map((c, i) => c + (place - k) * (stops[k + 1][i] - c));
 }
 
-// A direction in space as a colour: its hue goes around with x and y, z is how light it is.
+// The colour of a direction in space: the hue is the angle of (x, y), and z determines the lightness.
 function directed(x, y, z) {
   const length = Math.hypot(x, y, z) || 1, angle = Math.atan2(y, x), light = 0.5 + (0.42 * z) / length;
   const depth = Math.min(light, 1 - light) * (Math.hypot(x, y) / length);
   return [0, 1, 2].map((k) => 255 * (light + depth * Math.cos(angle - (2 * Math.PI * k) / 3)));
 }
 
-const COLUMNS = 240; // of a diagram; where there are more, every second goes
-const BEHIND = 60; // steps that sites which move leave behind them
+const COLUMNS = 240; // largest number of columns of a diagram; if there are more, every second one is removed
+const BEHIND = 60; // number of steps in the trails of moving sites
 
 function makeView(panel) {
   const { at, data, sides, ink, colour, tried, shortened } = panel;
@@ -59,7 +60,8 @@ function makeView(panel) {
   const countOf = (sizes) => sizes.reduce((product, n) => product * n, 1);
   let low, high, table, ground;
 
-  // The solver, what is to be integrated beside it, and what is conserved; throws what the solver does not take.
+  // The race of a new solver and RK4, with the errors of conserved quantities. Throws the errors of the solver for
+  // values that it does not accept.
   function begin({ Solver }, given) {
     const sizes = sizesOf(given), count = countOf(sizes), params = { ...given.params };
     for (const [name, values] of Object.entries(data.arrays)) {
@@ -71,14 +73,16 @@ function makeView(panel) {
     return new Race(solver, { h: given.h, parts: given.parts, field, groups, remember: (runner) => remember(runner, solver, chosen, sizes) });
   }
 
-  // The energy error, relative to |H| at the start or, where that is nearly 0, to the magnitudes of the energies of all sites.
+  // The function for the energy error, relative to |H| at the start or, if this is nearly 0, to the sum of the
+  // magnitudes of the energies of all sites.
   function energyError(solver) {
     const energy = solver.hamiltonian(), sites = solver.density().reduce((sum, v) => sum + Math.abs(v), 0);
     const unit = (Math.abs(energy) > 1e-3 * sites ? Math.abs(energy) : sites) || 1;
     return (x) => Math.abs(solver.hamiltonian(x) - energy) / unit;
   }
 
-  // Off the Casimir that is farthest off: of sites by the worst site, of sums in magnitudes of their terms.
+  // The function for the largest error of some Casimirs. For Casimirs of sites it is the error of the worst site;
+  // errors of sums are relative to the magnitudes of their terms.
   function offCasimirs(solver, chosen) {
     const first = solver.casimirs(), { count } = solver.sites, kinds = solver.constructor.CASIMIR_KINDS;
     const units = kinds.map((_, k) => first.subarray(k * count, (k + 1) * count).reduce((sum, v) => sum + Math.abs(v), 0) || 1);
@@ -97,7 +101,8 @@ function makeView(panel) {
     };
   }
 
-  // Off the invariant that is farthest off: an observable, of which the next has the magnitudes of its terms.
+  // The function for the largest error of some invariants. Each is an observable; the next observable is the sum of the
+  // magnitudes of its terms.
   function offInvariants(solver, chosen) {
     const first = Float64Array.from(solver.observables());
     const unit = (k) => (Math.abs(first[k]) > 1e-3 * first[k + 1] ? Math.abs(first[k]) : first[k + 1]) || 1;
@@ -108,10 +113,10 @@ function makeView(panel) {
     };
   }
 
-  // -- what is kept of a state
+  // -- stored values of states
 
-  // The values of the chosen field at the sites that are drawn, of a direction those of all three, of what moves the
-  // places; of three axes the plane in the middle of the first.
+  // The values to draw: those of the chosen field, the three fields of a direction, or the places of moving sites. On
+  // three axes, only the plane in the middle of the first axis is drawn.
   function shown({ x, t }, solver, { kind, fields }, sizes) {
     const count = countOf(sizes), plane = sizes.length > 2 ? sizes[1] * sizes[2] : count;
     const from = sizes.length > 2 ? plane * Math.floor(sizes[0] / 2) : 0;
@@ -121,7 +126,7 @@ function makeView(panel) {
     return kept;
   }
 
-  // Where a method has been: columns of a diagram, tails, or the last state only.
+  // Store the values to draw: columns of a diagram, trails of moving sites, or the last two states.
   function remember(runner, solver, chosen, sizes) {
     const kept = (runner.kept ??= { list: [], stride: 1, since: 0 });
     if (++kept.since < kept.stride) return;
@@ -134,9 +139,9 @@ function makeView(panel) {
     if (data.picture !== "diagram" && kept.list.length > (data.picture === "moving" ? BEHIND : 2)) kept.list.shift();
   }
 
-  // -- before it begins
+  // -- choice of speed and colours
 
-  // The values that are drawn in the first steps, each and how they change.
+  // The race after the first steps, with the least and largest value to draw, and the relative change in each step.
   function surveyed(given, steps, milliseconds) {
     const chosen = data.groups[given.group], sizes = sizesOf(given), changes = [];
     let last, least = Infinity, most = -Infinity;
@@ -168,7 +173,7 @@ function makeView(panel) {
     table = null;
   }
 
-  // Where values of the solver leave what the colours are for, these are for more.
+  // Extend the range of the colours if values of the solver are outside.
   function widen(values) {
     const reach = 0.1 * (high - low), both = low < 0 && high > 0;
     let least = low, most = high;
@@ -178,7 +183,7 @@ function makeView(panel) {
     table = null;
   }
 
-  // Settings to look for a step with: of a plane or a cube fewer sites, which move alike.
+  // Settings for the search of a step: planes and cubes have fewer sites, which move similarly.
   function rehearsed(given) {
     const counts = data.sizes.map(countOf), few = counts.findLastIndex((count) => count <= 600);
     return data.picture === "plane" && few >= 0 ? { ...given, sites: Math.min(few, given.sites) } : given;
@@ -188,7 +193,7 @@ function makeView(panel) {
 
   const isDark = (canvas) => Number(getComputedStyle(canvas).backgroundColor.match(/\d+/)?.[0] ?? 255) < 128;
 
-  // 256 colours from low to high.
+  // The 256 colours for values from low to high.
   function colours(canvas) {
     const now = isDark(canvas);
     if (table && ground === now) return table;
@@ -198,7 +203,7 @@ function makeView(panel) {
     return table;
   }
 
-  // The pixels of values, each put where place(site) says.
+  // Set the pixels of values; that of a site has the index place(site).
   function paint(pixels, values, place, all, direction) {
     const count = direction ? values.length / 3 : values.length;
     for (let site = 0; site < count; site++) {
@@ -211,7 +216,8 @@ function makeView(panel) {
     }
   }
 
-  // A picture of a runner that is painted anew where its size or its colours change, else only what is new.
+  // The picture of a runner. A diagram is kept while colours and stride are the same, so that only new columns are
+  // painted.
   function pictureOf(runner, width, height, all) {
     const { kept } = runner;
     const fresh = runner.picture?.all === all && runner.picture.stride === kept.stride && data.picture === "diagram";
@@ -224,7 +230,7 @@ function makeView(panel) {
     return runner.picture;
   }
 
-  // The sharp canvas of a side, empty, with the room for a picture in it: beside it the names of axes and the colours.
+  // Clear the canvas of a side, and return the rectangle for the picture; names of axes and colours are outside.
   function frame(k) {
     const canvas = at(sides[k]), pen = canvas.getContext("2d"), scale = window.devicePixelRatio || 1;
     canvas.width = canvas.clientWidth * scale;
@@ -242,7 +248,7 @@ function makeView(panel) {
     pen.fillText(text, x, y);
   }
 
-  // The names of two axes {name, low, high} about a rectangle.
+  // Write the names and ends of two axes {name, low, high} around a rectangle.
   function named({ pen, roomy }, [u, v], x, y, width, height) {
     pen.fillStyle = pen.strokeStyle = ink();
     pen.font = `italic ${roomy ? 14 : 11}px sans-serif`;
@@ -256,7 +262,7 @@ function makeView(panel) {
     write(pen, v.high, x - 5, y, "right", "top");
   }
 
-  // The colours, from low to high.
+  // Draw the scale of colours, from low to high.
   function scaleOf({ canvas, pen, roomy, bar, top, height }, all) {
     if (!bar) return;
     const x = canvas.clientWidth - (roomy ? 48 : 14);
@@ -272,7 +278,7 @@ function makeView(panel) {
     write(pen, rounded(low, digits), x + 11, top + height, "left", "bottom");
   }
 
-  // Sites upwards, the time to the right.
+  // Draw a chain over time: sites upwards, time to the right.
   function drawDiagram(space, runner) {
     const { canvas, pen, left, top, width, height } = space, all = colours(canvas), { list, stride } = runner.kept;
     const [count] = sizesOf(panel.settings), direction = group().kind === "direction";
@@ -289,7 +295,7 @@ function makeView(panel) {
     scaleOf(space, all);
   }
 
-  // The first axis to the right, the second upwards, in squares.
+  // Draw a plane of sites as squares: the first axis to the right, the second upwards.
   function drawPlane(space, runner) {
     const { canvas, pen, left, top, width, height } = space, all = colours(canvas), sizes = sizesOf(panel.settings).slice(-2);
     const [across, upwards] = sizes, picture = pictureOf(runner, across, upwards, all), { image } = picture;
@@ -304,7 +310,7 @@ function makeView(panel) {
     scaleOf(space, all);
   }
 
-  // Sites that move in a plane, with what is behind them; those of another sign are rings.
+  // Draw moving sites with their trails. Sites with a negative value of the parameter data.sign are rings.
   function drawMoving(space, runner, k) {
     const { pen, left, top, width, height } = space, { list } = runner.kept, count = list[0].length / 2;
     const side = Math.min(width, height), x0 = left + (width - side) / 2, unit = side / (high - low);
@@ -344,7 +350,7 @@ function makeView(panel) {
     named(space, group().fields.map((f) => ({ name: data.coordinates[f], ...ends })), x0, top, side, side);
   }
 
-  // Sites with the bonds between them, each as large as there is room.
+  // Draw the sites of a graph with their bonds. The size of sites depends on their number.
   function drawGraph(space, runner) {
     const { canvas, pen, left, top, width, height } = space, all = colours(canvas), values = runner.kept.list.at(-1);
     const count = data.places.length / 2, direction = group().kind === "direction", pixels = new Float64Array(4 * count);
@@ -373,7 +379,7 @@ function makeView(panel) {
     scaleOf(space, all);
   }
 
-  // The name of a site beside it.
+  // Write the name of a site next to it.
   function label(pen, name, x, y) {
     pen.fillStyle = ink();
     pen.font = "12px sans-serif";

@@ -1,4 +1,4 @@
-// The live panel: the solver of this page runs in it, beside RK4; what they conserve is drawn as it is computed.
+// The live panel: the solver of this page and RK4 run side by side, with the errors of conserved quantities.
 if (document.getElementById("live-panel")) {
   const at = (id) => document.getElementById(`live-${id}`);
   const data = JSON.parse(at("data").textContent);
@@ -8,17 +8,17 @@ if (document.getElementById("live-panel")) {
   const swatches = [...document.querySelectorAll("#live-panel .swatch")];
   const made = {};
   const solverOf = (order) => (made[order] ??= liveSolvers[order]());
-  const ahead = 100; // steps of the button, for those who ask for less motion
-  // What sliders that go from one to the next choose from.
+  const ahead = 100; // number of steps per click with reduced motion
+  // The values of sliders that select from a list.
   const lists = { order: data.orders, sites: (data.sizes ?? []).map((_, k) => k) };
   let settings, standard, race, changed = false, playing = false, waiting = 1, before = 0, seen = true;
 
-  // -- settings, and the links that hold them
+  // -- settings, and links that contain them
 
   const shortened = (value) => Number(value.toPrecision(4));
   const copy = (given) => ({ ...given, params: { ...given.params }, start: [...given.start] });
 
-  // A value is looked up by the kind of its slider and a name.
+  // The setting for the kind and the name of a slider.
   const get = (from, kind, name) => (kind === "params" ? from.params[name] : kind === "start" ? from.start[name] : from[kind]);
   function set(into, kind, name, value) {
     if (kind === "params") into.params[name] = value;
@@ -26,7 +26,8 @@ if (document.getElementById("live-panel")) {
     else into[kind] = value;
   }
 
-  // Sliders go from -100 to 100: over multiples of the usual value, or to both sides of it.
+  // The value of a slider with positions from -100 to 100. The position is the exponent of a factor, or is proportional
+  // to a difference from the usual value.
   function valueOf(input) {
     const { kind, name, reach } = input.dataset, place = Number(input.value) / 100, usual = get(standard, kind, name);
     if (lists[kind]) return lists[kind][Number(input.value)];
@@ -38,7 +39,7 @@ if (document.getElementById("live-panel")) {
 
   const counted = (steps) => (steps === 1 ? "1 step" : `${steps} steps`);
 
-  // 16 × 12, 16³
+  // Sizes as text, such as 16 × 12 or 16³.
   const sized = (sizes) => sizes.length > 1 && new Set(sizes).size === 1 ? `${sizes[0]}${superscript(sizes.length)}` : sizes.join(" × ");
 
   function show(input) {
@@ -64,17 +65,17 @@ if (document.getElementById("live-panel")) {
     return `#live&${parts}`;
   }
 
-  // The link to the settings; the address bar follows once a setting has changed.
+  // Update the link to the settings and, after a setting was changed, the address of the page.
   function linkHere() {
     at("link").href = link();
     if (!changed) return;
     at("unused").hidden = true;
     try {
       history.replaceState(null, "", link());
-    } catch { /* pages without an origin of their own may not */ }
+    } catch { /* pages without an origin must not change the address */ }
   }
 
-  // The settings of an address, with the parts of it that are not used.
+  // The settings in the address, and the parts of the address that are unknown or not allowed.
   function linked() {
     const found = copy(standard), parts = new URLSearchParams(location.hash.replace(/^#live&?/, ""));
     const unknown = new Set(parts.keys()), refused = [];
@@ -97,7 +98,7 @@ if (document.getElementById("live-panel")) {
       const allowed = only ? positive : nonnegative ? (v) => v >= 0 : () => true;
       number(`p.${name}`, allowed, (v) => { found.params[name] = v; });
     }
-    // A link shows what its sender saw, whatever this browser would measure.
+    // A link has the number of steps of RK4 that its sender saw, which is not measured again.
     number("rk4", (v) => v >= 1 && v <= MOST_PARTS && Number.isInteger(v), (v) => { start.remember(found, v); });
     found.start.forEach((_, i) => number(`x.${data.coordinates[i]}`, () => true, (v) => { found.start[i] = v; }));
     return { found, refused: [...refused, ...[...unknown].map((key) => `${key}=${parts.get(key)}`)] };
@@ -131,12 +132,12 @@ if (document.getElementById("live-panel")) {
     report();
   }
 
-  // -- what is seen
+  // -- display
 
   const ink = () => getComputedStyle(at("panel")).color;
   const colour = (k) => getComputedStyle(swatches[k]).color;
 
-  // Drawn by curves.js or fields.js, as the system has it.
+  // The pictures, by curves.js for ordinary systems and by fields.js for lattices.
   const view = makeView({
     at, data, sides, ink, colour, begin, shortened, draw, solverOf, restart,
     tried: (...given) => start.tried(...given),
@@ -147,7 +148,7 @@ if (document.getElementById("live-panel")) {
   });
   const start = makeStart({ data, begin, view, shortened });
 
-  // An error to read: in per cent, or as a power of ten where that would be many zeros.
+  // An error as text: in per cent, or with a power of ten if it is small.
   function readable(error) {
     if (!Number.isFinite(error)) return "∞";
     if (error > 10) return "over 1000 %";
@@ -170,7 +171,7 @@ if (document.getElementById("live-panel")) {
     if (at(`${sides[k]}-told`).textContent !== told) at(`${sides[k]}-told`).textContent = told;
   }
 
-  // Errors over the time, from 10^-17 to 10, one panel for each group of quantities.
+  // Draw the errors over time, from 10^-17 to 10, in one panel for each group of quantities.
   function drawErrors() {
     const canvas = at("errors"), pen = canvas.getContext("2d"), scale = window.devicePixelRatio || 1;
     canvas.width = canvas.clientWidth * scale;
@@ -217,7 +218,7 @@ if (document.getElementById("live-panel")) {
     at("steps").textContent = race ? counted(race.ours.steps) : "";
   }
 
-  // For screen readers, and for whoever examines the page: where both are when they rest.
+  // Write settings and states to the attributes of the panel, where tests and scripts can read them.
   function report() {
     const { dataset } = at("panel");
     dataset.settings = JSON.stringify(settings);

@@ -1,11 +1,11 @@
-// Two solvers from one start: that of phigen, and RK4 with one step or several for each step of it. What the flow
-// conserves is measured of both.
-const MOST = 400; // stretches of time of which a history keeps the largest error, and steps of a trail
-const MOST_PARTS = 64; // steps of RK4 for one of the solver
+// Comparison of the solver of phigen with RK4, from the same start, with one or several steps of RK4 for each step of
+// the solver. For both, the errors of conserved quantities are measured.
+const MOST = 400; // largest number of intervals in a history, and of steps in a trail
+const MOST_PARTS = 64; // largest number of steps of RK4 for one step of the solver
 const ROUNDING = 1e-13; // errors below this are not compared
-const STEADY = 1.2, GROWING = 1.5; // the second half of a run beside the first, of errors that stay and that grow
+const STEADY = 1.2, GROWING = 1.5; // ratio of the errors in the halves of a run, at most or at least, for errors that stay and that grow
 
-// The largest error of each stretch; where there are too many, two become one.
+// The largest error in each of several equal intervals of a run. If there are too many intervals, pairs are joined.
 class History {
   values = [];
   last = 0;
@@ -29,7 +29,7 @@ class History {
   }
 }
 
-// The classical method of Runge and Kutta for dx = field(x, t), dt = rate(x).
+// A step of the classical Runge–Kutta method. field(x, t) returns the derivatives {x, t} of state and time.
 function rk4(field, x, t, h) {
   const point = new Float64Array(x.length), sum = new Float64Array(x.length);
   let slope = { x: sum, t: 0 }, time = 0;
@@ -42,11 +42,11 @@ function rk4(field, x, t, h) {
   return { x: sum.map((total, i) => x[i] + (h * total) / 6), t: t + (h * time) / 6 };
 }
 
-// One method on its way: where it is, its errors, and why it ended if it did.
+// The run of one method: its state, its errors, and the reason if it has failed.
 class Runner {
   failed = "";
   steps = 0;
-  // For each group of quantities the largest error.
+  // The largest errors of each group of quantities.
   histories;
 
   constructor(race, advance) {
@@ -71,8 +71,8 @@ class Runner {
   }
 }
 
-// Both methods, from where a solver is; RK4 takes `parts` steps for each step of the solver. Of both the errors of
-// groups {name, error(x, t)} are stored, and remember(runner) is called at the start and after each step.
+// The runs of both methods, from the state of a solver. RK4 makes `parts` steps for each step of the solver. The errors
+// of the groups {name, error(x, t)} are stored, and remember(runner) is called at the start and after each step.
 class Race {
   constructor(solver, { h, parts = 1, field, groups, remember }) {
     Object.assign(this, { solver, h, field, groups, remember, start: Float64Array.from(solver.x), t0: solver.t });
@@ -91,7 +91,7 @@ class Race {
   }
 }
 
-// The processor time of one step of a runner in milliseconds, the least of several rounds; 0 if it fails.
+// The time of one step of a runner in milliseconds, the shortest of several rounds; 0 if the step fails.
 function millisecondsOf(runner, round) {
   let least = Infinity;
   try {
@@ -117,20 +117,20 @@ function equalWork(race, round = 4) {
   return ours > 0 && theirs > 0 ? Math.min(MOST_PARTS, Math.max(1, Math.ceil(ours / theirs))) : 1;
 }
 
-// Of the stored errors of a group the largest of the first half and of the second half.
+// The largest error in the first and in the second half of a history.
 function halves(history) {
   const { values } = history, middle = values.length >> 1;
   return [values.slice(0, middle), values.slice(middle)].map((part) => Math.max(0, ...part));
 }
 
-// The groups in which RK4 is closer to the truth, from the errors themselves, with the errors of both halves.
+// The groups {name, ours, theirs} in which RK4 has smaller errors, with the errors of both methods in both halves.
 function groupsOfRk4({ ours, theirs, groups }) {
   if (theirs.failed) return [];
   const errors = groups.map(({ name }, k) => ({ name, ours: halves(ours.histories[k]), theirs: halves(theirs.histories[k]) }));
   return errors.filter((of) => of.theirs[1] < of.ours[1] && of.ours[1] >= ROUNDING);
 }
 
-// What to say of these groups, "" if there is none.
+// A text about the groups in which RK4 has smaller errors; "" if there are none.
 function whereRk4IsCloser(race) {
   const sentences = groupsOfRk4(race).map(({ name, ours: [first, last], theirs: [begin, end] }) => {
     const crossing = last <= STEADY * first && end > GROWING * begin;

@@ -1,14 +1,15 @@
-// Points in space on a canvas, turned by mouse, touch and keys: for the live panel and the viewer.
+// Drawing of points in space on a canvas, with a view that mouse, touch and keys turn, for the live panel and the
+// viewer.
 const rounded = (number, digits) => number.toFixed(digits).replace(/^-(0\.?0*)$/, "$1").replace("-", "−");
 
-// Digits that tell numbers between two bounds apart.
+// The number of digits after the point that distinguishes numbers between two bounds.
 const digitsBetween = (low, high) => Math.max(0, Math.min(12, 3 - Math.floor(Math.log10(high - low || 1))));
 
 function inSpace(canvas, view, redraw, reset) {
   const pen = canvas.getContext("2d");
-  const bands = 8; // of distance, paler towards the back
+  const bands = 8; // number of bands by distance from the viewer; those in the back are paler
 
-  // From a point, each coordinate from -1 to 1, to the screen: [x, y, towards the viewer].
+  // The image [x, y, depth] of a point with coordinates from -1 to 1; depth increases towards the viewer.
   function placed(point) {
     const [cy, sy, cp, sp] = [Math.cos(view.yaw), Math.sin(view.yaw), Math.cos(view.pitch), Math.sin(view.pitch)];
     const [x, y, z] = point;
@@ -17,7 +18,7 @@ function inSpace(canvas, view, redraw, reset) {
     return [canvas.clientWidth / 2 + size * across, canvas.clientHeight / 2 - size * (cp * z + sp * deep), sp * z - cp * deep];
   }
 
-  // The four edges along axis k, as pairs of ends.
+  // The four edges of the box along axis k, as pairs of ends on the screen.
   function edges(k, reach) {
     return [[-1, -1], [-1, 1], [1, -1], [1, 1]].map(([s, t]) => [-1, 1].map((e) => {
       const corner = [0, 0, 0];
@@ -28,13 +29,13 @@ function inSpace(canvas, view, redraw, reset) {
     }));
   }
 
-  // An edge in front of everything: the lowest one or, upwards, the one on the left.
+  // The edge at which an axis is labelled: the lowest one, or for the vertical axis the leftmost one.
   function labelled(k, listed) {
     const place = ([p, q]) => (k === 2 ? -p[0] - q[0] : p[1] + q[1]);
     return listed.reduce((best, edge) => (place(edge) > place(best) ? edge : best));
   }
 
-  // An empty canvas, sharp on every screen.
+  // Clear the canvas, and give it the resolution of the screen.
   function begin() {
     const scale = window.devicePixelRatio || 1;
     canvas.width = canvas.clientWidth * scale;
@@ -42,7 +43,7 @@ function inSpace(canvas, view, redraw, reset) {
     pen.setTransform(scale, 0, 0, scale, 0, 0);
   }
 
-  // The box of three axes {name, low, high, reach}, whose ends are written where there is room.
+  // Draw the box of three axes {name, low, high, reach}. On small canvases the ends have no numbers.
   function box(axes, colour) {
     const roomy = canvas.clientWidth > 260, reach = axes.map((axis) => axis.reach);
     pen.strokeStyle = pen.fillStyle = colour;
@@ -74,7 +75,7 @@ function inSpace(canvas, view, redraw, reset) {
     });
   }
 
-  // Points on the screen, null where a line ends; paler towards the back.
+  // Draw points on the screen, as a line if `joined`. A line is interrupted at null, and is paler in the back.
   function curve(points, colour, width, [faint, full], joined) {
     pen.strokeStyle = pen.fillStyle = colour;
     pen.lineWidth = width;
@@ -122,7 +123,7 @@ function inSpace(canvas, view, redraw, reset) {
     if (event.buttons) turn(-event.movementX * 0.01, event.movementY * 0.01);
   });
   canvas.addEventListener("wheel", (event) => {
-    // The page scrolls on, unless the view has been clicked.
+    // The wheel zooms only after a click on the view; otherwise it scrolls the page.
     if (document.activeElement !== canvas) return;
     event.preventDefault();
     zoom(Math.exp(-event.deltaY * 0.001));
@@ -131,7 +132,8 @@ function inSpace(canvas, view, redraw, reset) {
   return { pen, begin, placed, box, curve, turn };
 }
 
-// How the axes {low, high} of a box share its unit: their middles, their halves, and how far they reach in the unit.
+// The middles of axes {low, high}, the half-lengths by which they are scaled, and their half-lengths after scaling
+// (`reach`). Axes of similar lengths have one scale.
 function framed(axes) {
   const spans = axes.map(({ low, high }) => high - low);
   const largest = Math.max(...spans), shared = spans.every((s) => 4 * s > largest);

@@ -1,23 +1,25 @@
-// Where the live panel begins: the order, the step and the speed with which the methods are seen to differ.
+// The settings with which the live panel starts: order, step and speed at which the difference of the methods is
+// visible.
 const SHOWN = 10; // seconds of the motion after which the methods are compared
-const TRIED = 1200; // largest number of steps of a trial
+const TRIED = 1200; // largest number of steps in a trial run
 const MILLISECONDS = { ours: 200, all: 2400 }; // largest durations of a trial, and of all trials
-const VISIBLE = 3e-3, FAR = 0.3; // errors below are not seen in the picture, and all above look alike
-const MARGIN = 0.03; // largest error of the solver with which the panel begins
-const CHORD = 0.8; // longest part of the picture that a step may cross
-const MOVED = 0.1; // least part of the picture that is crossed in a second, if a step allows it
-const DOUBLED = 14; // how often the step of the run is doubled
-const BETTER = 1.2, CLEAR = 4; // by this factor another setting must be better; with this score none is looked for
+const VISIBLE = 3e-3, FAR = 0.3; // smaller errors than VISIBLE cannot be seen, and all larger ones than FAR look alike
+const MARGIN = 0.03; // largest error of the solver in the initial settings
+const CHORD = 0.8; // greatest length of a step, relative to the picture
+const MOVED = 0.1; // least length of the motion in a second, relative to the picture, if a step allows it
+const DOUBLED = 14; // number of times that the step of the run is doubled
+const BETTER = 1.2, CLEAR = 4; // factor by which another setting must be better, and score at which the search ends
 
 function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, costOf = (race) => equalWork(race, 1) }) {
-  // How many steps RK4 takes for one of the solver: one, or as many as take as long here. Measured once for each order
-  // and size and for steps of about one length, so that it does not change while a slider moves.
+  // The number of steps of RK4 for one step of the solver: one, or as many as take the same time in this browser. This
+  // is measured once for each order and size and for similar steps, so that it does not change while a slider moves.
   const measured = {};
   const alike = ({ order, sites, h }) => [order, sites, Math.round(2 * Math.log2(Math.abs(h)))].join();
   const partsOf = (given) => (given.compare === "step" ? 1 : (measured[alike(given)] ??= costOf(begin({ ...given, parts: 1 }))));
   const remember = (given, parts) => { measured[alike(given)] = parts; };
 
-  // The first steps, no more than a limit of milliseconds allows, each of ours watched.
+  // The race after the given number of steps, or after as many as `limit` milliseconds allow. watch(runner) is called
+  // for each state of the solver.
   function tried(given, steps, limit, watch = () => {}) {
     const trial = begin(given), { ours } = trial, end = performance.now() + limit;
     watch(ours);
@@ -30,19 +32,20 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
 
   const worst = ({ failed, histories }) => (failed ? Infinity : Math.max(0, ...histories.map((history) => Math.max(...halves(history)))));
 
-  // Whether the solver has margin with a step: it does not break down with twice that.
+  // Whether the solver still works with twice the step.
   const hasMargin = (given) => worst(tried({ ...given, h: 2 * given.h }, 100, 60).ours) < 0.5;
 
-  // How well the solver is seen to be better: the share of the groups in which RK4 is not closer, and by what factor the
-  // errors of RK4 are larger, as far as these are seen in the picture; less with larger errors where RK4 is closer.
+  // A score for the visible advantage of the solver: the share of the groups in which RK4 does not have smaller errors,
+  // plus the ratio of the largest errors, limited to visible ones. The second term is negative if those of RK4 are
+  // smaller.
   function advantage(race) {
     const [ours, theirs] = [worst(race.ours), worst(race.theirs)], closer = groupsOfRk4(race).length;
     const seen = theirs > ours ? Math.min(theirs, FAR) / Math.max(ours, VISIBLE) : -Math.min(1, ours / MARGIN) / 2;
     return 1 - closer / race.groups.length + seen;
   }
 
-  // The steps of an order with which the solver has margin and small errors, from that of the run to the first with
-  // which RK4 fails at once; at least one.
+  // Settings of an order for which the errors of the solver are small, even with twice the step. Steps begin with that
+  // of the run, and end with the first for which RK4 fails at once. There is at least one.
   function stepsOf(given, end) {
     let h = data.step;
     const at = (step) => ({ ...given, h: step }), steps = [];
@@ -58,7 +61,7 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
     return steps;
   }
 
-  // The setting of an order in which the solver is seen to be better: of large steps, because there RK4 fails.
+  // The setting of an order with the highest score. Large steps are tried first, since RK4 fails with them.
   function settingOf(given, end) {
     const [first, ...larger] = stepsOf(given, end);
     let best = { ...first, score: 0 };
@@ -72,7 +75,7 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
     return best;
   }
 
-  // The order, step and speed to begin with: of the order of the page, or of another where the advantage is not clear.
+  // The initial order, step and speed. Other orders than that of the page are tried if the advantage is not clear.
   function showing(standard) {
     const given = view.rehearsed({ ...standard, parts: 1 }), begun = performance.now();
     if (!data.quantities.length) return { order: data.order, h: data.step, speed: view.pace(given).speed };

@@ -1,5 +1,5 @@
 "use strict";
-// The page follows the system; the button chooses the other of light and dark.
+// The page has the theme of the system, light or dark, until the button switches to the other one.
 {
   const root = document.documentElement;
   const button = document.getElementById("theme");
@@ -16,7 +16,7 @@
   system.addEventListener("change", name);
   name();
   button.hidden = false;
-  // On paper nothing can be unfolded.
+  // Folded sections cannot be opened on paper, so all of them are printed open.
   let opened = [];
   addEventListener("beforeprint", () => {
     opened = [...document.querySelectorAll("details:not([open])")];

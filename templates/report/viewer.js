@@ -1,4 +1,4 @@
-// The trajectory in space, turned by mouse, touch and keys.
+// The viewer of a report: the trajectory in space, which mouse, touch and keys turn.
 if (document.getElementById("viewer")) {
   const element = (id) => document.getElementById(id);
   const canvas = element("viewer-canvas");
@@ -10,12 +10,12 @@ if (document.getElementById("viewer")) {
   const space = inSpace(canvas, view, draw, reset), pen = space.pen;
   let turning = false;
 
-  // Column `axis` of curve `c` at row `i`: numbers were stored as integers from 0 to data.steps.
+  // Numbers are stored as integers from 0 to data.steps. value is column `axis` of curve `c` at row `i`.
   const scaled = (axis, i) => data.low[axis] + ((data.high[axis] - data.low[axis]) * i) / data.steps;
   const value = (c, axis, i) => scaled(axis, data.curves[c][axis][i]);
   const axes = () => selects.map((s) => Number(s.value));
 
-  // The row of curve `c` at the time of row `row` of the first: curves need not have the same rows.
+  // The row of curve `c` at the time of row `row` of the first curve. Curves may have rows at different times.
   function sameTime(c, row) {
     const times = data.curves[c].at(-1), i = times.findIndex((t) => t >= data.curves[0].at(-1)[row]);
     return i < 0 ? times.length - 1 : i;
@@ -50,7 +50,7 @@ if (document.getElementById("viewer")) {
     canvas.dataset.view = [view.yaw, view.pitch, view.zoom].map((v) => v.toFixed(3)).join(" ");
     const shown = data.names.map((n, a) => `${n} = ${rounded(value(0, a, row), digitsBetween(data.low[a], data.high[a]))}`);
     const told = shown.slice(0, 13).join(", ") + (shown.length > 13 ? ", …" : "");
-    // A screen reader speaks it whenever it is set.
+    // Screen readers speak the text whenever it is set, even to the same value.
     if (element("viewer-state").textContent !== told) element("viewer-state").textContent = told;
   }
 
@@ -67,7 +67,7 @@ if (document.getElementById("viewer")) {
     requestAnimationFrame(spin);
   };
   element("viewer-turn").addEventListener("click", () => {
-    // Who asks for less motion gets one step at a time.
+    // With reduced motion, each click turns the view once.
     if (still.matches) return space.turn(0.26, 0);
     turning = !turning;
     element("viewer-turn").textContent = turning ? "Stop" : "Turn";

@@ -107,8 +107,10 @@ def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *
 def _storing(
     function: ir.Function, layout: RowLayout, names: Mapping[int, str], member: str, kind: ir.Pointer, *, adds: bool
 ) -> ir.Function:
-    """Return a function by rows that stores to the arrays of a ``member`` of the row record; ``names`` are their
-    pointers."""
+    """Return a function by rows that stores to the arrays of a ``member`` of the row record.
+
+    ``names`` has the names of their pointers by number of the array.
+    """
     rows, selection = rows_of(function, layout), function.loop.selection
     head = grouped({name: (kind, layout.row(ir.entry(ir.Member(ROW, member), k))) for k, name in names.items()})
     places = ((ir.Entry(ir.Name(names[s.array.number]), SITE), s.value) for s in function.loop.stores)

@@ -14,7 +14,8 @@
 /* Multiply the group element of the attitude by the attitude increment of a step, given minus the identity, in
    compensated arithmetic. */
 #if PHI_RATE_OF_GAUGE
-/* The gauge rotation aside multiplies from the other side, by the same factor in every step; it may be NULL. */
+/* The group element `aside` of the gauge rotation, the same in every step, multiplies from the other side. It may be
+   NULL. */
 #endif
 static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND_DOUBLE_ASIDE)
 {

@@ -118,7 +118,7 @@ static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads
         for (int r = 0; r < PHI_READS; ++r) phi_mix(phi_prediction[predictor], last[PHI_READ(r)], reads[r]);
 }
 
-/* Number of the predictor that would have come nearest to the values that the last sweep of a step has read. */
+/* Number of the predictor whose prediction is nearest to the values that the last sweep of a step has read. */
 static int phi_best_predictor(phi_history *past, double scale, double element_scale, phi_lanes *reads)
 {
     phi_lanes predicted[PHI_READS];
@@ -137,7 +137,7 @@ static int phi_best_predictor(phi_history *past, double scale, double element_sc
 
 #endif
 #if PHI_FRAMED
-/* Stage increments in the frame of the end of a step from a point, where the next step starts. */
+/* Transform stage increments of a step to the frame of its end, where the next step starts. The step begins at point. */
 static void phi_to_next_frame(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments,
     double in_next_frame[PHI_UNKNOWNS][PHI_WIDTH])
 {
@@ -207,7 +207,7 @@ static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep,
     if (rate >= 1.0 && change <= PHI_NEARLY_ROUNDING) ++sweeps->rises;
     sweeps->last = change;
     if ((slow && change <= PHI_ROUNDING) || sweeps->rises > 1) {
-        /* or the first change was at rounding level */
+        /* the first measured change may have been at rounding level already */
         *first = (sweep == *first || rate > 2.0 * *usual ? *first : sweep) - 1;
         return 1;
     }
@@ -247,7 +247,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
             if (!isfinite(square)) return PHI_NOT_FINITE;
             if (judgement < 0) return PHI_NO_CONVERGENCE;
             if (judgement > 0) {
-                /* the remaining error of the sweep before was about the latest change */
+                /* the latest change is about the error before the last sweep: if it is small, that sweep was not needed */
                 if (solved) past->sweeps = square <= 16.0 * PHI_SOLVED * PHI_SOLVED ? sweep - 1 : sweep;
                 if (past->sweeps < 2) past->sweeps = 2;
 #if PHI_STAGED

@@ -10,8 +10,8 @@
 
 /* ---- SIMD batches of members: Gauss steps ---- */
 enum {
-    PHI_GROUP = PHI_LANES, /* members, one in each lane */
-    PHI_FEWEST = PHI_LANES > 4 ? 7 : 3 /* measured: fewer members are faster one by one, with their stages in lanes */
+    PHI_GROUP = PHI_LANES, /* number of members, one in each lane */
+    PHI_FEWEST = PHI_LANES > 4 ? 7 : 3 /* measured: fewer members are faster one after the other, with their stages in lanes */
 };
 /* As PHI_SOLVED, for the slowest member. With PHI_SOLVED the energy drifts by 1e-18 of its size in each step. */
 #define PHI_GROUP_SOLVED (0.25 * PHI_SOLVED)
@@ -32,7 +32,7 @@ typedef struct {
     int sweeps;    /* number of the first sweep whose change is measured */
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int active[PHI_LANES];        /* whether the lane holds a member that has not failed */
-    size_t steps_left[PHI_LANES]; /* steps left to make, for lanes whose member has left */
+    size_t steps_left[PHI_LANES]; /* steps left to make when the member failed */
     PHI_GAUGES_OF_MEMBERS
 #if PHI_TIMED
     double t0[PHI_LANES], h[PHI_LANES]; /* initial times and steps */
@@ -80,7 +80,7 @@ static void phi_group_scale(const phi_group *group, phi_batch now, phi_lanes sca
     }
 }
 
-/* The predictor that would have come nearest to the unknowns of active members in the end. */
+/* The number of the predictor whose prediction is nearest to the final unknowns z of the active members. */
 static int phi_group_best_predictor(phi_group *group, const phi_lanes scale, phi_batch z)
 {
     phi_lanes predicted[PHI_UNKNOWNS];
@@ -103,7 +103,8 @@ static int phi_group_best_predictor(phi_group *group, const phi_lanes scale, phi
     return best;
 }
 
-/* A sweep over all stages: the new increments, by the unknowns z. Changes are added to sum, if it is not NULL. */
+/* A sweep over all stages: compute the increments from the unknowns z, and add their squared changes to sum unless it is
+   NULL. */
 static void phi_group_sweep(phi_group *group, const phi_lanes scale, phi_batch z, phi_batch now, double *sum)
 {
     phi_lanes next[PHI_UNKNOWNS];
@@ -118,7 +119,8 @@ static void phi_group_sweep(phi_group *group, const phi_lanes scale, phi_batch z
     }
 }
 
-/* Largest squared change of an active member, as a mean over the stages. Members with values that are not finite leave. */
+/* Largest squared change of an active member, as a mean over the stages. Members with values that are not finite become
+   inactive. */
 static double phi_group_change(phi_group *group, const phi_lanes sum)
 {
     double largest = 0.0;
@@ -129,7 +131,7 @@ static double phi_group_change(phi_group *group, const phi_lanes sum)
     return largest / (double)PHI_NODES;
 }
 
-/* The values that the first sweep of a step reads. */
+/* The starting values z of the unknowns: a prediction, or 0 in the first step. */
 static void phi_group_begin(phi_group *group, phi_batch z)
 {
     const int predictor = group->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : group->predictor;
@@ -143,7 +145,7 @@ static void phi_group_begin(phi_group *group, phi_batch z)
 }
 
 /* Solve for the increments of all stages, as for a single trajectory, until the slowest member has converged. Members
-   that have not converged in the end leave. */
+   that do not converge become inactive. */
 static void phi_group_solve(phi_group *group, phi_batch now)
 {
     phi_batch z;
@@ -217,7 +219,7 @@ static void phi_group_advance(phi_group *group, phi_lanes change[PHI_DIM])
 }
 
 #if PHI_MONITOR
-/* Members for which the physical time of a step does not have the sign of h leave, as in a single step. */
+/* Members become inactive if the physical time of their step does not have the sign of h; a single step fails then. */
 static void phi_group_pass(phi_group *group, phi_batch now)
 {
     phi_lanes z[PHI_UNKNOWNS], elapsed[1], sum = { 0.0 };
@@ -232,7 +234,7 @@ static void phi_group_pass(phi_group *group, phi_batch now)
 
 #endif
 #if PHI_TIMED
-/* The time of each member after a step. */
+/* Update the time of each member after a step. */
 static void phi_group_pass(phi_group *group)
 {
     ++group->steps;
