@@ -170,7 +170,16 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
         # bindings need functions of parameters, which the other options would leave out
         arguments += [f"--binding {language}" for language in options.bindings]
     arguments += [shlex.quote(f"--stack={options.stack}")] if options.stack is not None and target == "c" else []
+    _expect_steps(compilation, target)
     return emit(compilation.program, target, " ".join(arguments), single_file=single)
+
+
+def _expect_steps(compilation: Compilation, target: str) -> None:
+    """Raise `SpecError`, located at the key, for a target without steps in relative coordinates."""
+    swept = compilation.program.step.swept
+    if target == "device" and swept and swept.relative:
+        message, hint = "coordinates_from: devices have no such steps", "another target, or remove coordinates_from"
+        raise SpecError([compilation.spec.diagnostic(("coordinates_from",), message, hint)])
 
 
 def _is_bundled(spec: Spec) -> bool:

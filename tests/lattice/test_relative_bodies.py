@@ -10,12 +10,14 @@ from time import process_time
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from lattice.lattices import with_threads
 from node import answers
 
 import phigen
 import phigen.spec
 from phigen.api import lattice_solver_of
+from phigen.cli import group
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit, examine
 from phigen.errors import SpecError, StepError
@@ -456,7 +458,12 @@ def test_what_does_not_fit_is_refused_at_its_place(name: str) -> None:
     assert diagnostic.hint
 
 
-def test_devices_are_refused() -> None:
-    with pytest.raises(SpecError, match="devices have no steps in relative coordinates") as raised:
+def test_devices_are_refused_at_the_key(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="devices have no steps in relative coordinates"):
         emit(compiled(text()).program, "device", "")
-    assert raised.value.diagnostics[0].hint
+    (tmp_path / "bodies.yaml").write_text(text(), encoding="utf-8")
+    command = ["build", str(tmp_path / "bodies.yaml"), "-t", "device", "-o", str(tmp_path / "out")]
+    result = CliRunner().invoke(group, command, prog_name="phigen")
+    assert result.exit_code == 1
+    assert "bodies.yaml:11:19: error: coordinates_from: devices have no such steps" in " ".join(result.stderr.split())
+    assert not (tmp_path / "out").exists()
