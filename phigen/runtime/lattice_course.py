@@ -112,6 +112,22 @@ class LatticeCourse:
         self._anchor = {}
         self.sites.kick(change)
 
+    def set_parameters(self, values: Mapping[str, Any]) -> None:
+        """Go on with other parameters, as a course that starts at the present state. Raises `StepError`.
+
+        The state, the time and the random numbers are unchanged. For steps equal in τ the energy level is −H of the
+        state.
+        """
+        sites, steps, draws = self.sites, self.steps, self.at.draws
+        clock = Clock(self._clock.after(steps), self._clock.h, steps)
+        beginning = Beginning(sites.state(), clock.h, values, clock.t, replace(draws, step=draws.step + steps))
+        changed = self.solver.started(beginning)
+        if self.solver.interface.monitored:
+            level, time = changed.saved()["passed"][:1], sites.saved()["passed"][1:]
+            changed.resume(clock.h, 0, {"passed": np.concatenate([level, time])})
+        self.at = replace(self.at, values=values, level=None)
+        self._sites, self._clock, self._before, self._anchor = changed, clock, steps, {}
+
     def saved(self) -> dict[str, Any]:
         """Return the arrays from which `restored` makes the same course."""
         if self._sites is None and not self._ahead:

@@ -181,9 +181,20 @@ class LiveLattice(LiveSession):
     def __init__(self, solver: LatticeSolver, beginning: Beginning) -> None:
         super().__init__(solver, cast("Session", LatticeCourse(solver, beginning)), beginning.values, beginning.t0)
 
-    def set_parameters(self, parameters: Mapping[str, float] | None = None, /, **by_keyword: float) -> Self:
-        """Raise `TypeError`: the parameters of a lattice are fixed during a session."""
-        raise TypeError("the parameters of a lattice are fixed: start another session at x, with t0")
+    def set_parameters(self, parameters: Mapping[str, Any] | None = None, /, **by_keyword: Any) -> Self:
+        """Replace parameters by numbers or arrays, and return the session; state, time and random numbers are unchanged.
+
+        The session goes on like one that starts at the present state: rounding errors carried so far, and predictors,
+        are dropped. Raises `TypeError`, `ValueError` and `StepError` for names and values that are not admissible;
+        then nothing changes.
+        """
+        changes = arguments.together(parameters, by_keyword)
+        if "bonds" in changes:
+            raise TypeError("the bonds of a session are fixed: start another session at x, with t0")
+        values = self.solver.values({**self.parameters, **changes}, {}, self._put.shape[1:])
+        cast("LatticeCourse", self._session).set_parameters(values)
+        self.parameters = values
+        return self
 
     @property
     def energy(self) -> float:

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from lattice import test_forcing as forcing
+from lattice import test_monitor as monitored
 from lattice import test_sweeps as sweeps
 from lattice import test_time as timed
+from lattice.lattices import SPIN_GRAPH
 
 import phigen
 import phigen.spec
@@ -74,6 +76,60 @@ def test_states_that_cannot_be_are_refused_and_leave_the_session_where_it_was(ta
         session.kick(x[:, :4])
     np.testing.assert_array_equal(session.x, before)
     assert session.casimirs["C"].shape == x.shape[1:]
+
+
+@pytest.mark.parametrize(("name", "target"), [(n, t) for n in CASES for t in ("numpy", "c")])
+def test_after_a_change_of_parameters_a_session_goes_on_as_one_that_starts_there(name: str, target: str) -> None:
+    solver, x, asked = prepared(name, target)
+    session = solver.session(x, **asked).step(0.05, 3)
+    name_of_one = next(iter(solver.interface.parameters))
+    changes = {name_of_one: 1.25 * np.asarray(session.parameters[name_of_one]) + 0.1}
+    before = session.x
+    assert session.set_parameters(changes) is session
+    np.testing.assert_array_equal(session.x, before)
+    later = {k: v + 3 if k == "step0" else session.t if k == "t0" else v for k, v in asked.items()}
+    later["parameters"] = {**later.get("parameters", {}), **changes}
+    other = solver.session(before, **later)
+    twins = [session.copy(), pickle.loads(pickle.dumps(session))]
+    assert {s.energy for s in twins} == {other.energy} == {session.energy}
+    states = {s.step(0.05, 2).step(0.03, 2).x.tobytes() for s in (session, other, *twins)}
+    assert len(states) == 1
+    assert (session.steps, session.t) == (7, pytest.approx(asked.get("t0", 0.0) + 0.31, abs=1e-15))
+    unchanged = solver.session(before, **{**later, "parameters": asked.get("parameters")}).step(0.05, 2).step(0.03, 2)
+    assert np.abs(unchanged.x - session.x).max() > 1e-6
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_parameters_of_steps_in_tau_change_the_level_and_not_the_time(target: str) -> None:
+    solver = phigen.compile(phigen.spec.loads(monitored.BODIES), target=target)
+    session = solver.session(monitored.X0).step(0.02, 5)
+    time, masses = session.t, np.array([0.9, 0.4, 0.2])
+    session.set_parameters(m=masses)
+    twin, other = session.copy(), solver.session(session.x, m=masses)
+    assert (session.t, twin.t, session.energy) == (time, time, other.energy)
+    for s in (session, twin, other):
+        s.step(0.02, 5)
+    assert session.x.tobytes() == twin.x.tobytes() == other.x.tobytes()
+    assert session.t == twin.t == pytest.approx(time + other.t, abs=1e-15)
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_parameters_that_cannot_be_leave_a_session_unchanged(target: str) -> None:
+    solver = phigen.compile(phigen.spec.loads(monitored.BODIES), target=target)
+    session, twin = (solver.session(monitored.X0).step(0.02, 2) for _ in range(2))
+    for changes, error, message in (
+        ({"m": [1, 2]}, ValueError, r"must be a number or have shape \(3,\)"),
+        ({"m": -1}, ValueError, "'m' must be positive at all sites"),
+        ({"n": 1}, TypeError, "'n'"),
+        ({"m": 1e200}, StepError, "not negative where it starts"),
+    ):
+        with pytest.raises(error, match=message):
+            session.set_parameters(changes)
+    assert session.parameters is not twin.parameters
+    assert session.step(0.02).x.tobytes() == twin.step(0.02).x.tobytes()
+    graph = phigen.compile(phigen.spec.loads(SPIN_GRAPH), target=target)
+    with pytest.raises(TypeError, match="the bonds of a session are fixed"):
+        graph.session(np.ones((3, 4)), bonds=[[0, 1], [1, 2], [2, 0], [2, 3]]).set_parameters(bonds=[[1, 2]] * 4)
 
 
 CHAIN_WITH_NOISE = """\
