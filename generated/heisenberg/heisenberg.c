@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 6fed1efa9681dc3d60f2a10b406ac9b972ad608688c0bb884983c403fa5d586c
+ * body-sha256: 875c941b7b634188779849fa50087d97d4b19a2f692dae62658ad0d3bb618b71
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -879,6 +879,18 @@ heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x)
 heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change)
 {
     return heisenberg_move(s, change, 1.0);
+}
+
+heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params)
+{
+    if (s == NULL || params == NULL || !heisenberg_allowed(params, s->sites)) return heisenberg_BAD_ARGUMENT;
+    double coef[heisenberg_COEFFICIENTS] = { 0.0 };
+    heisenberg_prepare_step(params, heisenberg_PROBE_STEP, coef);
+    if (!heisenberg_finite(coef, heisenberg_COEFFICIENTS)) return heisenberg_BAD_ARGUMENT;
+    s->params = *params;
+    heisenberg_put_parameters(s, params);
+    s->prepared = 0; /* so that the next step starts as with a new step size */
+    return heisenberg_OK;
 }
 
 size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0dfbd212eb5f43d228efdca82d6494ff733a8e4d95cea624e4905dd19a27a172
+ * body-sha256: 03561fe1cb6ea1020dc2dcd11dcb3effe61d04e5684f24261002bff24f88c5d3
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -74,6 +74,10 @@ void heisenberg_state(const heisenberg_solver *s, double *x);
    heisenberg_BAD_ARGUMENT and leaves the state unchanged if the new state is not finite. */
 heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x);
 heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
+
+/* Between steps: replace the parameters, as heisenberg_init takes them; state, time and random numbers are
+   unchanged. Returns heisenberg_BAD_ARGUMENT where heisenberg_init would, and then changes nothing. */
+heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params);
 
 /* Save and restore a run with the same bits: heisenberg_saved writes far and arrays x[field][site], and
    returns their number, at most that of fields, with compensated steps three times that. heisenberg_resume

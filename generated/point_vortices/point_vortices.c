@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 55540edd4662de71a842d31dfe2670bb1fd5e89371fb957e303870a56cfbc32f
+ * body-sha256: 43b7db1a3267b6096724dc943a46db9b55f9f7f77dd52b4f2182827dd9297428
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -784,6 +784,20 @@ point_vortices_status point_vortices_set_state(point_vortices_solver *s, const d
 point_vortices_status point_vortices_kick(point_vortices_solver *s, const double *change)
 {
     return point_vortices_move(s, change, 1.0);
+}
+
+point_vortices_status point_vortices_set_parameters(point_vortices_solver *s,
+    const point_vortices_params *params)
+{
+    if (s == NULL || params == NULL || !point_vortices_allowed(params, s->sites))
+        return point_vortices_BAD_ARGUMENT;
+    double coef[point_vortices_COEFFICIENTS] = { 0.0 };
+    point_vortices_prepare_step(params, point_vortices_PROBE_STEP, coef);
+    if (!point_vortices_finite(coef, point_vortices_COEFFICIENTS)) return point_vortices_BAD_ARGUMENT;
+    s->params = *params;
+    point_vortices_put_parameters(s, params);
+    s->prepared = 0; /* so that the next step starts as with a new step size */
+    return point_vortices_OK;
 }
 
 /* ---- Observables ---- */

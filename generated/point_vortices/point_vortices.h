@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d272962fc7052ff83a1f6e4e9ea16320d3bcadef1e1d43c36ac4b783613dd4c0
+ * body-sha256: 36cc351b09808d9f98ded8094b4adb1a8389dc67928b8c88ae423ddaecc082fd
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -91,6 +91,12 @@ void point_vortices_state(const point_vortices_solver *s, double *x);
    point_vortices_BAD_ARGUMENT and leaves the state unchanged if the new state is not finite. */
 point_vortices_status point_vortices_set_state(point_vortices_solver *s, const double *x);
 point_vortices_status point_vortices_kick(point_vortices_solver *s, const double *change);
+
+/* Between steps: replace the parameters, as point_vortices_init takes them; state, time and random numbers
+   are unchanged. Returns point_vortices_BAD_ARGUMENT where point_vortices_init would, and then changes
+   nothing. */
+point_vortices_status point_vortices_set_parameters(point_vortices_solver *s,
+    const point_vortices_params *params);
 
 /* Functions of the present state: the Hamiltonian; its density out[site]; the densities out[k][site] of the
    Casimirs; the right-hand side out[field][site] of the equations of motion. */

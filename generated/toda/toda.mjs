@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 53811b88bb9c48dc9b59fae9e59d379f5515cc2d3a210ce3ffdb76892ea1f04b
+ * body-sha256: 450a71eccc700a8c835bded74e215a78fa62cc30737cc56698c8d44422c3e8a0
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -205,6 +205,18 @@ function prepareStep(params, h, rows) {
   return rows;
 }
 
+/** Arrays for the coefficients of a step. */
+function emptyRows() {
+  return TIMES.map(() => new Float64Array(COEFFICIENTS));
+}
+
+/** Throw StepError if a coefficient of steps with these parameters is not finite. */
+function expectSteps(params) {
+  const rows = prepareStep(params, PROBE_STEP, emptyRows());
+  if (rows.every((row) => row.every(Number.isFinite))) return;
+  throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
+}
+
 /** A solver of a lattice and the trajectory that it computes. */
 export class Solver {
   static NAME = NAME;
@@ -229,7 +241,7 @@ export class Solver {
   /** Sizes, parameters, and tables of neighbours. */
   sites;
   /** Coefficients, functions of parameters and step size: a row for each flow or stage. */
-  rows = TIMES.map(() => new Float64Array(COEFFICIENTS));
+  rows = emptyRows();
   /** The state before a step. */
   before;
   /** Predictors and other results of steps of one size, for later steps. */
@@ -254,10 +266,7 @@ export class Solver {
     this.sites = new Sites(sizes, options);
     this.x = finite(x0, DIM * this.sites.count, "x0");
     this.before = Float64Array.from(this.x);
-    const rows = prepareStep(this.sites.params, PROBE_STEP, this.rows);
-    if (!rows.every((row) => row.every(Number.isFinite))) {
-      throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
-    }
+    expectSteps(this.params);
   }
 
   /** All parameters; those at sites and at bonds are arrays. */
@@ -305,6 +314,21 @@ export class Solver {
     }
     this.steps++;
     this.t = this.#timeBefore + (this.steps - this.#stepsBefore) * h;
+    return this;
+  }
+
+  /**
+   * Between steps: change parameters; state, time and random numbers are unchanged. Throws StepError for
+   * values that are not admissible; then nothing changes.
+   *
+   * @param {object} changes parameters by name; those at sites and at bonds are arrays, or one number for all
+   * @returns {this}
+   */
+  setParameters(changes) {
+    const sites = this.sites.changed(changes);
+    expectSteps(sites.params);
+    this.sites = sites;
+    this.h = NaN; // so that the next step computes the coefficients
     return this;
   }
 
@@ -411,6 +435,12 @@ class Sites {
       params[name] = listed ? values : length === undefined ? value : new Float64Array(length).fill(value);
     }
     return Object.freeze(params);
+  }
+
+  /** The same sites with changed parameters; throws StepError for values not allowed. */
+  changed(changes) {
+    const params = { ...this.params, ...changes };
+    return new Sites(this.sizes, { params });
   }
 
   /** Position of each site along each axis. */

@@ -158,6 +158,7 @@ CONDITIONS = {
     "lattice_noise.c": "NOISE",
     "lattice_observed.c": "OBSERVED",
     "lattice_observed_fields.c": "OBSERVED_FIELDS",
+    "lattice_parameters.c": "CHANGED_PARAMETERS",
     "lattice_passed.c": "TIMED || NOISE",
     "lattice_pieces.c": "SERIES",
     "lattice_plain_flows.c": "!WAVES && !ADJOINT && !NOISE && !MONITOR || !WAVES && !ADJOINT && RENEWED",

@@ -502,6 +502,7 @@ GRAPHS = Choice(
         "SIZES_OF_WORK": ("const size_t sizes[PHI_AXES], size_t bonds", "const size_t sizes[PHI_AXES]"),
         "AND_GRAPH": (", bonds", ""),
         "AND_BONDS": (", bonds != NULL ? bonds->count : 0", ""),
+        "AND_NUMBER_OF_BONDS": (", (size_t)s->bonds[s->sites] / 2", ""),
         "OR_TOO_MANY(sites)": ("|| !phi_few(sites, bonds)", ""),
         "OR_UNCONNECTED(sites)": ("|| !phi_connected(bonds, sites)", ""),
     },

@@ -182,6 +182,7 @@ phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
 
 #include "lattice_kicks.c"
+#include "lattice_parameters.c"
 #include "lattice_clock.c"
 
 #include "lattice_tangent.c"

@@ -80,6 +80,16 @@ void phi_state(const phi_solver *s, double *x);
 phi_status phi_set_state(phi_solver *s, const double *x);
 phi_status phi_kick(phi_solver *s, const double *change);
 
+#if PHI_BODIES || PHI_MONITOR
+/* Between steps: replace the parameters, as phi_init takes them; state, time and random numbers are unchanged. Returns
+   PHI_BAD_ARGUMENT where phi_init would. If this is because of the state or of masses, the parameters are replaced
+   nevertheless: replace them again before the next step. */
+#else
+/* Between steps: replace the parameters, as phi_init takes them; state, time and random numbers are unchanged. Returns
+   PHI_BAD_ARGUMENT where phi_init would, and then changes nothing. */
+#endif
+phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
+
 /* Save and restore a run with the same bits: phi_saved writes far and arrays x[field][site], and returns their number, at
    most that of fields, with compensated steps three times that. phi_resume takes all three after phi_init with the state. */
 size_t phi_saved(const phi_solver *s, double *x, size_t *far);

@@ -24,6 +24,18 @@ function prepareStep(params, h, rows) {
   return rows;
 }
 
+/** Arrays for the coefficients of a step. */
+function emptyRows() {
+  return TIMES.map(() => new Float64Array(COEFFICIENTS));
+}
+
+/** Throw StepError if a coefficient of steps with these parameters is not finite. */
+function expectSteps(params) {
+  const rows = prepareStep(params, PROBE_STEP, emptyRows());
+  if (rows.every((row) => row.every(Number.isFinite))) return;
+  throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
+}
+
 /** A solver of a lattice and the trajectory that it computes. */
 export class Solver {
   static NAME = NAME;
@@ -68,7 +80,7 @@ export class Solver {
   /** Sizes, parameters, and tables of neighbours. */
   sites;
   /** Coefficients, functions of parameters and step size: a row for each flow or stage. */
-  rows = TIMES.map(() => new Float64Array(COEFFICIENTS));
+  rows = emptyRows();
   /** The state before a step. */
   before;
   /** Predictors and other results of steps of one size, for later steps. */
@@ -93,10 +105,7 @@ export class Solver {
     takeTime(this, options);
     takeDraws(this, options);
     expectFewSteps(this);
-    const rows = prepareStep(this.sites.params, PROBE_STEP, this.rows);
-    if (!rows.every((row) => row.every(Number.isFinite))) {
-      throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
-    }
+    expectSteps(this.params);
     beginLevel(this);
   }
 
@@ -148,6 +157,27 @@ export class Solver {
     // #if !MONITOR
     this.t = this.#timeBefore + (this.steps - this.#stepsBefore) * h;
     // #endif
+    return this;
+  }
+
+  /**
+   * Between steps: change parameters; state, time and random numbers are unchanged. Throws StepError for
+   * values that are not admissible; then nothing changes.
+   *
+   * @param {object} changes parameters by name; those at sites and at bonds are arrays, or one number for all
+   * @returns {this}
+   */
+  setParameters(changes) {
+    const sites = this.sites.changed(changes);
+    expectSteps(sites.params);
+    beginLevel({ ...this, sites, params: sites.params });
+    this.sites = sites;
+    // #if MONITOR
+    const { tCarry } = this;
+    beginLevel(this);
+    this.tCarry = tCarry;
+    // #endif
+    this.h = NaN; // so that the next step computes the coefficients
     return this;
   }
 

@@ -131,6 +131,17 @@ export class Sites {
     return Object.freeze(params);
   }
 
+  /** The same sites with changed parameters; throws StepError for values not allowed. */
+  changed(changes) {
+    const params = { ...this.params, ...changes };
+    // #if GRAPH
+    const bonds = Array.from(this.ends.a).flatMap((a, k) => [a, this.ends.b[k]]);
+    return new Sites(this.sizes, { params, bonds });
+    // #else
+    return new Sites(this.sizes, { params });
+    // #endif
+  }
+
   /** Position of each site along each axis. */
   #place(site) {
     const place = [];
