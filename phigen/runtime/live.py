@@ -182,11 +182,11 @@ class LiveLattice(LiveSession):
         super().__init__(solver, cast("Session", LatticeCourse(solver, beginning)), beginning.values, beginning.t0)
 
     def set_parameters(self, parameters: Mapping[str, Any] | None = None, /, **by_keyword: Any) -> Self:
-        """Replace parameters by numbers or arrays, and return the session; state, time and random numbers are unchanged.
+        """Replace parameters by numbers or arrays, and return the session.
 
-        The session goes on like one that starts at the present state: rounding errors carried so far, and predictors,
-        are dropped. Raises `TypeError`, `ValueError` and `StepError` for names and values that are not admissible;
-        then nothing changes.
+        The state, the time and the random numbers are unchanged. The session goes on like one that starts at the
+        present state: compensation terms and predictors are dropped. Raises `TypeError`, `ValueError` and `StepError`
+        for names and values that are not admissible; then nothing changes.
         """
         changes = arguments.together(parameters, by_keyword)
         if "bonds" in changes:
