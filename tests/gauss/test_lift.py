@@ -85,6 +85,13 @@ def test_states_on_the_axes_have_frames(start):
     assert ends[0] == pytest.approx(ends[1], abs=2e-15)
 
 
+def test_other_coordinates_are_right_where_momenta_vanish():
+    """|F|² = 0 has no part in the weight of changes of other coordinates."""
+    make, h = CASES["mixed"]
+    ends = [solver(c, "c").integrate([0.0, 0.0, 0.0, 0.3, 0.7], h, 20).x[-1] for c in (make(), make(tangent=True))]
+    assert ends[0] == pytest.approx(ends[1], abs=2e-14)
+
+
 @pytest.mark.parametrize("scale", [1e-7, 1e7])
 def test_sweeps_do_not_depend_on_the_size_of_the_state(scale):
     """The time is scaled by as much, since H is quadratic."""

@@ -44,10 +44,10 @@ static void phi_lift(phi_solver *s)
     past->lifted = 1;
 }
 
-/* Weight of squared changes of group elements. */
+/* Weight of squared changes of group elements: 1 / |F|^2. It is bounded, as ratios to weights of coordinates would underflow. */
 static double phi_element_scale(const phi_solver *s)
 {
-    double square = DBL_MIN;
+    double square = 1e-150;
     for (int i = 0; i < PHI_LIFT; ++i) square += s->history.frame[i] * s->history.frame[i];
     return 1.0 / square;
 }
