@@ -75,6 +75,15 @@ def test_implicit_lattices_refuse_settings_of_the_inner_solve(setting):
     assert "<string>:7:" in str(refusal)
 
 
+@pytest.mark.parametrize("setting", ["max_iterations: 7", "tolerance: 1e-8"])
+@pytest.mark.parametrize("text", [CHAIN, BODY.replace(" + x1**3/9", "")])
+def test_splittings_refuse_settings_of_the_inner_solve(text, setting):
+    refusal = attempted(f"{text}solver: {{{setting}}}\n", "splitting")
+    assert f"solver: {setting.partition(':')[0]} belongs to steps that solve equations" in str(refusal)
+    assert f"hint: remove {setting.partition(':')[0]}, or the scheme" in str(refusal)
+    compile_text(f"{text}scheme: splitting\n")
+
+
 def test_implicit_lattices_may_name_the_usual_tolerance():
     assert compile_text(f"{CHAIN}solver: {{tolerance: auto}}\nscheme: series\n").program.step.equation
 
