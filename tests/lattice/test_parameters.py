@@ -43,7 +43,9 @@ SPECS = {
     "stiff": (javascript.STIFF.replace("200*", "K*").replace("scheme", "parameters: {K: 200}\nscheme"), 12),
     "monitor": (monitored.BODIES, 3),
     "relative": (relative.text("jacobi", "xy").replace("bound: true, ", ""), 4),
+    "heliocentric": (relative.text("democratic_heliocentric", "xy").replace("bound: true, ", ""), 4),
 }
+BODIES = ("relative", "heliocentric")
 
 
 @cache
@@ -57,7 +59,7 @@ def values_of(name: str, seed: int) -> dict[str, Any]:
     values = {
         p.name: random.uniform(0.5, 1.5, () if p.at == "all" else sites) for p in compilation(name).spec.parameters
     }
-    if name == "relative":
+    if name in BODIES:
         values["m"] *= [1, 1e-3, 0, 1e-3]
     return {key: value.tolist() for key, value in values.items()}
 
@@ -138,7 +140,7 @@ def test_c_goes_on_as_a_solver_that_starts_with_the_new_parameters(name: str, tm
     program, sites = compilation(name).program, SPECS[name][1]
     graph, timed, noise = name == "graph", bool(program.time), bool(program.noise)
     first, second = values_of(name, 1), values_of(name, 2)
-    wrong = next(p for p in second if name != "relative" or p != "m")
+    wrong = next(p for p in second if name not in BODIES or p != "m")
     arrays, assign = zip(*(in_c(v, k) for k, v in enumerate((first, second))), strict=True)
     bad = {wrong: [float("nan")] * sites if isinstance(second[wrong], list) else float("nan")}
     bad = {"m": 800.0} if name == "ring" else bad  # exp(m) is infinite

@@ -15,6 +15,8 @@
 static int phi_weigh(phi_solver *s)
 {
     const double *m = s->x[PHI_MASS];
+    s->massive = 0;
+    s->mass = 0.0;
     for (ptrdiff_t i = 0; i < s->length; ++i) {
         if (m[i] < 0.0 PHI_OR_NO_MASS(m[i])) return 0;
         if (m[i] > 0.0) s->massive = i + 1;
