@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import click
 
@@ -81,14 +81,14 @@ def length(experiment: Experiment, solver: AnySolver) -> float:
         raise solver.failure(error, experiment.h, None, experiment.parameters) from error
 
 
-def timed(experiment: E, solver: AnySolver, every: float | None = None, at: str | None = None) -> E:
+def timed(experiment: E, solver: AnySolver, every: float | None = None, at: Sequence[str] = ()) -> E:
     """Return the experiment with times at which states are stored: at equal distances ``every``, or listed in ``at``.
 
-    Without these options, the keys of the run apply.
+    Each text of ``at`` has times, or is the path of a file of times. Without these options, the keys of the run apply.
     """
-    if every is None and at is None and experiment.run.every is not None:
+    if every is None and not at and experiment.run.every is not None:
         every = float(experiment.run.every)
-    time_list = _parse_times(at) if at is not None else [float(t) for t in experiment.run.at] if every is None else []
+    time_list = _parse_times(at) if at else [float(t) for t in experiment.run.at] if every is None else []
     if every is None and not time_list:
         return experiment
     # with a monitor, only a session of the solver knows the time after the last step
@@ -98,7 +98,7 @@ def timed(experiment: E, solver: AnySolver, every: float | None = None, at: str 
     times = (
         _regular(experiment, solver, every)
         if every is not None
-        else _times_in_run(experiment, solver, time_list, at is not None)
+        else _times_in_run(experiment, solver, time_list, bool(at))
     )
     return replace(experiment, times=tuple(times))
 
@@ -144,10 +144,10 @@ def _expect_whole(experiment: Experiment, solver: AnySolver, times: Sequence[flo
             raise click.BadParameter(f"{message} {time!r} is between two", param_hint=option)
 
 
-def _parse_times(at: str) -> list[float]:
-    text: Any = Path(at).read_text(encoding="utf-8") if Path(at).is_file() else at
+def _parse_times(at: Sequence[str]) -> list[float]:
+    texts = [Path(text).read_text(encoding="utf-8") if Path(text).is_file() else text for text in at]
     try:
-        times = [float(word) for word in text.replace(",", " ").split()]
+        times = [float(word) for text in texts for word in text.replace(",", " ").split()]
     except ValueError as error:
         raise click.BadParameter(f"expected times or a file of times: {error}", param_hint="--at") from None
     if not times or not all(map(math.isfinite, times)):

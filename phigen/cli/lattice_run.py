@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,7 +46,7 @@ def run_lattice(
     source: Path | None = None,
     extend: bool = False,
     every: float | None = None,
-    at: str | None = None,
+    at: Sequence[str] = (),
     origin: Origin,
 ) -> None:
     """Integrate a run, and print the errors of conserved quantities. Raises `StepError` at the end if a step failed.

@@ -59,7 +59,9 @@ _TABLES = (".csv", ".npz")
 @click.option(
     "--every", metavar="DT", type=float, help="Store states at intervals DT of time, instead of every stride-th step."
 )
-@click.option("--at", metavar="T,…", help="Store states at these times, or at the times listed in a file.")
+@click.option(
+    "--at", metavar="T,…", multiple=True, help="Store states at these times, or at the times listed in a file."
+)
 @click.option("--stop", metavar="EXPR", help="The run ends where EXPR passes through 0, as with stop: in the spec.")
 @click.option(
     "--seed", metavar="N", type=SEED, help="Seed of the random numbers of the noise; overrides that of the run."
@@ -106,7 +108,7 @@ def command(
     sizes: str | None,
     until: float | None,
     every: float | None,
-    at: str | None,
+    at: tuple[str, ...],
     stop: str | None,
     seed: int | None,
     source: Path | None,

@@ -249,7 +249,9 @@ class ListOf(Kind):
             # The keys are read as the list: they are the right names, and their uses are not reported.
             node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
         if not isinstance(node, SequenceNode):
-            return self.mismatch(node, path, reader, list_hint(node))
+            is_matrix = isinstance(self.item, ListOf) and isinstance(node, MappingNode)
+            hint = "a matrix is a list of its rows: [[a, b], [c, d]]" if is_matrix else list_hint(node)
+            return self.mismatch(node, path, reader, hint)
         if len(node.items) < self.least:
             least = counted(self.least, "entry", "entries")
             return reader.error(node, f"{label(path)}expected at least {least}, found {len(node.items)}")

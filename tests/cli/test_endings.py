@@ -99,8 +99,12 @@ def test_sections_have_a_direction(phigen, swing, name, expected):
 
 def test_states_at_given_times(phigen, swing):
     Path("times.txt").write_text("2\n0.25, 0\n 6\n")
-    for option, times in (("1.234", [1.234, 6]), ("times.txt", [0.25, 2, 6])):
-        ran(phigen, swing, "--run", "steps", "--at", option, "-o", "a.csv")
+    for texts, times in (
+        (["1.234"], [1.234, 6]),
+        (["times.txt"], [0.25, 2, 6]),
+        (["5.5", "1.5, 3", "times.txt"], [0.25, 1.5, 2, 3, 5.5, 6]),
+    ):  # fmt: skip
+        ran(phigen, swing, "--run", "steps", *(word for text in texts for word in ("--at", text)), "-o", "a.csv")
         rows = table("a.csv")
         assert rows[:, 0] == pytest.approx([0, *times], rel=1e-15)
         assert rows[:, 1] == pytest.approx(np.cos(rows[:, 0]), abs=1e-11)

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from phigen.errors import Location
+from phigen.errors import Location, SpecError
 from phigen.spec import load, loads, starter
 from phigen.spec.model import CanonicalForm, LieAlgebraForm, LogCanonicalForm, MatrixForm, NambuForm, PoissonForm, Spec
 from phigen.spec.names import FAMILIES
@@ -82,6 +82,11 @@ def test_brackets_may_be_stated_twice_as_exact_negatives() -> None:
 
 def test_canonical_pairs() -> None:
     assert form("{canonical: {q: [x3], p: [x1]}}") == CanonicalForm(("x3",), ("x1",))
+
+
+def test_a_mapping_in_place_of_a_matrix_has_a_hint() -> None:
+    with pytest.raises(SpecError, match=r"expected a list, found a mapping[^$]*a matrix is a list of its rows"):
+        form("{log_canonical: {xy: 1, yz: 2}}")
 
 
 def test_log_canonical_matrix_with_parameters() -> None:
