@@ -420,10 +420,7 @@ class Gauss(_Staged):
         """All kernels, each once."""
         varied = (self.tangent.slope, self.tangent.change) if self.tangent else ()
         reduced = (self.reduced.slope, self.reduced.follow) if self.reduced else ()
-        lifted = (self.lifted.slope, self.lifted.change) if self.lifted else ()
-        return _present(
-            (self.prepare, self.slope, *reduced, self.change, self.frame, *varied, *self.transposed, *lifted)
-        )
+        return _present((self.prepare, self.slope, *reduced, self.change, self.frame, *varied, *self.transposed))
 
 
 class _Scheduled(_Staged):

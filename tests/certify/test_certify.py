@@ -650,13 +650,17 @@ def test_the_runtime_is_the_one_that_the_theorems_are_about() -> None:
     expect_phrases(
         "kowalevski_gauss",
         {
-            "collocate": ("square * (past->rate * past->rate) <= SOLVED * SOLVED",),
+            "collocate": ("square * (past->rate * past->rate) <= SOLVED * SOLVED", "element_scale = 1.0"),
             "judge": (
                 "slow && change <= ROUNDING",
                 "rate > fmax(STALLED, 1.5 * *usual)",
                 "change <= NEARLY_ROUNDING",
             ),
-            "change_of": ("(now[lane] - old[lane]) * (now[lane] - old[lane])", "return total(sum) / (double)NODES"),
+            "change_of": (
+                "(now[lane] - old[lane]) * (now[lane] - old[lane])",
+                "sum[lane] *= scale / element_scale",
+                "return element_scale * (total(sum) / (double)NODES)",
+            ),
         },
     )
     expect_phrases(
