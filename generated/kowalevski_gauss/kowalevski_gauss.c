@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: e6f478866a40bb0de25640eb56cf7ffba64bb3e1cf788368b57681dbb9c617cd
+ * body-sha256: 9bfc6ec0ef181620a47f2e91c14d84d13b9022b1452516ccaf75830d81b63a4f
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -300,12 +300,6 @@ static inline void kowalevski_gauss_mix_twice(const double matrix[kowalevski_gau
         + matrix[13][lane] * before[5] + matrix[15][lane] * before[7]);
 }
 
-enum {
-    kowalevski_gauss_ITERATED = kowalevski_gauss_UNKNOWNS, /* unknowns that sweeps iterate */
-    kowalevski_gauss_READS = kowalevski_gauss_UNKNOWNS,    /* values that sweeps read */
-    kowalevski_gauss_FACTORS = 1                           /* number of factors of a stage: its weight */
-};
-
 /* kowalevski_gauss_stage_field in all lanes. */
 static void kowalevski_gauss_stage_field_lanes(const double coef[1], const double x[6],
     kowalevski_gauss_lanes z[restrict 8], kowalevski_gauss_lanes w[restrict 1],
@@ -421,13 +415,6 @@ static void kowalevski_gauss_factors_at(double fraction, double factor[kowalevsk
 /* Sweeps iterate all unknowns, and read them. */
 #define kowalevski_gauss_READ(r) (r)
 
-/* The factors of a stage that a sweep reads. */
-static inline void kowalevski_gauss_set_factors(double h,
-    kowalevski_gauss_lanes factors[kowalevski_gauss_FACTORS])
-{
-    for (int i = 0; i < kowalevski_gauss_NODES; ++i) factors[0][i] = h * kowalevski_gauss_weights[i];
-}
-
 /* Values of the unknowns in a step of another size, the last one times a ratio, by the collocation
    polynomial. */
 static void kowalevski_gauss_predict_at(kowalevski_gauss_history *past, double ratio,
@@ -448,7 +435,7 @@ static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowal
     double square = DBL_MIN;
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) square += x[i] * x[i];
     if (square <= DBL_MIN)
-        for (int k = 0; k < kowalevski_gauss_PLAIN && k < kowalevski_gauss_ITERATED; ++k)
+        for (int k = 0; k < kowalevski_gauss_PLAIN && k < kowalevski_gauss_UNKNOWNS; ++k)
             for (int i = 0; i < kowalevski_gauss_NODES; ++i) square += increments[k][i] * increments[k][i];
     return 1.0 / square;
 }
@@ -472,16 +459,16 @@ static inline double kowalevski_gauss_change_of(double scale, double element_sca
 
 /* Predict the values that sweeps read, from the increments of the last steps. */
 static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor,
-    kowalevski_gauss_lanes reads[kowalevski_gauss_READS])
+    kowalevski_gauss_lanes reads[kowalevski_gauss_UNKNOWNS])
 {
     double(*last)[kowalevski_gauss_WIDTH] = past->increments[past->latest], (*older)[kowalevski_gauss_WIDTH] =
         past->increments[1 - past->latest];
     if (predictor + 1 < kowalevski_gauss_PREDICTORS)
-        for (int r = 0; r < kowalevski_gauss_READS; ++r)
+        for (int r = 0; r < kowalevski_gauss_UNKNOWNS; ++r)
             kowalevski_gauss_mix_twice(kowalevski_gauss_prediction[predictor], last[kowalevski_gauss_READ(r)],
             older[kowalevski_gauss_READ(r)], reads[r]);
     else /* the last predictor reads one step only */
-        for (int r = 0; r < kowalevski_gauss_READS; ++r)
+        for (int r = 0; r < kowalevski_gauss_UNKNOWNS; ++r)
             kowalevski_gauss_mix(kowalevski_gauss_prediction[predictor], last[kowalevski_gauss_READ(r)],
             reads[r]);
 }
@@ -491,12 +478,12 @@ static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int 
 static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale, double element_scale,
     kowalevski_gauss_lanes *reads)
 {
-    kowalevski_gauss_lanes predicted[kowalevski_gauss_READS];
+    kowalevski_gauss_lanes predicted[kowalevski_gauss_UNKNOWNS];
     double least = HUGE_VAL;
     int best = kowalevski_gauss_PREDICTORS - 1;
     for (int predictor = 0; predictor < kowalevski_gauss_PREDICTORS; ++predictor) {
         kowalevski_gauss_predict(past, predictor, predicted);
-        const double change = kowalevski_gauss_change_of(scale, element_scale, kowalevski_gauss_READS,
+        const double change = kowalevski_gauss_change_of(scale, element_scale, kowalevski_gauss_UNKNOWNS,
             predicted, reads);
         if (change < least) {
             least = change;
@@ -583,11 +570,11 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *increments)
 {
     kowalevski_gauss_history *past = &s->history;
-    kowalevski_gauss_lanes z[kowalevski_gauss_READS], next[kowalevski_gauss_ITERATED],
-        factors[kowalevski_gauss_FACTORS] = { { 0.0 } };
+    kowalevski_gauss_lanes z[kowalevski_gauss_UNKNOWNS], next[kowalevski_gauss_UNKNOWNS], factors[1] =
+        { { 0.0 } };
     kowalevski_gauss_lanes *now = increments;
     kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
-    kowalevski_gauss_set_factors(s->h, factors);
+    for (int i = 0; i < kowalevski_gauss_NODES; ++i) factors[0][i] = s->h * kowalevski_gauss_weights[i];;
     if (past->count == 0 || memcmp(&s->h, &past->h, sizeof s->h) != 0) {
         memset(z, 0, sizeof z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h))
@@ -604,7 +591,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
         kowalevski_gauss_slopes(s, point, factors, z, tested ? next : now);
         if (tested) {
             const double scale = kowalevski_gauss_scale(s->x, next), element_scale = 1.0;
-            const double square = kowalevski_gauss_change_of(scale, element_scale, kowalevski_gauss_ITERATED,
+            const double square = kowalevski_gauss_change_of(scale, element_scale, kowalevski_gauss_UNKNOWNS,
                 now, next);
             const int solved = square * (past->rate * past->rate) <= kowalevski_gauss_SOLVED
                 * kowalevski_gauss_SOLVED;

@@ -653,6 +653,13 @@ SWEEPS = Choice(
     "Sweeps of a Gauss step iterate some unknowns, and read integrals of their increments; or they do so with all.",
     ("REDUCED",),
     {
+        "ITERATED_COUNT": ("PHI_ITERATED", "PHI_UNKNOWNS"),
+        "READ_COUNT": ("PHI_READS", "PHI_UNKNOWNS"),
+        "FACTOR_COUNT": ("PHI_FACTORS", "1"),
+        "SET_FACTORS(h, factors)": (
+            "phi_set_factors(h, factors);",
+            "for (int i = 0; i < PHI_NODES; ++i) factors[0][i] = h * phi_weights[i];",
+        ),
         "ITERATES(now, increments)": ("phi_lanes now[PHI_ITERATED];", "phi_lanes *now = increments;"),
         "SWEEP(s, point, factors, z, now)": (
             "phi_reduced_field_lanes(s->coef, point, z, factors, factors + 1, now)",

@@ -121,7 +121,7 @@ STEP_MODULES: Mapping[str, StepModule] = {
         constants=lambda program, step: _implicit(step),
         series=_path_series,
     ),
-    "gauss": StepModule(kernels=lambda program, step: step.kernels, constants=_collocation),
+    "gauss": StepModule(kernels=lambda program, step: replace(step, lifted=None).kernels, constants=_collocation),
     "splitting": StepModule(
         kernels=_splitting_kernels,
         constants=lambda program, step: _schedule(step, program.attitude),

@@ -81,13 +81,14 @@ static void phi_factors_at(double fraction, double factor[PHI_NODES])
 #include "gauss_all_unknowns.c"
 #include "gauss_lifted.c"
 
+#if PHI_STAGED
 /* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
 static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
 {
     double square = DBL_MIN;
     for (int i = 0; i < PHI_DIM; ++i) square += x[i] * x[i];
     if (square <= DBL_MIN)
-        for (int k = 0; k < PHI_PLAIN && k < PHI_ITERATED; ++k)
+        for (int k = 0; k < PHI_PLAIN && k < PHI_ITERATED_COUNT; ++k)
             for (int i = 0; i < PHI_NODES; ++i) square += increments[k][i] * increments[k][i];
     return 1.0 / square;
 }
@@ -107,32 +108,49 @@ static inline double phi_change_of(double scale, double element_scale, int count
     return element_scale * (phi_total(sum) / (double)PHI_NODES);
 }
 
-#if PHI_STAGED
 /* Predict the values that sweeps read, from the increments of the last steps. */
-static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads[PHI_READS])
+static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads[PHI_READ_COUNT])
 {
     double(*last)[PHI_WIDTH] = past->increments[past->latest], (*older)[PHI_WIDTH] = past->increments[1 - past->latest];
     if (predictor + 1 < PHI_PREDICTORS)
-        for (int r = 0; r < PHI_READS; ++r) phi_mix_twice(phi_prediction[predictor], last[PHI_READ(r)], older[PHI_READ(r)], reads[r]);
+        for (int r = 0; r < PHI_READ_COUNT; ++r) phi_mix_twice(phi_prediction[predictor], last[PHI_READ(r)], older[PHI_READ(r)], reads[r]);
     else /* the last predictor reads one step only */
-        for (int r = 0; r < PHI_READS; ++r) phi_mix(phi_prediction[predictor], last[PHI_READ(r)], reads[r]);
+        for (int r = 0; r < PHI_READ_COUNT; ++r) phi_mix(phi_prediction[predictor], last[PHI_READ(r)], reads[r]);
 }
 
 /* Number of the predictor whose prediction is nearest to the values that the last sweep of a step has read. */
 static int phi_best_predictor(phi_history *past, double scale, double element_scale, phi_lanes *reads)
 {
-    phi_lanes predicted[PHI_READS];
+    phi_lanes predicted[PHI_READ_COUNT];
     double least = HUGE_VAL;
     int best = PHI_PREDICTORS - 1;
     for (int predictor = 0; predictor < PHI_PREDICTORS; ++predictor) {
         phi_predict(past, predictor, predicted);
-        const double change = phi_change_of(scale, element_scale, PHI_READS, predicted, reads);
+        const double change = phi_change_of(scale, element_scale, PHI_READ_COUNT, predicted, reads);
         if (change < least) {
             least = change;
             best = predictor;
         }
     }
     return best;
+}
+
+#else
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for group elements;
+   at x = 0 the increments take the place of x. */
+static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lanes *after)
+{
+    double square = DBL_MIN, sum[PHI_NODES] = { 0.0 };
+    for (int i = 0; i < PHI_DIM; ++i) square += x[i] * x[i];
+    if (square <= DBL_MIN)
+        for (int k = 0; k < PHI_PLAIN; ++k)
+            for (int i = 0; i < PHI_NODES; ++i) square += after[k][i] * after[k][i];
+    for (int k = 0; k < PHI_UNKNOWNS; ++k)
+        for (int i = 0; i < PHI_NODES; ++i) {
+            sum[i] += (after[k][i] - before[k][i]) * (after[k][i] - before[k][i]);
+            if (k + 1 == PHI_PLAIN) sum[i] *= 1.0 / square;
+        }
+    return phi_total(sum) / (double)PHI_NODES;
 }
 
 #endif
@@ -220,10 +238,10 @@ static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep,
 static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *increments)
 {
     phi_history *past = &s->history;
-    phi_lanes z[PHI_READS], next[PHI_ITERATED], factors[PHI_FACTORS] = { { 0.0 } };
+    phi_lanes z[PHI_READ_COUNT], next[PHI_ITERATED_COUNT], factors[PHI_FACTOR_COUNT] = { { 0.0 } };
     PHI_ITERATES(now, increments)
     phi_progress progress = { HUGE_VAL, 0, 0 };
-    phi_set_factors(s->h, factors);
+    PHI_SET_FACTORS(s->h, factors);
     if (past->count == 0 || PHI_DIFFERS(s->h, past->h)) {
         PHI_CLEAR_STAGES(z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h)) phi_predict_at(past, s->h / past->h, z);
@@ -239,8 +257,12 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
         const int tested = sweep >= past->sweeps;
         PHI_SWEEP(s, point, factors, z, tested ? next : now);
         if (tested) {
+#if PHI_STAGED
             const double scale = phi_scale(s->x, next), element_scale = PHI_ELEMENT_SCALE(s);
-            const double square = phi_change_of(scale, element_scale, PHI_ITERATED, now, next);
+            const double square = phi_change_of(scale, element_scale, PHI_ITERATED_COUNT, now, next);
+#else
+            const double square = phi_change_of(s->x, now, next);
+#endif
             const int solved = square * (past->rate * past->rate) <= PHI_SOLVED * PHI_SOLVED;
             const int judgement = solved ? 1 : phi_judge(&past->rate, &past->sweeps, &progress, sweep, sqrt(square));
             PHI_COPY_STAGES(now, next, next);

@@ -1,14 +1,10 @@
 #ifndef PHI_FILE_GAUSS_ALL_UNKNOWNS
 #define PHI_FILE_GAUSS_ALL_UNKNOWNS
+#if PHI_STAGED
 /* Sweeps iterate all unknowns, and read them. */
 #define PHI_READ(r) (r)
 
-/* The factors of a stage that a sweep reads. */
-static inline void phi_set_factors(double h, phi_lanes factors[PHI_FACTORS])
-{
-    for (int i = 0; i < PHI_NODES; ++i) factors[0][i] = h * phi_weights[i];
-}
-
+#endif
 /* Values of the unknowns in a step of another size, the last one times a ratio, by the collocation polynomial. */
 static void phi_predict_at(phi_history *past, double ratio, phi_lanes *z)
 {

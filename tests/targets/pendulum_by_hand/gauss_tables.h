@@ -8,8 +8,6 @@ static const double phi_weights[PHI_WIDTH] = { 1.0 };
 static const double phi_mixing[PHI_NODES][PHI_WIDTH] = { { 0.5 } };
 static const double phi_prediction[PHI_NODES][PHI_WIDTH] = { { 0.5 } };
 
-enum { PHI_ITERATED = PHI_UNKNOWNS, PHI_READS = PHI_UNKNOWNS, PHI_FACTORS = 1 };
-
 static double phi_total(const double values[PHI_WIDTH])
 {
     return values[0];
