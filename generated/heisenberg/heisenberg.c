@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 875c941b7b634188779849fa50087d97d4b19a2f692dae62658ad0d3bb618b71
+ * body-sha256: 39f0a2f84cb00aa553e68c5b18d9f40078341a260929373b50adff7c11213fd9
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -890,6 +890,7 @@ heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenbe
     s->params = *params;
     heisenberg_put_parameters(s, params);
     s->prepared = 0; /* so that the next step starts as with a new step size */
+    s->open = 0;
     return heisenberg_OK;
 }
 

@@ -34,6 +34,13 @@ parameters: {k: {value: 1, at: sites}, m: {value: 2, positive: true}, a: 0.3}
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/(2*m) + k*q**4/4 + a*(q[i+1] - q)**2 + exp(m)*q/50
 """
+#: Statements that save a run and resume it in another solver.
+SAVED = """\
+static double arrays[3 * sizeof x / sizeof *x];
+    size_t far;
+    const size_t count = NAME_saved(&s, arrays, &far);
+    if (NAME_resume(&fresh, H, arrays, count, far)) return 5;
+"""
 #: Specs with the number of sites; in C the bonds are a ring.
 SPECS = {
     "ring": (RING, 5),
@@ -125,6 +132,7 @@ int main(void)
     if (NAME_set_parameters(&s, &params)) return 4;
     NAME_state(&s, x);
     NAME_solver fresh = begun(&params, s.t, 5);
+    SAVED
     printf("%d ", alike(&s, &fresh));
     WRONG
     printf("%d ", NAME_set_parameters(&s, &params) == NAME_BAD_ARGUMENT);
@@ -157,6 +165,7 @@ def test_c_goes_on_as_a_solver_that_starts_with_the_new_parameters(name: str, tm
         "BONDS": f"{bonds}\n    void *work = malloc({size});",
         "START": f"work == NULL || NAME_init{'_at' * timed}(&s, params, {tail})",
         "NOISE": "NAME_set_noise(&s, 7, 0, step);" if noise else "",
+        "SAVED": SAVED * (name in BODIES or name in ("ring", "timed", "graph")),
         "FIRST": assign[0], "SECOND": assign[1], "WRONG": bad_assign.replace("nan", "0.0 / 0.0"),
         "H": "0.02", "NAME": program.name,
     }.items():  # fmt: skip

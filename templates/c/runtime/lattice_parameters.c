@@ -14,6 +14,7 @@ phi_status phi_set_parameters(phi_solver *s, const phi_params *params)
     phi_put_parameters(s, params);
     phi_put_at_bonds(s, params);
     s->prepared = 0; /* so that the next step starts as with a new step size */
+    PHI_NOT_OPEN(s)
 #if PHI_BODIES
     if (!phi_weigh(s)) return PHI_BAD_ARGUMENT;
 #endif
