@@ -536,7 +536,7 @@ class _StoredState:
         return self.path.with_name(f"{self.path.name}.{count % 2}.npy")
 
     def save(self, energy: Sequence[float]) -> None:
-        """Store the state after the frame of the last of these energies, and then its description."""
+        """Store the present state, and then its description with the energies of all frames so far."""
         domain, count = self.domain, len(energy)
         state_file = _SharedArrayFile(domain, self._file(count), (domain.fields, *domain.sizes), new=True)
         state_file.write(0, domain.saved_state())

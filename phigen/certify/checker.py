@@ -226,8 +226,10 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
 
 
 def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
-    """Return the outputs ``of`` a stage by the mean value theorem, errors included; narrower than `run_of` over small
-    boxes."""
+    """Return balls for the outputs named ``of`` of a stage, by the mean value theorem, with rounding errors.
+
+    For small boxes they are narrower than the balls of `run_of`.
+    """
     _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
     x, u = ([arb(v.mid()) for v in values] for values in (X, box))
     at = run_of(c, stage, x, T, leaf, u, exact=True)

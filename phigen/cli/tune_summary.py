@@ -180,7 +180,7 @@ def _automatic(tuning: Tuning) -> str:
     assert tuning.winner is not None
     ratio, text = tuning.automatic_ratio, f"scheme: auto takes {tuning.automatic} at order {tuning.winner.curve.order}"
     if not math.isfinite(ratio):
-        return f"{text}, of which no method that was measured has the accuracy."
+        return f"{text}, but no measured method of that scheme reaches the accuracy."
     return f"{text}; the best of that scheme takes {ratio:.2g} times the time of the best of all."
 
 

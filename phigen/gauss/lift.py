@@ -1,9 +1,10 @@
-"""Frames of group elements in which functionals of quaternions are constant.
+"""Frames of group elements, for which the functionals on quaternions are constant.
 
-A copy of the quaternions in a star algebra, with the basis 1, i, j, k, has x̃(q) = y·Im q, and y = F* k F for some
-quaternion F. With U = FG in place of G, momenta x̃(GaG*) = k̃(UaU*), k̃(q) = (Im q)_3, take no products with x̃, and the
-element U at the end of a step is that from which the next one starts. Left multiplication commutes with the field, so
-the step is the same. F is arbitrary up to a left factor exp(tk), and any F is good: it moves with U.
+Let 1, i, j, k be the basis of a copy of the quaternions in a star algebra. There, x̃(q) = y·Im q with a vector y, and
+y = F* k F for some quaternion F, the frame. Let the unknown be U = FG in place of G. Then momenta need no products with
+x̃: they are x̃(GaG*) = k̃(UaU*) with k̃(q) = (Im q)_3. The U at the end of a step is the frame at the start of the next
+step. Left multiplication commutes with the vector field, so the step is the same as with G. F is only determined up to
+a left factor exp(tk); any choice is possible, since F changes with U.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ Copy = tuple[int, int, int, int]
 
 
 def quaternion_copies(algebra: StarAlgebra) -> tuple[Copy, ...]:
-    """Return the copies of the quaternions that an algebra is a sum of, in its basis; none if it is no such sum."""
+    """Return the copies of the quaternions whose direct sum is the algebra; () if it is no such sum.
+
+    Each copy consists of elements of the basis.
+    """
     field, n = algebra.field, range(algebra.dimension)
     if not field.is_rational or algebra.dimension % 4:
         return ()
@@ -39,7 +43,7 @@ def quaternion_copies(algebra: StarAlgebra) -> tuple[Copy, ...]:
 
 
 def _products(copy: Copy, one: Scalar) -> dict[tuple[int, int], Vector]:
-    """Return the products of 1, i, j, k."""
+    """Return the products of the basis elements 1, i, j, k of a copy."""
     u, i, j, k = copy
     products = {(u, u): {u: one}}
     for a, b, c in ((i, j, k), (j, k, i), (k, i, j)):
@@ -50,7 +54,7 @@ def _products(copy: Copy, one: Scalar) -> dict[tuple[int, int], Vector]:
 def momentum_form(
     algebra: StarAlgebra, copies: Sequence[Copy], element: Mapping[int, Scalar]
 ) -> dict[tuple[int, int], Scalar]:
-    """Return the quadratic form k̃(U a U*) of the components of U, by pairs of these in ascending order."""
+    """Return the quadratic form k̃(U a U*) for a = ``element``: coefficients by ascending pairs of components of U."""
     unit, last = algebra.field.one, {copy[3] for copy in copies}
     form: dict[tuple[int, int], Scalar] = {}
     for i in range(algebra.dimension):

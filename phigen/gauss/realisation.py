@@ -109,7 +109,10 @@ class Realisation:
 
     @property
     def lifted(self) -> Realisation | None:
-        """The same with the frames F of `phigen.gauss.lift` for all group elements; None if one has none."""
+        """The realisation with frames F for all group elements, see `phigen.gauss.lift`.
+
+        None if there are no group elements, or if one of them has no frame.
+        """
         parts: list[Part] = []
         for part in self.parts:
             copies = quaternion_copies(part.algebra) if isinstance(part, AlgebraBlock) and not part.central else ()

@@ -423,7 +423,10 @@ def multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expres
 
 
 def lifted_functionals(points: StageMap) -> list[Expression]:
-    """Return y with x̃(q) = y·Im q on each copy of the quaternions, in the order of i, j, k: F*kF = y at the start."""
+    """Return the vectors y with x̃(q) = y·Im q, for all copies of the quaternions one after the other.
+
+    Components are in the order of i, j, k. At the start of a step, F* k F = y.
+    """
     values: list[Expression] = []
     for group in points.realisation.groups:
         x = group_values(points.system, group)
@@ -461,7 +464,7 @@ def _functional_in_next_frame(
 ) -> list[Expression]:
     """Return derivatives ``k`` of the functional λ in the frame of the end of a step: k(bg*) − λ(sg*).
 
-    Here s is the symmetric part of ġb, and ġ, ``turned``, is the derivative of g in that frame. The second term follows
+    Here ġ is the derivative ``turned`` of g in that frame, and s is the symmetric part of ġb. The second term follows
     from nb + gn* = 0 at the end of a step.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)

@@ -160,7 +160,7 @@ def _functionals(system: System, points: StageMap) -> Statement:
 
 
 def _frames(system: System, points: StageMap, lifted: StageMap) -> Statement:
-    """Decide that unknowns U − F make the same step as G − 1 if x̃(q) = k̃(FqF*), with U = FG."""
+    """Decide that the step with unknowns U − F, where U = FG, is the step with G − 1 if x̃(q) = k̃(FqF*)."""
     others = points.unknowns[: len(points.unknowns) - len(lifted.frames)]
     values = {name: symbol(name) for name in others}
     for group, places in zip(lifted.realisation.groups, lifted.places, strict=True):

@@ -16,7 +16,8 @@ static void phi_lift_one(const double y[3], double f[4])
     f[3] = y[2] >= 0.0 ? 0.0 : a;
 }
 
-/* Multiply F by the exp(tk) that brings it nearest to an old one, so that old increments still predict. */
+/* Multiply F by the factor exp(tk) that brings it nearest to an old frame, so that predictions by old increments remain
+   valid. */
 static void phi_align(const double old[4], double f[4])
 {
     const double a = f[0] * old[0] + f[1] * old[1] + f[2] * old[2] + f[3] * old[3];
@@ -26,7 +27,7 @@ static void phi_align(const double old[4], double f[4])
     memcpy(f, turned, sizeof turned);
 }
 
-/* Choose frames for the state, unless the last step has left some. */
+/* Compute frames for the state, unless those from the last step are still valid. */
 static void phi_lift(phi_solver *s)
 {
     phi_history *past = &s->history;
@@ -52,7 +53,7 @@ static double phi_element_scale(const phi_solver *s)
     return 1.0 / square;
 }
 
-/* The frames at the end of a step, in compensated arithmetic. */
+/* Update the frames to the end of a step, in compensated arithmetic. */
 static void phi_move_frames(phi_solver *s, const double end[PHI_UNKNOWNS])
 {
     for (int i = 0; i < PHI_LIFT; ++i) {
