@@ -213,7 +213,7 @@ def _logarithmic(cell: Cell, density: Expression) -> dict[str, Expression]:
 
 
 def _closed(cell: Cell) -> bool:
-    """Whether every bracket depends only on the box that its two sites span."""
+    """Whether every bracket depends only on sites in the smallest box that contains its two sites."""
     for (_, other), entry in cell.bracket.items():
         offset = steps(cell.place(other)[1])
         low, high = cell.extent(entry)

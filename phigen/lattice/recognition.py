@@ -157,8 +157,10 @@ def _lattice(
 
 
 def _names(spec: Spec, coordinates: Mapping[str, tuple[str, Site]], boundary: tuple[str, ...]) -> _SiteNames:
-    """Return the fields and sites of all coordinates, with sites counted from 0, and of parameters with the same
-    numbers."""
+    """Return the field and the site of each coordinate, and of each parameter with a value at every site.
+
+    Sites are counted from 0.
+    """
     first = tuple(min(c) for c in zip(*(s for _, s in coordinates.values()), strict=True))
     fields = tuple(dict.fromkeys(f for f, _ in coordinates.values()))
     sizes = _sizes(coordinates)

@@ -354,7 +354,10 @@ class PartSearch:
     def _seam_motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
     ) -> SiteMotion | None:
-        """Return the motion of sites near seams, or None if the part has the terms of all sites."""
+        """Return the motion of sites near seams.
+
+        None if there are no seams, or if the part has the terms of sites of all colours.
+        """
         all_classes = {(id(s.expression), c) for s, _ in (*part, *more) for c in range(self.colouring.count)}
         if not self.colouring.seams or all_classes == {(id(s.expression), c) for s, c in (*part, *more)}:
             return None

@@ -518,9 +518,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return trajectory
 
     def _expect_place(self, run: LatticeRun, output: str | Path | None, frames: Frames | None, *, resume: bool) -> None:
-        """Raise `ValueError` if files of an interrupted run would be overwritten, or a complete run continued.
+        """Raise `ValueError` if files of an interrupted run would be overwritten, or if a run to resume is complete.
 
-        A run that continues a finished one may rewrite the file of that run.
+        A longer run that continues a complete one may overwrite the file of the latter.
         """
         if run.checkpoints:
             target = Path(output) if output and run.plan.past is None else None

@@ -190,7 +190,7 @@ class Declarations:
         return replace(scope, names={**scope.names, **dated}, refused=refused)
 
     def numbers(self) -> AllowedNames:
-        """Return no declared name, for defaults and initial values."""
+        """Return the names for defaults and initial values: constants, but nothing that the spec declares."""
         declared = (*self.coordinates, *self.parameters, *self.definitions, *filter(None, [self.time]))
         hint = "formulas of values may contain indices and sizes, such as i and N_i" if self.lattice else ""
         return AllowedNames({}, {n: (f"expected a number; {n!r} is not constant", hint) for n in declared})

@@ -89,7 +89,8 @@ class Amalgam:
     def _selected(self, text: str) -> list[str]:
         """Return the lines of a text that the switches select."""
         chosen: list[str] = []
-        frames: list[list[bool]] = []  # for each open #if: this branch is on, one was on, it is a switch
+        # For each open #if: whether its present branch is on, whether one was on so far, whether it tests a switch.
+        frames: list[list[bool]] = []
         selected = True  # whether all open branches are on
         for line in text.splitlines():
             if not line.startswith("#"):
