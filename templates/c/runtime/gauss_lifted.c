@@ -1,5 +1,6 @@
 #ifndef PHI_FILE_GAUSS_LIFTED
 #define PHI_FILE_GAUSS_LIFTED
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -48,7 +49,7 @@ static void phi_lift(phi_solver *s)
 /* Weight of squared changes of group elements: 1 / |F|^2. It is bounded, as ratios to weights of coordinates would underflow. */
 static double phi_element_scale(const phi_solver *s)
 {
-    double square = 1e-150;
+    double square = sqrt(DBL_MIN);
     for (int i = 0; i < PHI_LIFT; ++i) square += s->history.frame[i] * s->history.frame[i];
     return 1.0 / square;
 }
