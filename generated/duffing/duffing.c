@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: a6b9fc9106e59882cfcb6215f0fd854f841bf28913286b0bb5ecd85e1d2de29b
+ * body-sha256: 32ee8568c1198757515d42d8bcb9b492b01bc32f86b87da201d1057e486b64f9
  */
 #include "duffing.h"
 #include <float.h>
@@ -261,7 +261,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 #define duffing_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
 
 #define duffing_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
-#define duffing_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */
+#define duffing_SHRINKING 0.25     /* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double duffing_size(const double y[duffing_DIM], const double delta[duffing_DIM])

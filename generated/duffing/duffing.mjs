@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8a908064c1a77497cc1aa0c67a5c2e2200017a859d7234be08fec41bc43239d0
+ * body-sha256: cc9aa3c845a92e4d16626f10d7fbe0ea7bc1c1788bb62b5cf58d197d89356cb6
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -165,7 +165,7 @@ function energy(params, t, x, energy) {
 function casimirs(params, x, out) {
 }
 
-/** Pi(x) grad H(x). */
+/** Pi(x) grad H(t, x). */
 function vectorField(params, t, x, out) {
   const q = x[0];
   const p = x[1];
@@ -181,7 +181,7 @@ const FLOOR = 1e-6;
 
 /** A correction below this is rounding ... */
 const NEARLY_SOLVED = 1e-8;
-/** ... if it exceeds this fraction of the one before */
+/** Ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 const SHRINKING = 0.25;
 
 /** Accepted length of steps, relative to state and motion */

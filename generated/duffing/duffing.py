@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d49bb4fa4b3085d81a05fa485abfecb26445a6cb48f25d4d6fe7f43885429c28
+# body-sha256: a96eb1fe28b573169a1f28b9b120f84fde8e058b727fd9a39a48bff214f3f40b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -238,7 +238,7 @@ def _solved(stage, x, carry, prediction):
 
 FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
-SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
+SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
 
 
 def _size(y, delta):
@@ -409,7 +409,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, t, x):
-    """Pi(x) grad H(x)."""
+    """Pi(x) grad H(t, x)."""
     A = parameters["A"]
     omega = parameters["omega"]
     q = x[..., 0]

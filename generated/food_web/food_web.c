@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 4b86c1148e6308a3cb9607a5598e5ec0bf583c05743e7e58951f9b145f728039
+ * body-sha256: eaf550013be8d830d460fd433c3ff92dcbe1589544f68b1c3cc45f94c7ee9b6f
  */
 #include "food_web.h"
 #include <limits.h>
@@ -90,7 +90,7 @@ typedef struct {
 #define food_web_EACH_SITE
 #endif
 
-/* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
+/* Set the padded length of the only row, and return the number of rows, 1; 0 if the size is not allowed. */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;

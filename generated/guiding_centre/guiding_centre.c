@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: b8d978fcad0346414ee3bb34e81552350a0a9b2e769f2eb6329917228f00d2bd
+ * body-sha256: 70573ca27ad1e42deba02f5a260d5652af2669da77a3db090c0ac71dd740a295
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -456,8 +456,8 @@ enum {
 #define guiding_centre_ROUNDED_SLOPE 2e-15
 /* difference of arguments in a difference quotient, relative to p: the root of rounding */
 #define guiding_centre_DIFFERENCE 1e-7
-#define guiding_centre_SOLVED 4e-16        /* a residual below this, relative to p, is rounding; */
-#define guiding_centre_NEARLY_SOLVED 1e-12 /* one below this is rounding too ... */
+#define guiding_centre_SOLVED 4e-16        /* a residual below this, relative to p, is rounding */
+#define guiding_centre_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
 #define guiding_centre_SHRINKING 0.25      /* ... if it exceeds this fraction of the one before */
 /* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define guiding_centre_CONTRACTING 0.05

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: cfaccc4a9ded53561e927775e770c231f449a1d4c91348b236dde200c686e599
+# body-sha256: cdddbcd1a023b1b79d86375d2463dbe3441a4a39e8a59922e3638952735493a4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -181,8 +181,8 @@ NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are ro
 LEAST_SHARE = 1e-5  # smaller coordinates are measured relative to this fraction of their sum
 ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, relative to the path and its slope
 DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the root of rounding
-SOLVED = 4e-16  # a residual below this, relative to p, is rounding;
-NEARLY_SOLVED = 1e-12  # one below this is rounding too ...
+SOLVED = 4e-16  # a residual below this, relative to p, is rounding
+NEARLY_SOLVED = 1e-12  # a residual below this may be rounding: see SHRINKING
 SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
 CONTRACTING = 0.05  # largest reduction factor of the residual by an iteration with a useful Jacobian
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 9bfc6ec0ef181620a47f2e91c14d84d13b9022b1452516ccaf75830d81b63a4f
+ * body-sha256: 69aa907e7248e25b1afe9b3415ab208ceff7d2f2fe3e77bd82740b7f520b81d9
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -530,11 +530,11 @@ enum {
 };
 /* largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs */
 #define kowalevski_gauss_SOLVED 2e-18
-/* sweeps end when a change exceeds this fraction of the one before ... */
+/* ratio of successive changes from which on sweeps do not help; with 0.4 Casimirs drifted */
 #define kowalevski_gauss_STALLED 0.8
-/* ... and is below this; a fraction of 0.4 let Casimirs drift; */
+/* sweeps end at a change below this with at least the ratio STALLED */
 #define kowalevski_gauss_ROUNDING 4e-16
-/* ... or with the second change below this that is not smaller than the one before */
+/* sweeps end at the second change below this that is no smaller than the last */
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
 /* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if they do not

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 3bc985015d45904eb76c31d47d8ed83e9de89540d04f553f98367a3013b00c71
+# body-sha256: 04035671ac5658b8a27ca6459ea5622b1a3306f2948d4ad5644870d79f73747b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -200,9 +200,9 @@ def _next_frame(coef, x, z, k):
 
 MOST_RISING = 3  # growing changes after transients: with more sweeps of this kind, the step is too large
 SOLVED = 2e-18  # largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs
-STALLED = 0.8  # sweeps end when a change exceeds this fraction of the one before ...
-ROUNDING = 4e-16  # ... and is below this; a fraction of 0.4 let Casimirs drift;
-NEARLY_ROUNDING = 2e-14  # ... or with the second change below this that is not smaller than the one before
+STALLED = 0.8  # ratio of successive changes from which on sweeps do not help; with 0.4 Casimirs drifted
+ROUNDING = 4e-16  # sweeps end at a change below this with at least the ratio STALLED
+NEARLY_ROUNDING = 2e-14  # sweeps end at the second change below this that is no smaller than the last
 TRIALS = 32  # steps between comparisons of the predictors; a comparison costs as much as two sweeps
 
 # Gauss collocation: nodes, weights, and the matrix mu = A diag(1/b). All entries of mu + mu.T are exactly 1.

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d7230410e5cf77b8a521987cdfe07abba392cfb1bee2c32e87e605380656a5bd
+ * body-sha256: fce1c6a8034e0f54a624afc50f50995da7c9f0a419df61e026692556af4594aa
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -40,7 +40,7 @@ const POSITIVE = ["g"];
 /** A step of size h is the composition of stages of these fractions of h. */
 const FRACTIONS = [1.0];
 
-/** Values that depend on parameters and step size only. */
+/** Number of values that depend on parameters and step size only. */
 const COEFFICIENTS = 2;
 
 /** Everything that depends on parameters and step size only. */

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 43b7db1a3267b6096724dc943a46db9b55f9f7f77dd52b4f2182827dd9297428
+ * body-sha256: 149d5a9cd13b53012834093fe2b2641b49fe638c9862fa17dced382abac499ff
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -74,7 +74,7 @@ typedef struct {
 #define point_vortices_EACH_SITE
 #endif
 
-/* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
+/* Set the padded length of the only row, and return the number of rows, 1; 0 if the size is not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;
@@ -590,7 +590,7 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
     }
 }
 
-/* to = v - (derivative of a sweep at s->y[now], or its transpose) v. */
+/* to = v - J v, where J is the derivative of a sweep by y at s->y[now]. */
 static void point_vortices_multiply(const point_vortices_solver *s, const double *coef, int now,
     double *const *v, double *const *to)
 {

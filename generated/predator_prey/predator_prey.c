@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 5891b5bec46812f4bbc7506879d98bd8fd0b0121de8ffbe7f86c8f7252fb5583
+ * body-sha256: 3457d8313880223cd76d36819cf1361bc393ce0820ff639c6f4108f7568031f2
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -235,7 +235,8 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 #define predator_prey_FLOOR 0.0 /* smaller components of y count as this fraction of the largest */
 
 #define predator_prey_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
-#define predator_prey_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */
+/* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+#define predator_prey_SHRINKING 0.25
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double predator_prey_size(const double y[predator_prey_DIM], const double delta[predator_prey_DIM])

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 5a049dbdbfff7ab84fd13467cf6a60a6bf59f12ea0fae82302be8d50675989e6
+# body-sha256: 09da48b2aaaebeabbe667e3099003ea5bc3aca0f8536ffc66b8f732ca72af3f6
 import numpy as np
 
 VERSION = "0.1.0"
@@ -232,7 +232,7 @@ def _solved(stage, x, carry, prediction):
 
 FLOOR = 0.0  # smaller components of y count as this fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
-SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
+SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
 
 
 def _size(y, delta):

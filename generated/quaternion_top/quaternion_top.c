@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: d825f8057e1c7cab9f00a7b0e9e4afa32b40458c306d7097c9ace077632bdde7
+ * body-sha256: f3313d51583ee7f05ed19af140dab2eecf29f651613bdb24487df97bc2a2b700
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -689,8 +689,8 @@ enum {
 #define quaternion_top_ROUNDED_SLOPE 2e-15
 /* difference of arguments in a difference quotient, relative to p: the root of rounding */
 #define quaternion_top_DIFFERENCE 1e-7
-#define quaternion_top_SOLVED 4e-16        /* a residual below this, relative to p, is rounding; */
-#define quaternion_top_NEARLY_SOLVED 1e-12 /* one below this is rounding too ... */
+#define quaternion_top_SOLVED 4e-16        /* a residual below this, relative to p, is rounding */
+#define quaternion_top_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
 #define quaternion_top_SHRINKING 0.25      /* ... if it exceeds this fraction of the one before */
 /* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define quaternion_top_CONTRACTING 0.05

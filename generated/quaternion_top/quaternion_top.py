@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: dc53e959cb5de9d2a758be31ce66e58d8052b5294c0ff942e497d8571ec9ce5e
+# body-sha256: 3579851698e0f4db21dc1f8376a75cf17f685a9dda837d3f6c623bee3d611b8c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -448,8 +448,8 @@ NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are ro
 LEAST_SHARE = 1e-5  # smaller coordinates are measured relative to this fraction of their sum
 ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, relative to the path and its slope
 DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the root of rounding
-SOLVED = 4e-16  # a residual below this, relative to p, is rounding;
-NEARLY_SOLVED = 1e-12  # one below this is rounding too ...
+SOLVED = 4e-16  # a residual below this, relative to p, is rounding
+NEARLY_SOLVED = 1e-12  # a residual below this may be rounding: see SHRINKING
 SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
 CONTRACTING = 0.05  # largest reduction factor of the residual by an iteration with a useful Jacobian
 

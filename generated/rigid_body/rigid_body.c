@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members: implicit
  *   steps; Ensembles
- * body-sha256: 806ed91219f7bcfd607b3dce156028bda48c4aa4ae4b7a280c3dfd4e5322b7b6
+ * body-sha256: 17d7c981faf2307570683d4bf6b74816429ec6cd793890c55bcaf9236161bd1f
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -658,7 +658,8 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 #define rigid_body_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
 
 #define rigid_body_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
-#define rigid_body_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */
+/* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+#define rigid_body_SHRINKING 0.25
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double rigid_body_size(const double y[rigid_body_DIM], const double delta[rigid_body_DIM])

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9a6e030639720455f84271eb3e54fa8f126203e38bb0a49d9b583d4ec306ce6e
+ * body-sha256: 4c1269328e3b58bc59b6cddffaf403ffe2ab4dac7454acf69e80c518d0d9f79e
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -49,7 +49,7 @@ const GAUGE = Object.freeze(["C"]);
 /** A step of size h is the composition of stages of these fractions of h. */
 const FRACTIONS = [1.0];
 
-/** Values that depend on parameters and step size only. */
+/** Number of values that depend on parameters and step size only. */
 const COEFFICIENTS = 35;
 
 /** Largest number of iterations of an implicit step. */
@@ -460,7 +460,7 @@ const FLOOR = 1e-6;
 
 /** A correction below this is rounding ... */
 const NEARLY_SOLVED = 1e-8;
-/** ... if it exceeds this fraction of the one before */
+/** Ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 const SHRINKING = 0.25;
 
 /** Accepted length of steps, relative to state and motion */

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 62f58124d214f115eedf6f46ece5ab8cfe86d7e04842901a2a755395f39f94f2
+# body-sha256: ea24f5b206d4aac9c06c22acf3a67b97f483cb714e979ef7016b1562d9d7426a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -484,7 +484,7 @@ def _solved(stage, x, carry, prediction):
 
 FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
-SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
+SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
 
 
 def _size(y, delta):

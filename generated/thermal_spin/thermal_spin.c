@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 4518d718a8eaeee4f33d3e4679e9f880dbaf5256978e70d6f14a61929c855999
+ * body-sha256: 6f881c790f568b41cb7bc41de77b9dd8e9c794147be72aa6b9326b632e9c3501
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -292,7 +292,8 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 #define thermal_spin_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
 
 #define thermal_spin_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
-#define thermal_spin_SHRINKING 0.25     /* ... if it exceeds this fraction of the one before */
+/* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+#define thermal_spin_SHRINKING 0.25
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double thermal_spin_size(const double y[thermal_spin_DIM], const double delta[thermal_spin_DIM])

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6782b1719b1170da1e1bcb9a2ba834a1f87fd9f258b577673ee88125b166b1a2
+ * body-sha256: ffefd4831a0f07a4a59d40c0a92693b747e7c242155cf8859c2f037a0dbfb30b
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -254,7 +254,7 @@ function casimirs(params, x, out) {
   out[0] = z * z + (x_ * x_ + y * y);
 }
 
-/** Pi(x) grad H(x). */
+/** Pi(x) (grad H(x) + zeta(x)) + f(x). */
 function vectorField(params, x, out) {
   const x_ = x[0];
   const y = x[1];
@@ -276,7 +276,7 @@ const FLOOR = 1e-6;
 
 /** A correction below this is rounding ... */
 const NEARLY_SOLVED = 1e-8;
-/** ... if it exceeds this fraction of the one before */
+/** Ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 const SHRINKING = 0.25;
 
 /** Accepted length of steps, relative to state and motion */

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0608be8739b1a6dbfefd6c400b0cb0d2047be4f94cda133b3af3cb736984def8
+# body-sha256: 07ef894e00104ed242adaa9543030f23da0920eab645b139458b411a22f2744f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -328,7 +328,7 @@ def _solved(stage, x, carry, prediction):
 
 FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
-SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
+SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
 
 
 def _size(y, delta):
@@ -539,7 +539,7 @@ def _casimirs(parameters, x):
 
 
 def _vector_field(parameters, x):
-    """Pi(x) grad H(x)."""
+    """Pi(x) (grad H(x) + zeta(x)) + f(x)."""
     B = parameters["B"]
     damping_rate = parameters["damping_rate"]
     x_ = x[..., 0]

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: a7507f4a9772d810490b927b923dd52182d66415bd8ae9843cb99413e40d9ead
+ * body-sha256: a3436870207bbfabc85adbf6ec8120f3565e6edbd98f1cb157602a4c558943b8
  */
 #include "toda.h"
 #include <math.h>
@@ -83,7 +83,7 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 1; k <= toda_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* Number of rows, which is 1, and its width; 0 if the size is not allowed. */
+/* Set the padded length of the only row, and return the number of rows, 1; 0 if the size is not allowed. */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t n = sizes != NULL ? sizes[0] : 0;

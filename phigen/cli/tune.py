@@ -86,10 +86,26 @@ def command(
     spec = load_one(spec_file)
     if spec.noise:
         message = "phigen tune does not compare settings where there is noise"
-        raise SpecError([spec.diagnostic(("noise",), message, "phigen verify and phigen run measure what is chosen")])
+        raise SpecError(
+            [
+                spec.diagnostic(
+                    ("noise",),
+                    message,
+                    "choose the settings yourself; phigen verify and phigen run measure their errors",
+                )
+            ]
+        )
     if spec.time:
         message = "phigen tune does not compare settings where H depends on the time"
-        raise SpecError([spec.diagnostic(("time",), message, "phigen verify and phigen run measure what is chosen")])
+        raise SpecError(
+            [
+                spec.diagnostic(
+                    ("time",),
+                    message,
+                    "choose the settings yourself; phigen verify and phigen run measure their errors",
+                )
+            ]
+        )
     if spec.forces and measure == "energy":
         place = ("damping",) if ("damping",) in spec.locations else ("forces",)
         message = "forces change the energy, so its change is not an error of the method"
@@ -183,9 +199,11 @@ def _of_lattice(
             f"measured on {reduced_text} of the {full_text} sites: errors are relative, and times in proportion"
         )
     if measure == "orbit" and len(problem.start) > MOST_COMPARED:
-        message = f"orbits are compared up to {MOST_COMPARED} numbers, and this run has {len(problem.start)}"
+        message = (
+            f"orbits are compared for states of up to {MOST_COMPARED} numbers, and this one has {len(problem.start)}"
+        )
         raise SpecError(
-            [compilation.spec.diagnostic(("runs", run.name), message, "--measure energy, or smaller sizes")]
+            [compilation.spec.diagnostic(("runs", run.name), message, "use --measure energy, or smaller sizes")]
         )
     return problem
 

@@ -1,4 +1,8 @@
-"""Kernels for paths in lanes, as functions at one point, and the stack that expansions need."""
+"""Kernels of steps along Karasev's paths with the Taylor series of several paths in SIMD lanes, one path each.
+
+A path is the solution of ṁ = π(m)p about its mean (docs/mathematics.md). The bytes of stack that its series need are
+counted here too.
+"""
 
 from __future__ import annotations
 

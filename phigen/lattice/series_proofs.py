@@ -71,7 +71,7 @@ def _on_a_box(cell: Cell, realisation: CellRealisation) -> tuple[System, BiReali
 
 
 def _at(box: Expansion, e: Expression, site: Site) -> Expression:
-    """Return an expression in fields and covectors around a site with the symbols of the box."""
+    """Return an expression in fields and covectors relative to a site, in the symbols of the ``box`` of sites."""
     values: dict[str, Expression] = {}
     for name in symbols_of(e):
         covector = isinstance(name, Symbol) and name.kind == MOMENTUM

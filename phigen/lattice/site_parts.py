@@ -178,8 +178,9 @@ class CellFlow(Flow):
     """The flow of a part of H over the lattice. The ``motions`` may run in any order, each over the sites in any order.
 
     ``summands`` are the terms of the part, with the colours of the sites where they begin. On graphs a part of one
-    colour, marked ``by_colour``, stands for the parts of all colours. With seams, ``beside`` is the motion of sites
-    near them, by the terms that begin on the seams of ``window``; sites on a seam have no other motion.
+    colour, marked ``by_colour``, stands for the parts of all colours. If the colouring has boundary seams,
+    ``beside`` is the motion of sites near them, and sites on a seam have no other motion. ``window`` is the set of
+    seams on which the terms of ``beside`` begin, a bit mask over the axes (see `Colouring.windows`).
     """
 
     motions: tuple[SiteMotion, ...] = ()

@@ -1,6 +1,6 @@
-"""Bi-realisation of a canonical π that is not symmetric: α = (q, p + a), β = (q + b, p), or its adjoint.
+"""A bi-realisation of canonical π that is not symmetric itself: α = (q, p + a), β = (q + b, p), or the adjoint pair.
 
-(a, b) is the covector at (q, p). With k = 1 the step is symplectic Euler; it is explicit for separable H.
+(a, b) is the covector at (q, p). At order 1 the step is symplectic Euler; it is explicit for separable H.
 """
 
 from __future__ import annotations

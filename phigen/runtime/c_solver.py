@@ -1,8 +1,9 @@
 """A generated C solver, called through ctypes.
 
-Besides the documented functions, two others are called: ``size_t NAME_solver_size(void)``, and ``size_t
-NAME_solver_steps_done(const NAME_solver *)``, the number of successful steps since ``NAME_init``. Of the solver's
-struct only the first member, ``double x[DIM]``, is read; the struct is copied and stored as bytes.
+Besides the documented functions it calls ``size_t NAME_solver_size(void)``; ``size_t NAME_solver_steps_done(const
+NAME_solver *)``, the number of successful steps since ``NAME_init``; and with a monitor ``double NAME_solver_time(const
+NAME_solver *)``. Of the solver's struct only the first member, ``x[DIM]`` of double or float, is read; the struct is
+copied and stored as bytes.
 """
 
 from __future__ import annotations

@@ -235,7 +235,7 @@ def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
 
 
 def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge, step: Gauss) -> Iterator[str]:
-    """Yield the lines of the header of generated files."""
+    """Yield the lines about a Gauss method in the header of generated files."""
     stages = order.terms
     yield f"scheme: Gauss collocation, {stages} stage{'s' * (stages > 1)}"
     if not realisation.exact:

@@ -259,6 +259,12 @@ def noise_fields(system: System) -> Kernel:
     return Kernel("noise_fields", purpose, system_inputs(system), (Output("out", values),))
 
 
+def field_formula(*, timed: bool, forced: bool) -> str:
+    """Return the formula of the vector field, with the time and with forces if there are any, for comments."""
+    at = "(t, x)" if timed else "(x)"
+    return f"pi(x) (grad H{at} + zeta{at}) + f{at}" if forced else f"pi(x) grad H{at}"
+
+
 def observables(system: System) -> Observables:
     """Return the kernels of H, the Casimirs, the vector field and the observables of the spec."""
     inputs, timeless = system_inputs(system), {"params": system.parameter_names, "x": system.coordinates}
@@ -269,9 +275,10 @@ def observables(system: System) -> Observables:
         else None
     )
     casimirs = tuple(system.casimirs.values())
+    formula = field_formula(timed=bool(system.times), forced=system.forces is not None)
     return Observables(
         Kernel("energy", "the Hamiltonian", inputs, (Output("energy", (system.hamiltonian,)),)),
         Kernel("casimirs", "the Casimirs", timeless, (Output("out", casimirs),), role=Role.CASIMIRS),
-        Kernel("vector_field", "pi(x) grad H(x)", inputs, (Output("out", field),)),
+        Kernel("vector_field", formula, inputs, (Output("out", field),)),
         observable_kernel,
     )

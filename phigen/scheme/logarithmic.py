@@ -45,7 +45,7 @@ class Logarithmic:
         return (*increments, ZERO if self._is_negative(flow) else time, power(argument, Fraction(1, 2)))
 
     def time(self, flow: Flow) -> Expression:
-        """Return the duration of the flow of the part of H that is the flow of K over τ."""
+        """Return the time over which the flow of a part of H is the flow of that part of K over τ."""
         return symbol(TIME) * power(self._argument(flow), -1)
 
     def _argument(self, flow: Flow) -> Expression:

@@ -63,9 +63,9 @@ def _power(base: Expression, exponent: Fraction) -> Expression:
 
 
 def _root(base: Expression, degree: int) -> Expression | None:
-    """Return the root of a base by square roots and at most one cube root; None for other degrees.
+    """Return base^(1/degree), written with square roots and at most one cube root; None for degrees not 2^n or 3·2^n.
 
-    Other powers of the base share the roots.
+    Other powers of the same base reuse these roots.
     """
     if degree in (2, 3):
         return raw("pow", (base,), Fraction(1, degree))

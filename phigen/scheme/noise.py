@@ -66,7 +66,10 @@ def driving_times(system: System) -> list[Expression]:
 
 
 def driven(system: System) -> list[Flow]:
-    """Return the flows of the sources over these durations. Raises `SpecError` for a flow that is not elementary."""
+    """Return the flow of each source of noise over its duration σ ΔW, see `driving_times`.
+
+    Raises `SpecError` for a flow that is not elementary.
+    """
     timed_flows = zip(noise_flows(system), driving_times(system), strict=True)
     return [replace(flow, increment=tuple(substitute(flow.increment, {TIME: time}))) for flow, time in timed_flows]
 

@@ -59,7 +59,7 @@ class NewtonPolicy(Policy):
     """Newton's method for the point of an implicit step; its tolerance is in `InnerSolve`."""
 
     nearly_solved: float = number(1e-8, "a correction below this is rounding ...")
-    shrinking: float = number(0.25, "... if it exceeds this fraction of the one before")
+    shrinking: float = number(0.25, "ratio of successive residuals below NEARLY_SOLVED that shows rounding")
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class PathPolicy(Policy):
     difference: float = number(
         1e-7, "difference of arguments in a difference quotient, relative to p: the root of rounding"
     )
-    solved: float = number(4e-16, "a residual below this, relative to p, is rounding;")
-    nearly_solved: float = number(1e-12, "one below this is rounding too ...")
+    solved: float = number(4e-16, "a residual below this, relative to p, is rounding")
+    nearly_solved: float = number(1e-12, "a residual below this may be rounding: see SHRINKING")
     shrinking: float = number(0.25, "... if it exceeds this fraction of the one before")
     contracting: float = number(0.05, "largest reduction factor of the residual by an iteration with a useful Jacobian")
 
@@ -97,10 +97,12 @@ class GaussPolicy(Policy):
     solved: float = number(
         2e-18, "largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs"
     )
-    stalled: float = number(0.8, "sweeps end when a change exceeds this fraction of the one before ...")
-    rounding: float = number(4e-16, "... and is below this; a fraction of 0.4 let Casimirs drift;")
+    stalled: float = number(
+        0.8, "ratio of successive changes from which on sweeps do not help; with 0.4 Casimirs drifted"
+    )
+    rounding: float = number(4e-16, "sweeps end at a change below this with at least the ratio STALLED")
     nearly_rounding: float = number(
-        2e-14, "... or with the second change below this that is not smaller than the one before"
+        2e-14, "sweeps end at the second change below this that is no smaller than the last"
     )
     trials: int = count(32, "steps between comparisons of the predictors; a comparison costs as much as two sweeps")
 
@@ -152,17 +154,21 @@ class GaussTangentPolicy(Policy):
     """Sweeps for the linear equations of the derivatives of Gauss stages."""
 
     tangent_solved: float = number(1e-17, "a relative change below this is rounding;")
-    tangent_nearly_solved: float = number(1e-13, "one below this is rounding too ...")
-    tangent_shrinking: float = number(0.4, "... if it exceeds this fraction of the one before")
+    tangent_nearly_solved: float = number(1e-13, "a residual below this may be rounding: see TANGENT_SHRINKING")
+    tangent_shrinking: float = number(
+        0.4, "ratio of successive residuals below TANGENT_NEARLY_SOLVED that shows rounding"
+    )
 
 
 @dataclass(frozen=True)
 class GaussAdjointPolicy(Policy):
     """Sweeps of the transposed equations of Gauss stages."""
 
-    adjoint_solved: float = number(1e-17, "largest expected change by a further sweep, relative to the cotangents;")
-    adjoint_stalled: float = number(0.8, "a change that exceeds this fraction of the one before ...")
-    adjoint_rounding: float = number(1e-12, "... and is below this is rounding; the second one ends the sweeps")
+    adjoint_solved: float = number(1e-17, "largest expected change by a further sweep, relative to the cotangents")
+    adjoint_stalled: float = number(0.8, "ratio of successive changes from which on sweeps do not help")
+    adjoint_rounding: float = number(
+        1e-12, "sweeps end at the second change below this with at least the ratio ADJOINT_STALLED"
+    )
 
 
 @dataclass(frozen=True)

@@ -192,10 +192,12 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
         problems.add("profile: real: float needs profile: small", reader.locations["profile",], "remove profile")
     if raw.get("structure") is not None and raw.get("scheme") != "gauss":
         message = "structure belongs to scheme: gauss; other schemes are exact Poisson maps"
-        problems.add(message, reader.locations["structure",], "remove structure, or scheme: gauss")
+        problems.add(message, reader.locations["structure",], "remove structure, or set scheme: gauss")
     if raw.get("coordinates_from") is not None and raw.get("scheme") != "splitting":
         message = "coordinates_from belongs to scheme: splitting, whose parts are motions in these coordinates"
-        problems.add(message, reader.locations["coordinates_from",], "scheme: splitting, or remove coordinates_from")
+        problems.add(
+            message, reader.locations["coordinates_from",], "set scheme: splitting, or remove coordinates_from"
+        )
     how = WITHOUT_SERIES.get(raw.get("scheme", ""))
     if how is None:
         return

@@ -95,14 +95,14 @@ def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> li
     """Return the terms without the monomials of the motions; terms that contain none of them are left as written."""
     untouched, remaining = [], []
     for term in terms:
-        shared_monomials = {
+        motion_monomials = {
             m for motion in motions for m in ring.terms(motion.element, ring.state) if _is_of(ring, term, motion)
         }
         monomials = ring.terms(term.element, ring.state)
-        if shared_monomials.isdisjoint(monomials):
+        if motion_monomials.isdisjoint(monomials):
             untouched.append(term)
         else:
-            remaining += [c * ring.monomial(m) for m, c in monomials.items() if m not in shared_monomials]
+            remaining += [c * ring.monomial(m) for m, c in monomials.items() if m not in motion_monomials]
     monomials_left = [t for e in remaining for t in monomial_terms(ring, e)]
     return [*untouched, *joined(ring, monomials_left)]
 

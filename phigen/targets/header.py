@@ -8,6 +8,7 @@ import textwrap
 import unicodedata
 from collections.abc import Callable, Sequence
 
+from phigen.scheme.kernels import field_formula
 from phigen.scheme.program import MAX_NORMAL_VARIATE, Program
 
 CHECKSUM = "body-sha256:"
@@ -60,8 +61,7 @@ def _kind(program: Program) -> str:
 
 def right_hand_side(program: Program) -> str:
     """Return the formula of the vector field, with the forces if there are any."""
-    at = "(t, x)" if program.time else "(x)"
-    return f"pi(x) (grad H{at} + zeta{at}) + f{at}" if program.forced else f"pi(x) grad H{at}"
+    return field_formula(timed=bool(program.time), forced=program.forced)
 
 
 def facts(

@@ -121,11 +121,11 @@ def _storing(
 
 @dataclass(frozen=True)
 class BondLoop:
-    """A function for sums over bonds or pairs, on the level of sites, with its further ``arguments`` by rows.
+    """A function that sums over the bonds or pairs of a site, and the ``arguments`` of its loop over a row segment.
 
-    ``oriented`` is as in `Reading`. The possible arguments are ``at_bonds`` (the parameters at bonds), ``sign`` (the
-    sign of the direction of bonds) and ``across`` (a flag that the sites of the swept colour are at the other ends of
-    the bonds).
+    ``oriented`` are the parameters at bonds that change sign when a bond is read from its end b. Arguments, besides
+    coef and row, may be ``at_bonds`` (the arrays of parameters at bonds), ``sign`` (the sign of the direction of bonds)
+    and ``across`` (a flag that the sites of the swept colour are at the other ends of the bonds).
     """
 
     function: ir.Function

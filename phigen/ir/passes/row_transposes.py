@@ -239,14 +239,14 @@ def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
     head += [_pointer("bar", "bar", k, None, ir.Pointer(constant=False)) for k in sorted(bars)]
     shares = [k for k, s in enumerate(updates) if isinstance(s, ir.Reduce)]
     head += [_zero(f"share{k}") for k in shares]
-    over = _over_bonds if layout.lattice.step.others.graph else _over_pairs
+    loop_over_partners = _over_bonds if layout.lattice.step.others.graph else _over_pairs
     totals = (
         ir.Assign(ir.entry(SUMS, s.number), ir.fixed(f"share{k}"), adds=True)
         for k, s in enumerate(updates)
         if isinstance(s, ir.Reduce)
     )
     parameters = (*[p for p in transpose.function.parameters if p == "coef"], "row", "sums")
-    return row_function(transpose.function, *parameters, body=(*head, over(transpose, rows), *totals))
+    return row_function(transpose.function, *parameters, body=(*head, loop_over_partners(transpose, rows), *totals))
 
 
 def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:

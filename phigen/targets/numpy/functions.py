@@ -26,7 +26,7 @@ def called(program: Program) -> list[str]:
 
 
 def _exponentials(program: Program) -> list[str]:
-    """Return the matrix exponential; [] if ``prepare`` does not call it."""
+    """Return the text of the matrix exponential; [] if ``prepare`` does not call it."""
     if not special.largest_exponential(program):
         return []
     values = {"adjoint": special.transposes_exponentials(program), **special.exponential_constants()}
@@ -34,7 +34,7 @@ def _exponentials(program: Program) -> list[str]:
 
 
 def _anomaly() -> str:
-    """Return the universal anomaly of Kepler motions."""
+    """Return the text of the function that computes the universal anomaly of Kepler motions."""
     c2, c3 = ([repr(float(c)) for c in reversed(series)] for series in special.stumpff())
     others = list(zip(c2[1:], c3[1:], strict=True))
     values = {"c2_last": c2[0], "c3_last": c3[0], "others": others, **special.anomaly_values()}

@@ -5,7 +5,7 @@
 /* Sweeps iterate some unknowns, and read integrals of their increments: the other unknowns follow from these. */
 #define PHI_READ(r) phi_iterated[phi_reads[r]] /* the unknown whose increments a value is the integral of */
 
-/* The factors of a stage that a sweep reads: its weight and time, and the step. */
+/* Set the factors of each stage that a sweep reads: its weight, its time and h. */
 static inline void phi_set_factors(double h, phi_lanes factors[PHI_FACTORS])
 {
     for (int i = 0; i < PHI_NODES; ++i) factors[0][i] = h * phi_weights[i];

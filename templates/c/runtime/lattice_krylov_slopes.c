@@ -3,7 +3,11 @@
 #include "lattice.h"
 #include "model.h"
 
-/* to = v - (derivative of a sweep at s->y[now], or its transpose) v. */
+#if PHI_ADJOINT
+/* to = v - J v, where J is the derivative of a sweep by y at s->y[now]; its transpose in a reverse pass (s->side). */
+#else
+/* to = v - J v, where J is the derivative of a sweep by y at s->y[now]. */
+#endif
 static void phi_multiply(const phi_solver *s, const double *coef, int now, double *const *v, double *const *to)
 {
     const size_t units = phi_units(s);

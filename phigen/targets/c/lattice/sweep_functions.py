@@ -321,10 +321,11 @@ def _arrays(order: tuple[str, ...], arrays: Sequence[ir.Value]) -> ir.Declare:
 
 
 def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[tuple[ir.Function, row_drivers.Sites]]:
-    """Return the loops, each with the sites for which it is called.
+    """Return the loops, each with the sites for which it is called; a loop may occur twice.
 
-    There is one loop for all sites, or for all sites away from boundary seams. With open ends there may be two: for
-    sites away from the ends, and for sites near them.
+    Without open ends there is one loop, for all sites. With boundary seams it is for the sites away from them, or for
+    those near them at both ends of a row. With open ends there may be two loops: for sites away from the ends, and for
+    sites near them.
     """
     if sweep and beside_seams(sweep):
         return [(loops[0], sites) for sites in ((AWAY,) if sweep.inside else (FIRST_SITES, LAST_SITES))]
