@@ -650,16 +650,16 @@ def test_the_runtime_is_the_one_that_the_theorems_are_about() -> None:
     expect_phrases(
         "kowalevski_gauss",
         {
-            "collocate": ("square * (past->rate * past->rate) <= SOLVED * SOLVED", "element_scale = 1.0"),
+            "collocate": ("square * (past->rate * past->rate) <= SOLVED * SOLVED",),
             "judge": (
                 "slow && change <= ROUNDING",
                 "rate > fmax(STALLED, 1.5 * *usual)",
                 "change <= NEARLY_ROUNDING",
             ),
             "change_of": (
-                "(now[lane] - old[lane]) * (now[lane] - old[lane])",
-                "sum[lane] *= scale / element_scale",
-                "return element_scale * (total(sum) / (double)NODES)",
+                "(after[k][i] - before[k][i]) * (after[k][i] - before[k][i])",
+                "if (k + 1 == PLAIN) sum[i] *= 1.0 / square",
+                "return total(sum) / (double)NODES",
             ),
         },
     )
