@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 32ee8568c1198757515d42d8bcb9b492b01bc32f86b87da201d1057e486b64f9
+ * body-sha256: ef0d8587f68dced3731747673888ab0e032f650e1b82738e1e038c6263a6f12f
  */
 #include "duffing.h"
 #include <float.h>
@@ -196,7 +196,7 @@ static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[d
 /* ---- Predictors ---- */
 #define duffing_REACH 4.0 /* largest distance from the last value, relative to it */
 
-/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
+/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
 static int duffing_predict(const duffing_history *history, double value[duffing_DIM])
 {
@@ -235,8 +235,8 @@ static void duffing_remember(duffing_history *history, const double value[duffin
 #define duffing_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
-   at another energy, and unrelated to the motion. */
+/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
+   equation may have solutions far away, at another energy, unrelated to the motion. */
 static int duffing_plausible(const duffing_solver *s, const double increment[duffing_DIM])
 {
     double distance = 0.0, size = 0.0, field[duffing_DIM], point[duffing_DIM], H[3];
@@ -248,7 +248,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
     duffing_vector_field(&s->params, s->t, s->x, field);
     for (int i = 0; i < duffing_DIM; ++i) size += fabs(s->h * field[i]);
     if (distance <= duffing_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
         for (int i = 0; i < duffing_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = duffing_hamiltonian(&s->params, s->t, point);
     }
@@ -263,7 +263,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 #define duffing_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
 #define duffing_SHRINKING 0.25     /* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 
-/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
 static double duffing_size(const double y[duffing_DIM], const double delta[duffing_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -277,8 +277,8 @@ static double duffing_size(const double y[duffing_DIM], const double delta[duffi
 }
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
-   last correction changes the increment to first order, without another evaluation: it is accepted if the
-   remaining error, quadratic in it, is below duffing_TOLERANCE. */
+   effect of the last correction on the increment is added to first order, without another evaluation. So a
+   solution is accepted if its error, quadratic in the last correction, is below duffing_TOLERANCE. */
 static duffing_status duffing_attempt(duffing_solver *s)
 {
     double y[duffing_DIM], delta[duffing_DIM], displacement[duffing_DIM], increment[duffing_DIM];
@@ -336,13 +336,13 @@ duffing_status duffing_init(duffing_solver *s, const duffing_params *params, con
     return duffing_init_at(s, params, x0, 0.0);
 }
 
-/* Compute the coefficients of the next step that depend on the time or on the noise. */
+/* For the stages of the next step, compute the coefficients that differ from step to step. */
 static void duffing_renew(duffing_solver *s)
 {
     duffing_at_time(s->coef, s->t + duffing_middles * s->h, s->coef + duffing_PREPARED);
 }
 
-/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
 static duffing_status duffing_stage(duffing_solver *s)
 {
     const duffing_status status = duffing_attempt(s);

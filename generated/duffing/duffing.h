@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6f215c0bce3c29ce9edef9c33dba0fb4e844d93ef515afbde2a29f1afdc40ca8
+ * body-sha256: 86ff4399cc1ed4535e1b185c3e29a656b2b2d2e69872cc38cf22a77eabd21a80
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -55,11 +55,11 @@ typedef struct {
 size_t duffing_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t duffing_solver_steps_done(const duffing_solver *s);
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. duffing_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns duffing_BAD_ARGUMENT, with *s unchanged,
+   if a value or a coefficient is not finite, or a parameter that must be positive is not. */
 duffing_status duffing_init(duffing_solver *s, const duffing_params *params, const double x0[duffing_DIM]);
 
-/* The same at the time t0; duffing_init starts at the time 0. */
+/* As duffing_init, at the time t0; duffing_init starts at the time 0. */
 duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, const double x0[duffing_DIM],
     double t0);
 
@@ -67,17 +67,17 @@ duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, 
 duffing_status duffing_step(duffing_solver *s, double h);
 duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. duffing_BAD_ARGUMENT,
-   with *s unchanged, if the new state is not finite. */
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
+   duffing_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM]);
 duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
-   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
+   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 duffing_status duffing_ensemble(const duffing_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 
-/* The same from the time t0 on; duffing_ensemble starts at the time 0. */
+/* duffing_ensemble from the time t0 on; duffing_ensemble starts at the time 0. */
 duffing_status duffing_ensemble_at(const duffing_params *params, double *x, size_t members, double t0,
     double h, size_t steps, unsigned char *status);
 

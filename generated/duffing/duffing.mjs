@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cc9aa3c845a92e4d16626f10d7fbe0ea7bc1c1788bb62b5cf58d197d89356cb6
+ * body-sha256: 9b90df6a5ce99bd2ee1d34f3b336bdf8e7ffc384367b48032c64ca2f4ce4a814
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -47,12 +47,12 @@ const FRACTIONS = [1.0];
 const MIDDLES = [0.5];
 
 /**
- * Coefficients that depend on parameters and step size only; after them, those that also depend on
- * the time.
+ * The number of coefficients that depend on parameters and step size only. After them come those that also
+ * depend on the time.
  */
 const PREPARED = 22;
 
-/** Coefficients. */
+/** Number of all coefficients. */
 const COEFFICIENTS = 33;
 
 /** Largest number of iterations of an implicit step. */
@@ -204,11 +204,11 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
+/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps good steps until then
+   * @param {number} steps number of successful steps before
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {
@@ -258,7 +258,7 @@ const OPTIONS = "x0 params t0".split(" ");
 
 /**
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
- * where required, and give finite coefficients for a negligibly small step.
+ * where required, and the coefficients of a very small step are finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -295,13 +295,13 @@ export class Solver {
   t;
   /** Number of successful steps since the start. */
   steps = 0;
-  /** Number of evaluations of the step equations, or of explicit stages, for statistics. */
+  /** Number of evaluations of the step equations, for statistics. */
   evaluations = 0;
   /** Size of the last step. */
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size; then those of the time or noise. */
+  /** Coefficients of each stage: functions of parameters and step size, then those of the time too. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
@@ -372,12 +372,12 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state. Predictors may start anew.
+   * Return an independent solver with the same state.
    *
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
+    const { x: x0, params, gauge, seed, member, step0 } = this; // some may be undefined
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -386,8 +386,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws
-   * StepError for values that are not admissible; then nothing changes.
+   * Between steps: change parameters; all else is unchanged. Throws StepError for values that are not
+   * admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
@@ -412,7 +412,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change to the state, such as an impulse; otherwise as setState.
+   * Between steps: add a change, such as an impulse, to the state. Throws StepError as setState does.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -430,7 +430,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Replace the state by x + carry. */
+  /** Replace the state by x with the rounding error carry. */
   #place(x, carry) {
     shiftHistory(this, x);
     this.x.set(x);
@@ -439,15 +439,15 @@ export class Solver {
   }
 
   /**
-   * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
-   * they have another length.
+   * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
+   * h, parameters and t0 may be arrays with a number for each state. Throws StepError if an array has another
+   * length.
    *
-   * @param {Iterable<ArrayLike<number>>} members
-   * @param {number | ArrayLike<number>} h
-   * @param {number} count
+   * @param {Iterable<ArrayLike<number>>} members initial states
+   * @param {number | ArrayLike<number>} h step size
+   * @param {number} count number of steps
    * @param {object} [options] as in the constructor, without x0
-   * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
+   * @returns {{x: Float64Array[], status: string[]}} last states; for each "OK" or the status of the failure
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
@@ -488,7 +488,7 @@ export class Solver {
     return out;
   }
 
-  /** The vector field dx/dt at a state and a time. */
+  /** The vector field dx/dt, at x and its time or at given ones. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorFieldAt(this.params, t, x, out);
@@ -496,17 +496,17 @@ export class Solver {
   }
 }
 
-/** The Hamiltonian at x and the time t. */
+/** Compute the Hamiltonian at x and the time t. */
 function energyAt(params, t, x, out) {
   energy(params, t, x, out);
 }
 
-/** The vector field dx/dt at x and the time t. */
+/** Compute the vector field dx/dt at x and the time t. */
 function vectorFieldAt(params, t, x, out) {
   vectorField(params, t, x, out);
 }
 
-/** Take the time of the initial state from the options of a solver, 0 by default. */
+/** Set the time of the initial state from the options of a solver, 0 by default. */
 function takeTime(solver, options) {
   [solver.t] = finite([options.t0 ?? 0], 1, "t0");
 }
@@ -546,8 +546,8 @@ function restoreState(solver, copies) {
 // ---- The implicit step, by Newton's method ----
 
 /**
- * Size of a correction relative to each component of y, or to FLOOR times the largest if that is more; NaN if
- * the correction is.
+ * The largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|; NaN or infinity if a correction
+ * is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -570,9 +570,9 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
- * last correction changes the increment to first order, without another evaluation: it is accepted if the
- * remaining error, quadratic in it, is below TOLERANCE.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
+ * a status. The effect of the last correction on the increment is added to first order, without another
+ * evaluation. So a solution is accepted if its error, quadratic in the last correction, is below TOLERANCE.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -610,22 +610,22 @@ function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }
 
-/** The coefficients that depend on the time. */
+/** Compute the coefficients that depend on the time; there is no noise dw. */
 function refreshAt(row, t, dw, out) {
   refresh(row, t, out);
 }
 
-/** Compute the coefficients of the next step that depend on the time or on the noise. */
+/** For the stages of the next step, compute the coefficients that differ from step to step. */
 function renew({ coef, t, h, dw }) {
   coef.forEach((row, stage) => refreshAt(row, t + MIDDLES[stage] * h, dw, row.subarray(PREPARED)));
 }
 
-/** Clear the predictor of a stage. */
+/** Clear the predictor of a stage, if it has one. */
 function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Shift the predictors of all stages with the state, to x. */
+/** Shift the predictors of all stages by the change of the state of a solver to x. */
 function shiftHistory(solver, x) {
   for (const history of solver.history) history.shift(solver.x, x);
 }
@@ -638,7 +638,7 @@ function startFrom(history, x, y) {
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution and its backward differences, from which the next one is extrapolated. Affects
+ * Predictor: the last solution and its backward differences, which extrapolate to the next solution. Affects
  * the speed only.
  */
 class History {
@@ -655,7 +655,7 @@ class History {
   }
 
   /**
-   * Shift the last value with the state, after this has been changed; differences are unchanged.
+   * Add the change of the state, to - from, to the last solution; differences are unchanged.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -664,13 +664,13 @@ class History {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 
-  /** The last value. */
+  /** The last solution. */
   last() {
     return Float64Array.from(this.#difference[0]);
   }
 
   /**
-   * Predict the next value by the sum of the differences.
+   * Predict the next solution by the sum of the differences.
    *
    * @param {Float64Array} value is overwritten
    * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
@@ -722,8 +722,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
- * at another energy, and unrelated to the motion.
+ * Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
+ * equation may have solutions far away, at another energy, unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -753,7 +753,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage. If it fails from the predicted value, it is tried again from the state.
+ * Make one stage. If attempt fails from the predicted solution, it is called again without a prediction.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -768,7 +768,7 @@ function retried(solver, stage, attempt) {
   return attempt(solver, stage);
 }
 
-/** Size of the noise in the increments of the state: 0. */
+/** Contribution of noise to the size of an increment of the state: 0, since there is no noise. */
 function sizeOfNoise() {
   return 0;
 }

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a96eb1fe28b573169a1f28b9b120f84fde8e058b727fd9a39a48bff214f3f40b
+# body-sha256: be38fb8a20b480b854587b34b5d14f87665f5df939e7be266c9501574f326f15
 import numpy as np
 
 VERSION = "0.1.0"
@@ -23,7 +23,7 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ("omega",)
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
+# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
 GAUGE = ()
 
 # A step of size h is composed of steps of these fractions of h.
@@ -46,12 +46,12 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the coefficients of some members; a single column belongs to all members."""
+    """Return the columns of coefficients for some members; a single column is that of all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return a stage for some of its members."""
+    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
@@ -64,7 +64,7 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
+    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -91,7 +91,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -101,8 +101,7 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
-    step.
+    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -200,7 +199,7 @@ def _linearise(coef, y):
 
 
 def _solve(matrix, side):
-    """Return the solutions of linear systems, NaN if the matrix is singular."""
+    """Return the solutions of linear systems, one for each member; NaN if its matrix is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -214,9 +213,9 @@ MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Return whether the increments of steps agree with the motion; arrays (members, DIM).
+    """Return for which members the increment from x to end is short, or the change of energy small.
 
-    If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
+    If a step is too large, its equation may have solutions far away, at another energy, unrelated to the motion.
     """
     _, parameters, h, t = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -242,7 +241,7 @@ SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows
 
 
 def _size(y, delta):
-    """Return the size of a correction relative to each component of y, or to FLOOR times the largest if that is more."""
+    """Return the largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|, for each member."""
     scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
 
@@ -250,8 +249,9 @@ def _size(y, delta):
 def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
-    The last correction changes the increment to first order; it is accepted if the remaining error, quadratic in it,
-    is below 1e-20. Returns new x, carry, y, and a status for each member, "" if good.
+    The effect of the last correction on the increment is added to first order, so a solution is accepted if its error,
+    quadratic in the last correction, is below 1e-20. Returns new x, carry, y, and a status for each member, ""
+    if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -266,7 +266,7 @@ def _attempt(coef, x, carry, y):
         status[open_[~finite]] = "NOT_FINITE"
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
-        # Second criterion: corrections no longer shrink, the solve has reached rounding level.
+        # Second criterion: corrections no longer shrink, since they are at rounding level.
         done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
@@ -288,7 +288,7 @@ def _advance(stage, x, carry, memory):
     predicted = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & predicted)
     if len(failed):
-        # A prediction may be bad: repeat from y = x.
+        # Stages that failed from the prediction are made again from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
     return following, rest, (y - x, np.where(predicted[:, np.newaxis], memory[0], y - x)), status
@@ -317,7 +317,8 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def _renewed(stage, t, h):
-    """Return a stage of the step of size h from the time t on, with its time and the coefficients that depend on it."""
+    """Return a stage of the step of size h from the time t on, with the time of its midpoint and with the coefficients
+    that depend on the time."""
     coef, parameters, step, middle = stage
     t = t + middle * h
     coef = _table([*coef, *_refresh(coef, t)])
@@ -337,7 +338,7 @@ def step(x, h, t0=0.0, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: eaf550013be8d830d460fd433c3ff92dcbe1589544f68b1c3cc45f94c7ee9b6f
+ * body-sha256: 4c5e710c32865d636ae2c995717cea8b8aba1f2884406a834237407f9b85f2a5
  */
 #include "food_web.h"
 #include <limits.h>
@@ -34,7 +34,7 @@ static const size_t food_web_least[food_web_AXES] = { 1 };
 /* For each part of H, 1 if it consists of one flow for each colour of sites. */
 static const unsigned char food_web_by_colour[] = { 1 };
 
-/* Part of H of a flow, counted from 1; *flow becomes the colour of the sites that it updates. */
+/* Return the part of H, counted from 1, of a flow; *flow becomes the colour of the sites that it updates. */
 static int food_web_part_of_flow(const food_web_solver *s, int *flow)
 {
     int part = 1;

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 32ab711347963b4d2a012b271427763723619193347f91ed55b5a261d7ba897b
+ * body-sha256: a2c30a9df195db8e9e46e089b01ba68f26577b575339b47f6ee9c33193473157
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -43,7 +43,7 @@ typedef struct {
     double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     int *bonds, *middle; /* for each site, index in other of the first bond from it, and to it */
     int *other, *number; /* for each of these, the site at the other end, and the number of the bond */
-    double *at_bonds[food_web_BOND_ARRAYS]; /* for each of these, parameters at bonds */
+    double *at_bonds[food_web_BOND_ARRAYS]; /* for each entry of other, the parameters at the bond */
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
     int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e59a94e35bcfd23d60f9a477e9bb5e53c7b50f2fb2f42c2524408622a2e9e04f
+# body-sha256: 48639228b4454b163fd37d03face74ea185d02c9f3136fe3a721139c9322d4b8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -30,8 +30,8 @@ OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
 
-# The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
-# part of H, and its row.
+# The times of flows, as fractions of a step: one for each row of coefficients. The flows of a step in order, each as (part
+# of H, row).
 TIMES = (0.0792036964311957, 0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498, 0.2193769557534996, 0.1096884778767498, 0.434336666566456, 0.3246481886897062, -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 8), (1, 9), (2, 10), (3, 11), (0, 12), (1, 13), (2, 14), (3, 15), (0, 16), (1, 17), (2, 18), (3, 19), (0, 20), (1, 21), (2, 22), (3, 23), (0, 24))
@@ -40,7 +40,7 @@ SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, NOT_FINITE; states: the frames so far.
+    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the frames so far.
     """
 
     def __init__(self, step, status, states):
@@ -52,7 +52,7 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Error in a step: the status."""
+    """Error in a step; its argument is the status."""
 
 
 def _finite(values):
@@ -87,7 +87,7 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """() for a parameter with one value."""
+        """Return the shape of the values of a parameter: () for one value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
@@ -116,7 +116,7 @@ AT_BONDS = ("A",)
 
 
 class _Graph(_Sites):
-    """The sites of a graph: each of the bonds runs from a site a to a site b."""
+    """The sites of a graph and its bonds, each from a site a to a site b."""
 
     def __init__(self, shape, parameters):
         parameters = dict(parameters)
@@ -128,12 +128,15 @@ class _Graph(_Sites):
         super().__init__(shape, parameters)
 
     def shape_of(self, parameter):
-        """() for a parameter with one value."""
+        """Return the shape of the values of a parameter: () for one value."""
         return (len(self.ends),) if parameter in AT_BONDS else super().shape_of(parameter)
 
     def bonds(self, end, chosen):
-        """Return the bonds of all sites that are their end a, or b, or either: the site itself, the site at the
-        other end, the number of the bond."""
+        """Return three arrays over bonds with end a or b, or over both ends ("") of all bonds: the site here at that
+        end, the site there at the other end, the number of the bond.
+
+        With chosen "here" or "there", only bonds whose site here or there has the present colour.
+        """
         key = (end, chosen, chosen and self.colour)
         if key not in self._known:
             ways = [self.ends[:, ::way] for name, way in (("a", 1), ("b", -1)) if end in ("", name)]
@@ -146,12 +149,12 @@ class _Graph(_Sites):
         return self._known[key]
 
     def summed(self, values, here):
-        """Return sums at sites over the values of bonds."""
+        """Return, for each site, the sum of the values of its bonds; here is the site of each value."""
         return np.bincount(here, np.broadcast_to(values, here.shape), self.sizes[0])
 
 
-# For each part of H, whether it consists of one flow for each colour of sites. In SCHEDULE 0 is the first flow of a
-# step, 1 all inner ones, 2 the last, 3 the inner ones in reverse order.
+# For each part of H, whether it consists of one flow for each colour of sites. In SCHEDULE, 0 is the first flow of a
+# step, 1 all inner flows, 2 the last flow, 3 all inner flows in reverse order.
 BY_COLOUR = (True,)
 
 
@@ -179,7 +182,7 @@ class _Coloured(_Graph):
 
 
 def _advance(sites, rows, x, past):
-    """Make one step; raises FailedError. There is no predictor."""
+    """Make one step; raises FailedError. `past` is unused: nothing is predicted."""
     for (part, sites.colour), row in sites.schedule:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -240,7 +243,7 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the densities of the Casimirs (CASIMIRS, *sizes)."""
+    """Return the terms of the Casimirs at each site, (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 

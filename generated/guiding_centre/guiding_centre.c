@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 70573ca27ad1e42deba02f5a260d5652af2669da77a3db090c0ac71dd740a295
+ * body-sha256: f0b2917216447b6177f1a2214481147c846684890008a4ebde6f50f72ec89362
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -178,7 +178,7 @@ static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centr
 /* ---- Predictors ---- */
 #define guiding_centre_REACH 4.0 /* largest distance from the last value, relative to it */
 
-/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
+/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
 static int guiding_centre_predict(const guiding_centre_history *history, double value[guiding_centre_DIM])
 {
@@ -217,8 +217,8 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
 #define guiding_centre_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
-   at another energy, and unrelated to the motion. */
+/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
+   equation may have solutions far away, at another energy, unrelated to the motion. */
 static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
     const double increment[guiding_centre_DIM])
 {
@@ -232,7 +232,7 @@ static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
     for (int i = 0; i < guiding_centre_DIM; ++i)
         size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
     if (distance <= guiding_centre_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
         for (int i = 0; i < guiding_centre_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = guiding_centre_hamiltonian(&s->params, point);
     }
@@ -247,7 +247,7 @@ static double guiding_centre_taylor_product(const double *a, const double *b, in
     return sum;
 }
 
-/* Coefficient k >= 1 of the Taylor series of b = a^r, times a[0]: a b' = r a' b. */
+/* a[0] times coefficient k >= 1 of the Taylor series of b = a^r, from a b' = r a' b. */
 static double guiding_centre_taylor_power(const double *a, const double *b, double r, int k)
 {
     double sum = 0.0;
@@ -443,7 +443,8 @@ static void guiding_centre_path_field(const double *coef, const double p[4], con
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
     guiding_centre_LONGEST_PATH = 128, /* largest number of pieces of a path, a power of 2 */
-    /* ... of all paths of a solve: steps that need more have errors of the size of the state */
+    /* largest number of pieces of all paths of a solve; steps that need more have errors of the size of the
+       state */
     guiding_centre_MOST_PIECES = 512,
     /* iterations with the approximate Jacobian before its contraction is checked */
     guiding_centre_PATIENCE = 3,
@@ -462,9 +463,8 @@ enum {
 /* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define guiding_centre_CONTRACTING 0.05
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope. An expansion with gaps
-   between its terms, like t + t^9, or across the kink of an absolute value, may only seem to have
-   converged. */
+/* Whether the slope of an expansion at a point m is pi(m) p. If not, the expansion only seems to have
+   converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value. */
 static int guiding_centre_holds(const double *coef, const double p[guiding_centre_DIM],
     const double m[guiding_centre_DIM], const double slope[guiding_centre_DIM])
 {
@@ -476,8 +476,9 @@ static int guiding_centre_holds(const double *coef, const double p[guiding_centr
     return 1;
 }
 
-/* Path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m - start.
-   The size of the terms decides their number. Returns 0 if guiding_centre_TERMS terms do not suffice. */
+/* Compute the path m(t) from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start, mean the mean
+   of m - start. Terms are added until they are negligible. Returns 0 if guiding_centre_TERMS terms do not
+   suffice. */
 static int guiding_centre_piece(const double *coef, const double p[guiding_centre_DIM],
     const double start[guiding_centre_DIM], double change[guiding_centre_DIM],
     double mean[guiding_centre_DIM])
@@ -509,9 +510,9 @@ static int guiding_centre_piece(const double *coef, const double p[guiding_centr
     return 0;
 }
 
-/* Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path
-   lies on the symplectic leaf of x. Returns 0 if the path is too long or leaves the domain. *made counts all
-   pieces. */
+/* Compute the whole path from x, in 1, 2, 4, ... pieces until each expansion converges: change is its end
+   minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x. Returns 0
+   if the path is too long or leaves the domain. *made counts all pieces. */
 static int guiding_centre_path(const double *coef, const double x[guiding_centre_DIM],
     const double p[guiding_centre_DIM], double change[guiding_centre_DIM], double mean[guiding_centre_DIM],
     int *pieces_used)
@@ -538,8 +539,9 @@ static int guiding_centre_path(const double *coef, const double x[guiding_centre
     return 0;
 }
 
-/* Residual p - grad S_h(mean) of the equation for p, where mean is that of the path; also the change of x
-   along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
+/* Compute the residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the
+   change of x along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be
+   followed. */
 static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
     const double p[guiding_centre_DIM], double y[guiding_centre_DIM], double residual[guiding_centre_DIM],
     double change[guiding_centre_DIM], double jacobian[guiding_centre_DIM * guiding_centre_DIM],
@@ -554,7 +556,8 @@ static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
     return 1;
 }
 
-/* Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
+/* Compute the Jacobian of the residual by differences, for steps so large that iterations with the
+   approximate Jacobian do not converge. */
 static int guiding_centre_differences(guiding_centre_solver *s, const double *coef,
     const double p[guiding_centre_DIM], const double residual[guiding_centre_DIM],
     double jacobian[guiding_centre_DIM * guiding_centre_DIM], int *pieces_used)
@@ -572,8 +575,8 @@ static int guiding_centre_differences(guiding_centre_solver *s, const double *co
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x with covector p), and move to the end of that path. If that
-   needs more than guiding_centre_MOST_PIECES pieces, the step is too large for a meaningful solution. */
+/* Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path. A step
+   that needs more than guiding_centre_MOST_PIECES pieces is too large for a meaningful solution. */
 static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -630,7 +633,7 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     return guiding_centre_OK;
 }
 
-/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
 static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int stage)
 {
     const guiding_centre_status status = guiding_centre_attempt(s, stage);

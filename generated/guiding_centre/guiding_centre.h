@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 84c70c662dd485cbb28afc8cb8a0c854952b5a2ec3d7db0f8eb2c5394dd2d613
+ * body-sha256: e0433f23e7e8e3ea272eeff688455e776588fd4decbf32b848d214fda59cdf08
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -59,8 +59,8 @@ typedef struct {
 size_t guiding_centre_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s);
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. guiding_centre_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns guiding_centre_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM]);
 
@@ -68,13 +68,13 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
 guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h);
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
    guiding_centre_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const double x[guiding_centre_DIM]);
 guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
-   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
+   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: cdddbcd1a023b1b79d86375d2463dbe3441a4a39e8a59922e3638952735493a4
+# body-sha256: 300658cb90d7de5d08f28ae4103ce810f69b37cf1091851d422551e844a726ce
 import numpy as np
 
 VERSION = "0.1.0"
@@ -25,7 +25,7 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ("mu", "k",)
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
+# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
 GAUGE = ()
 
 # A step of size h is composed of steps of these fractions of h.
@@ -48,12 +48,12 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the coefficients of some members; a single column belongs to all members."""
+    """Return the columns of coefficients for some members; a single column is that of all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return a stage for some of its members."""
+    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
@@ -66,7 +66,7 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
+    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -93,7 +93,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -103,8 +103,7 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
-    step.
+    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -175,7 +174,7 @@ def _generate(coef, y):
 
 
 LONGEST_PATH = 128  # largest number of pieces of a path, a power of 2
-MOST_PIECES = 512  # ... of all paths of a solve: steps that need more have errors of the size of the state
+MOST_PIECES = 512  # largest number of pieces of all paths of a solve; steps that need more have errors of the size of the state
 PATIENCE = 3  # iterations with the approximate Jacobian before its contraction is checked
 NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are rounding
 LEAST_SHARE = 1e-5  # smaller coordinates are measured relative to this fraction of their sum
@@ -188,9 +187,9 @@ CONTRACTING = 0.05  # largest reduction factor of the residual by an iteration w
 
 
 def _holds(coef, p, m, slope):
-    """Return for which members dm/dt = pi(m) p holds at m, where the expansion has the given slope.
+    """Return for which members the slope of an expansion at m is pi(m) p.
 
-    An expansion with gaps between its terms, like t + t**9, or across a kink may only seem to have converged.
+    Others only seem to have converged: an expansion has gaps between its terms, as t + t**9, or extends across a kink.
     """
     e = [m[:, i] for i in range(DIM)] + [None] * (55 - DIM)
     e[4] = coef[4] * e[0]
@@ -260,12 +259,12 @@ def _product(a, b, k):
 
 
 def _chain(a, d, k):
-    """Return coefficient k >= 1 of the Taylor series of f(a); d is the series of f'(a): f(a)' = f'(a) a'."""
+    """Return coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'; d is the series of f'(a)."""
     return sum(j * a[j] * d[k - j] for j in range(1, k + 1)) / k
 
 
 def _power(a, b, r, k):
-    """Return coefficient k >= 1 of the Taylor series of b = a**r, times a[0]: a b' = r a' b."""
+    """Return a[0] times coefficient k >= 1 of the Taylor series of b = a**r, from a b' = r a' b."""
     return sum(((r + 1.0) * j - k) * a[j] * b[k - j] for j in range(1, k + 1)) / k
 
 
@@ -399,10 +398,9 @@ def _piece(coef, p, start):
 
 
 def _path(coef, x, p):
-    """Return the whole path in 1, 2, 4, ... pieces until each expansion converges: change of x, mean of m - x,
-    pieces made.
+    """Return the change of x along the whole path from x, the mean of m - x, and the number of pieces computed.
 
-    NaN if the path is too long or leaves the domain.
+    The path is cut into 1, 2, 4, ... pieces until each expansion converges. NaN if it is too long or leaves the domain.
     """
     change, mean, pieces_used = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))
@@ -430,10 +428,10 @@ def _residual(coef, x, p):
 
 
 def _differences(coef, x, p, residual):
-    """Return the Jacobian by differences, for steps so large that the approximate one does not contract; and the
-    number of pieces.
+    """Return the Jacobian of the residual by differences, and the number of pieces of all paths.
 
-    NaN where a path cannot be followed.
+    It serves for steps so large that iterations with the approximate Jacobian do not converge. NaN where a path cannot
+    be followed.
     """
     jacobian, pieces_used = np.full((len(x), DIM, DIM), np.nan), np.zeros(len(x), dtype=int)
     norm = np.max(np.abs(p), axis=-1) + np.finfo(float).tiny
@@ -451,7 +449,7 @@ def _differences(coef, x, p, residual):
 
 
 def _solve(matrix, side):
-    """Return the solutions of linear systems, NaN if the matrix is singular."""
+    """Return the solutions of linear systems, one for each member; NaN if its matrix is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -465,9 +463,9 @@ MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Return whether the increments of steps agree with the motion; arrays (members, DIM).
+    """Return for which members the increment from x to end is short, or the change of energy small.
 
-    If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
+    If a step is too large, its equation may have solutions far away, at another energy, unrelated to the motion.
     """
     _, parameters, h = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -488,10 +486,10 @@ def _solved(stage, x, carry, prediction):
 
 
 def _attempt(coef, x, carry, p):
-    """Solve p = grad S_h(mean of the path from x with covector p), and move to its end; arrays (members, DIM).
+    """Solve p = grad S_h(mean of the path from x with covector p), and move to the end of the path.
 
-    If that needs more than MOST_PIECES pieces, the step is too large for a meaningful solution. Returns new x,
-    carry, p, and a status for each member, "" if good.
+    Arrays are (members, DIM). A step that needs more than MOST_PIECES pieces is too large for a meaningful solution.
+    Returns new x, carry, p, and a status for each member, "" if good.
     """
     x, carry, p = x.copy(), carry.copy(), p.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -503,7 +501,7 @@ def _attempt(coef, x, carry, p):
         norm = np.max(np.abs(p[open_]), axis=-1) + np.finfo(float).tiny
         size = np.max(np.abs(residual), axis=-1) / norm
         finite = np.isfinite(residual).all(axis=-1)
-        # Second criterion: residuals no longer shrink, the solve has reached rounding level.
+        # Second criterion: residuals no longer shrink, since they are at rounding level.
         done = (size <= SOLVED) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -534,7 +532,7 @@ def _advance(stage, x, carry, memory):
     predicted = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & predicted)
     if len(failed):
-        # A prediction may be bad: repeat from p = 0.
+        # Stages that failed from the prediction are made again from p = 0.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], np.zeros_like(x[failed]))
         following[failed], rest[failed], p[failed], status[failed] = again
     return following, rest, (p, np.where(predicted[:, np.newaxis], memory[0], p)), status
@@ -546,7 +544,7 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -570,7 +568,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 

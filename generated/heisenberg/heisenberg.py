@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 6b7753c43ac12d7725c35ca0368b0cb36c221bac99e3968f65d975a3878627e0
+# body-sha256: cdccd81db0383604aabc9e9df9d1414c79825ab76f49a8fe2ff964e0122eaf4e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -30,8 +30,8 @@ OPEN = (False, False, False,)
 LEAST = (2, 2, 2,)
 PERIODS = (1, 1, 1,)
 
-# The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
-# part of H, and its row.
+# The times of flows, as fractions of a step: one for each row of coefficients. The flows of a step in order, each as (part
+# of H, row).
 TIMES = (0.5, 0.5, 1.0, 0.5, 0.5,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (1, 3), (0, 4))
@@ -40,7 +40,7 @@ SCHEDULE = ((0, 0), (1, 1), (2, 2), (1, 3), (0, 4))
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, NOT_FINITE; states: the frames so far.
+    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the frames so far.
     """
 
     def __init__(self, step, status, states):
@@ -52,7 +52,7 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Error in a step: the status."""
+    """Error in a step; its argument is the status."""
 
 
 def _finite(values):
@@ -87,7 +87,7 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """() for a parameter with one value."""
+        """Return the shape of the values of a parameter: () for one value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
@@ -112,7 +112,7 @@ class _Sites:
 
 
 def _advance(sites, rows, x, past):
-    """Make one step; raises FailedError. There is no predictor."""
+    """Make one step; raises FailedError. `past` is unused: nothing is predicted."""
     for part, row in SCHEDULE:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -173,7 +173,7 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the densities of the Casimirs (CASIMIRS, *sizes)."""
+    """Return the terms of the Casimirs at each site, (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 

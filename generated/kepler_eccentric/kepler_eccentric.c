@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0) and the monitor dt/dtau; The
  *   solver
- * body-sha256: 4e5820741cf2cd1c9fecedf2dc7ef10d7cdde885503ed83513f3bec1534e3615
+ * body-sha256: bea06dd15f99ed0e83351562046189e7b149d94108e87583ea17b8be59528242
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -22,7 +22,7 @@ const kepler_eccentric_params kepler_eccentric_default_params = { 1e-06 };
 enum { kepler_eccentric_ROWS_OF_FLOWS = 35 }; /* times of flows in a step, each with its coefficients */
 enum { kepler_eccentric_ROW = 4 };            /* coefficients for one of them */
 
-/* The times of the flows of one step, as fractions of h; each has a row of coefficients. */
+/* The times of flows, as fractions of h: one for each row of coefficients. */
 static const double kepler_eccentric_times[kepler_eccentric_ROWS_OF_FLOWS] = { 0.06510124154444503,
     0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727,
     -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757,
@@ -202,7 +202,7 @@ static inline void kepler_eccentric_flows(const double *coef, double x[6], doubl
     }
 }
 
-/* The coefficients of all flows of a step: a row for each time. */
+/* Compute the coefficients of all flows of a step: a row for each time. */
 static void kepler_eccentric_prepare(const kepler_eccentric_params *params,
     const double gauge[kepler_eccentric_GAUGES], double h, double *coef)
 {
@@ -241,7 +241,7 @@ static void kepler_eccentric_choose_gauge(const kepler_eccentric_params *params,
     gauge[0] = -kepler_eccentric_hamiltonian(params, x);
 }
 
-/* Whether the monitor is positive at a state, so that the physical time increases with tau. */
+/* Whether the monitor is positive and finite at a state, so that the physical time increases with tau. */
 static int kepler_eccentric_time_passes(const kepler_eccentric_params *params,
     const double x[kepler_eccentric_DIM])
 {
@@ -300,8 +300,8 @@ kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double
     return kepler_eccentric_integrate(s, h, 1);
 }
 
-/* Set the energy level after the state was moved to s->x. Returns 0, with the former state, if that has
-   none. */
+/* Set the energy level to that of the new state s->x. Returns 0, with the former state, if the new state is
+   not admissible. */
 static int kepler_eccentric_take_level(kepler_eccentric_solver *s, const double from[kepler_eccentric_DIM],
     const double carry[kepler_eccentric_DIM])
 {

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1c575acfe5074c0f493c790c8a651fe864e20bca091ffdbf9f6e682a706d74cb
+ * body-sha256: 2489061c3136a237f6924d338249f4d438885824beca5639963dac4898589f08
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -39,7 +39,7 @@ typedef struct {
     double x[kepler_eccentric_DIM];     /* the state; change it only by the functions below */
     double carry[kepler_eccentric_DIM]; /* rounding error of x: x + carry is more accurate */
     size_t steps;                       /* number of successful steps since kepler_eccentric_init */
-    size_t evaluations;                 /* number of computed stages (splitting: of steps), for statistics */
+    size_t evaluations;                 /* number of computed steps, for statistics */
     /* physical time since kepler_eccentric_init, t + t_carry; steps are equal in tau, not t */
     double t, t_carry;
     double h;                       /* size of the last step; NaN before the first step */
@@ -52,9 +52,9 @@ size_t kepler_eccentric_solver_size(void); /* bytes; for languages that cannot r
 size_t kepler_eccentric_solver_steps_done(const kepler_eccentric_solver *s);
 double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. kepler_eccentric_BAD_ARGUMENT, with
-   *s unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
-/* Also if kepler_eccentric_monitor is not positive at x0. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns kepler_eccentric_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
+/* It returns the same if kepler_eccentric_monitor is not positive at x0. */
 kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM]);
 
@@ -69,7 +69,7 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
 kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double h);
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
    kepler_eccentric_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 /* The energy level e becomes -H of the new state, at which kepler_eccentric_monitor must be positive. */
 kepler_eccentric_status kepler_eccentric_set_state(kepler_eccentric_solver *s,
@@ -77,8 +77,8 @@ kepler_eccentric_status kepler_eccentric_set_state(kepler_eccentric_solver *s,
 kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
     const double change[kepler_eccentric_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
-   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
+   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 kepler_eccentric_status kepler_eccentric_ensemble(const kepler_eccentric_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
 

@@ -7,7 +7,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: cbe6cbdc6cf06db9f879288b2ff1efeb8aaf6fdd62da7ec818d8815f905551eb
+# body-sha256: 8dc538360edc7e56664b8bfec40fd48b02b14e09d1d7861f54867705951f78b6
 import numpy as np
 
 VERSION = "0.1.0"
@@ -23,7 +23,7 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ()
 
-# Constant of a trajectory: the energy level e = -H(x0), see gauge().
+# Name of the constant of a trajectory that gauge() returns: the energy level e = -H(x0).
 GAUGE = ("e",)
 
 # A step of size h is composed of steps of these fractions of h.
@@ -46,12 +46,12 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the coefficients of some members; a single column belongs to all members."""
+    """Return the columns of coefficients for some members; a single column is that of all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return a stage for some of its members."""
+    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
@@ -64,7 +64,7 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
+    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -91,7 +91,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -101,8 +101,7 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
-    step.
+    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -152,8 +151,8 @@ def _flow2(coef, state):
         ])
 
 
-# The times of the flows of one step, as fractions of h, each with a row of coefficients; and the flows in order: the
-# part of H, and its row.
+# The times of flows, as fractions of h: one for each row of coefficients. The flows of a step in order, each as (part of
+# H, row).
 TIMES = (0.06510124154444503, 0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727, -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757, -0.10568212657746093, 0.1845396409783157, 0.22145701433231887, 0.25837438768632204, 0.27669305564781616, 0.2950117236093103, -0.15524840511036214, -0.6055085338300346, -0.15524840511036214, 0.2950117236093103, 0.27669305564781616, 0.25837438768632204, 0.22145701433231887, 0.1845396409783157, -0.10568212657746093, -0.39590389413323757, -0.11853099378904099, 0.1588419065551556, -0.11531652804484584, -0.38947496264484727, 0.08584400956513055, 0.5611629817751084, 0.3456827324319992, 0.13020248308889007, 0.06510124154444503,)
 ROW = 4
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12), (1, 13), (0, 14), (1, 15), (0, 16), (1, 17), (0, 18), (1, 19), (0, 20), (1, 21), (0, 22), (1, 23), (0, 24), (1, 25), (0, 26), (1, 27), (0, 28), (1, 29), (0, 30), (1, 31), (0, 32), (1, 33), (0, 34))
@@ -161,8 +160,7 @@ FLOWS = (_flow1, _flow2,)
 
 
 def _advance(stage, x, carry, memory):
-    """Make one step of all members: the flows of the parts of K, one after another; the memory becomes its physical
-    time.
+    """Make one step of all members: the flows of the parts of K, one after another; returns its physical time as memory.
 
     The time is NaN if the argument of a logarithm of K has left its domain.
     """
@@ -181,7 +179,7 @@ def _prepare(parameters, gauge, h):
 
 
 def _choose_gauge(parameters, x):
-    """Return the energy level e = -H of the starts, (members, 1): K = g (H + e) is zero along the trajectory."""
+    """Return the energy levels e = -H at x, (members, 1): K = g (H + e) is zero along trajectories from x."""
     return -_energy(parameters, x)
 
 
@@ -204,13 +202,13 @@ def _refused(parameters, x):
 
 
 def _time_of(stage, x, value):
-    """Return the time (members,) that a stage took, from its start and solution; NaN unless it has the sign of the step."""
+    """Return the physical time (members,) of a stage with start x and solution value; NaN unless it has the sign of the step."""
     elapsed = value
     return np.where(elapsed * np.sign(stage[2]) > 0, elapsed, np.nan)
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -234,7 +232,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 

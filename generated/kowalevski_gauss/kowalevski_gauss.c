@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 69aa907e7248e25b1afe9b3415ab208ceff7d2f2fe3e77bd82740b7f520b81d9
+ * body-sha256: 383aa8a389a44dd24d39250545f93e00832e24f1f02225c9d7a420d648a0b543
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -265,7 +265,7 @@ static inline double kowalevski_gauss_total(const double values[kowalevski_gauss
         + (values[3] + values[7])));
 }
 
-/* A value at each stage, each a weighted sum of the increments of one unknown at all stages. */
+/* For each stage, a weighted sum of the increments of one unknown at all stages. */
 static inline void kowalevski_gauss_mix(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
     const double increment[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
 {
@@ -276,7 +276,7 @@ static inline void kowalevski_gauss_mix(const double matrix[kowalevski_gauss_NOD
         * increment[3] + matrix[5][lane] * increment[5] + matrix[7][lane] * increment[7]);
 }
 
-/* Unknowns of all stages: weighted sums of the stage increments. */
+/* Compute the unknowns of all stages: weighted sums of the stage increments. */
 static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
     double increments[][kowalevski_gauss_WIDTH], kowalevski_gauss_lanes *z)
 {
@@ -365,20 +365,19 @@ static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double
 }
 
 /* ---- The implicit step, by Gauss collocation ---- */
-/* Start of a step: the coordinates, the time if H depends on it, and frames of group elements if there are
-   any. */
+/* Copy the data of the start of a step, kowalevski_gauss_POINT numbers, the coordinates first. */
 static void kowalevski_gauss_start(const kowalevski_gauss_solver *s, double point[kowalevski_gauss_POINT])
 {
     memcpy(point, s->x, sizeof s->x);
 }
 
-/* Sum of the increments of all stages. */
+/* Compute the sum of the increments of all stages. */
 static void kowalevski_gauss_end(kowalevski_gauss_lanes *increments, double end[kowalevski_gauss_UNKNOWNS])
 {
     for (int k = 0; k < kowalevski_gauss_UNKNOWNS; ++k) end[k] = kowalevski_gauss_total(increments[k]);
 }
 
-/* h b_j times the vector field at each stage, for unknowns z; the weights are h b_j. */
+/* Compute the increments of all stages: the weights h b_j times the vector field at the unknowns z. */
 static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *weights, kowalevski_gauss_lanes *z,
     kowalevski_gauss_lanes *increments)
@@ -386,9 +385,9 @@ static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     kowalevski_gauss_stage_field_lanes(s->coef, point, z, weights, increments);
 }
 
-/* Collocation polynomial: factors of the stage increments in the offsets of the unknowns from the end of a
-   step, at a fraction of the step. They are integrals of Lagrange polynomials from 1 on, as sums of Legendre
-   polynomials. */
+/* Compute factors f_j: the collocation polynomial at a fraction of a step, minus its value at the end of the
+   step, is the sum of f_j times the increment of stage j. The factors are integrals of Lagrange polynomials
+   from 1 to the fraction, divided by the weights, by sums of Legendre polynomials. */
 static void kowalevski_gauss_factors_at(double fraction, double factor[kowalevski_gauss_NODES])
 {
     const double x = 2.0 * fraction - 1.0;
@@ -651,7 +650,7 @@ kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     return kowalevski_gauss_OK;
 }
 
-/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
 static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s)
 {
     const kowalevski_gauss_status status = kowalevski_gauss_attempt(s);
@@ -742,8 +741,8 @@ size_t kowalevski_gauss_solver_size(void) { return sizeof(kowalevski_gauss_solve
 size_t kowalevski_gauss_solver_steps_done(const kowalevski_gauss_solver *s) { return s->steps; }
 
 /* ---- Members of an ensemble ---- */
-/* Arguments of an ensemble. own = 1: member m has the parameters params[m] and the step h[m]; own = 0: all
-   have those of member 0. */
+/* Arguments of an ensemble. per_member = 1: member m has the parameters params[m] and the step h[m];
+   per_member = 0: all have those of member 0. */
 typedef struct {
     double *x;
     size_t members, steps, per_member;

@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8e92c4edb29eea4a856620f8592bdb285b097bfe2d9f0cd094ea52c4fe4905f8
+ * body-sha256: 54ee7ca7d0caf3e653ec4b792b0161d80574aa69a9aaa7c7deda4c8ec4e09581
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -42,7 +42,7 @@ typedef struct {
     int sweeps;    /* number of the first sweep over the stages whose change is measured */
     int predictor; /* row of kowalevski_gauss_prediction that predicts the next step */
     /* steps since the predictors were first compared; they are compared again after every
-       kowalevski_gauss_TRIALS */
+       kowalevski_gauss_TRIALS steps */
     int age;
     double rate; /* factor by which the changes of a sweep shrink from one sweep to the next */
     int kicked;  /* whether the state was changed since the last step */
@@ -68,8 +68,8 @@ typedef struct {
 size_t kowalevski_gauss_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t kowalevski_gauss_solver_steps_done(const kowalevski_gauss_solver *s);
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. kowalevski_gauss_BAD_ARGUMENT, with
-   *s unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns kowalevski_gauss_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
 kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     const kowalevski_gauss_params *params, const double x0[kowalevski_gauss_DIM]);
 
@@ -77,7 +77,7 @@ kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
 kowalevski_gauss_status kowalevski_gauss_step(kowalevski_gauss_solver *s, double h);
 kowalevski_gauss_status kowalevski_gauss_integrate(kowalevski_gauss_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
    kowalevski_gauss_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 kowalevski_gauss_status kowalevski_gauss_set_state(kowalevski_gauss_solver *s,
     const double x[kowalevski_gauss_DIM]);
@@ -86,18 +86,19 @@ kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
 
 /* The states at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial:
    x[r * kowalevski_gauss_DIM + i] is x_i at fraction[r]. They are far less accurate than steps, and off the
-   leaf by their error: they serve to find events. The state at an event, as accurate as those of whole steps,
-   is reached by a copy of *s in a step of size (fraction - 1) h. kowalevski_gauss_BAD_ARGUMENT before the
-   first step, and after a change of the state. */
+   symplectic leaf by their error; they serve to find events. To get the state at an event as accurately as by
+   whole steps, make a step of size (fraction - 1) h with a copy of *s. Returns kowalevski_gauss_BAD_ARGUMENT
+   before the first step, and after a change of the state. */
 kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solver *s, const double *fraction,
     size_t count, double *x);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
-   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
+   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 kowalevski_gauss_status kowalevski_gauss_ensemble(const kowalevski_gauss_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
 
-/* The same for members with parameters params[m] and step size h[m]. params may be NULL for the defaults. */
+/* kowalevski_gauss_ensemble for members with parameters params[m] and step size h[m]. params may be NULL for
+   the defaults. */
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * kowalevski_gauss_DIM + i)
    * members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before.
    Arrays must not overlap. */

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 04035671ac5658b8a27ca6459ea5622b1a3306f2948d4ad5644870d79f73747b
+# body-sha256: b2cc86edb113ab3e3d3d5fd383ee2caf2435dfe697c1a31358935ca888dc6bf1
 import numpy as np
 
 VERSION = "0.1.0"
@@ -21,7 +21,7 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ()
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
+# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
 GAUGE = ()
 
 # A step of size h is composed of steps of these fractions of h.
@@ -44,12 +44,12 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the coefficients of some members; a single column belongs to all members."""
+    """Return the columns of coefficients for some members; a single column is that of all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return a stage for some of its members."""
+    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
@@ -62,7 +62,7 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
+    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -89,7 +89,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -99,8 +99,7 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
-    step.
+    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -224,18 +223,18 @@ PLAIN = 4
 
 
 def _point(stage, x):
-    """Return the start of a step for all stages: (members, stages, coordinates)."""
+    """Return the start of a step, repeated for all stages: (members, stages, coordinates)."""
     return np.broadcast_to(x[:, np.newaxis, :], (len(x), len(WEIGHTS), x.shape[1]))
 
 
 def _slopes(stage, point, z):
-    """Return h b_j f(Z_j) at all stages; arrays (unknowns, members, stages)."""
+    """Return the increments h b_j f(Z_j) of all stages j from their unknowns Z_j; arrays (unknowns, members, stages)."""
     weights = np.broadcast_to(np.reshape(stage[2], (-1, 1)) * WEIGHTS, point.shape[:2])
     return np.moveaxis(_stage_field(stage[0][:, :, np.newaxis], point, z, [weights]), -1, 0)
 
 
 def _change_of(x, change, increments):
-    """Return the largest change at any stage, relative to the size of the unknowns: (members,)."""
+    """Return the largest change at any stage, (members,); that of coordinates is relative to |x|."""
     size = np.sqrt(np.sum(x**2, axis=-1))[:, np.newaxis]
     size = np.where(size > 0, size, np.sqrt(np.sum(increments[:PLAIN] ** 2, axis=0)) + np.finfo(float).tiny)
     plain, rest = np.sum(change[:PLAIN] ** 2, axis=0) / size**2, np.sum(change[PLAIN:] ** 2, axis=0)
@@ -274,9 +273,10 @@ def _solved(stage, x, z):
 
 
 def _factors_at(fractions):
-    """Return the weights of the stage increments in offsets from the end of a step, (fractions, stages).
+    """Return factors f_j of the stage increments at fractions of a step, (fractions, stages).
 
-    They evaluate the collocation polynomial: integrals of Lagrange polynomials from 1 on, by Legendre polynomials.
+    The sum of f_j times increment j is the collocation polynomial minus its value at the end of the step. The factors
+    are integrals of Lagrange polynomials from 1 to the fraction, divided by the weights, by sums of Legendre polynomials.
     """
     x, nodes = 2 * np.reshape(fractions, (-1, 1)) - 1, 2 * NODES - 1
     legendre = np.polynomial.legendre.legvander
@@ -330,7 +330,7 @@ def _advance(stage, x, carry, memory):
     increments, status = _solved(stage, x, anew if predicted is None else predicted)
     failed = np.flatnonzero(status != "")
     if predicted is not None and len(failed):
-        # If a step fails from the prediction, it is tried again without one.
+        # Steps that failed from the prediction are made again without one.
         increments[:, failed], status[failed] = _solved(_stage_at(stage, failed), x[failed], anew[:, failed])
     end = np.sum(increments, axis=-1)
     following, rest = _sum(x, carry, _stage_change(stage[0], _point(stage, x)[:, 0], end))
@@ -346,7 +346,7 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -370,7 +370,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ee1b2167b99e1bbb9beb4a2527cebd39504b757e2b28f72a67e52cf1339fdcf8
+ * body-sha256: 8a08312e0838a2c1f01ca33ee0cebc7df27eeac7ec0a533600497fe1b4e543b6
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -35,7 +35,7 @@ typedef struct {
     double x[pendulum_euler_DIM]; /* the state; change it only by the functions below */
     double carry[pendulum_euler_DIM]; /* rounding error of x: x + carry is more accurate */
     size_t steps; /* number of successful steps since pendulum_euler_init */
-    size_t evaluations; /* number of computed stages (splitting: of steps), for statistics */
+    size_t evaluations; /* number of computed stages, for statistics */
     double t; /* time since pendulum_euler_init */
     double h; /* size of the last step; NaN before the first step */
     pendulum_euler_params params; /* the parameters, set by pendulum_euler_init; do not change them */
@@ -46,8 +46,8 @@ typedef struct {
 size_t pendulum_euler_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s);
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. pendulum_euler_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns pendulum_euler_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM]);
 
@@ -55,13 +55,13 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
 pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h);
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
    pendulum_euler_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const double x[pendulum_euler_DIM]);
 pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
-   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
+   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

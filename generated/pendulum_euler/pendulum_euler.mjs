@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fce1c6a8034e0f54a624afc50f50995da7c9f0a419df61e026692556af4594aa
+ * body-sha256: 811c96a987356369a189ac08c558e6b277d984bb703ce987d3bb3c2b25db48e2
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -90,11 +90,11 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
+/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps good steps until then
+   * @param {number} steps number of successful steps before
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {
@@ -144,7 +144,7 @@ const OPTIONS = "x0 params".split(" ");
 
 /**
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
- * where required, and give finite coefficients for a negligibly small step.
+ * where required, and the coefficients of a very small step are finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -181,7 +181,7 @@ export class Solver {
   t = 0;
   /** Number of successful steps since the start. */
   steps = 0;
-  /** Number of evaluations of the step equations, or of explicit stages, for statistics. */
+  /** Number of computed stages, for statistics. */
   evaluations = 0;
   /** Size of the last step. */
   h = NaN;
@@ -252,12 +252,12 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state. Predictors may start anew.
+   * Return an independent solver with the same state.
    *
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
+    const { x: x0, params, gauge, seed, member, step0 } = this; // some may be undefined
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -266,8 +266,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws
-   * StepError for values that are not admissible; then nothing changes.
+   * Between steps: change parameters; all else is unchanged. Throws StepError for values that are not
+   * admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
@@ -292,7 +292,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change to the state, such as an impulse; otherwise as setState.
+   * Between steps: add a change, such as an impulse, to the state. Throws StepError as setState does.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -310,7 +310,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Replace the state by x + carry. */
+  /** Replace the state by x with the rounding error carry. */
   #place(x, carry) {
     this.x.set(x);
     this.carry.set(carry);
@@ -318,15 +318,15 @@ export class Solver {
   }
 
   /**
-   * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
-   * they have another length.
+   * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
+   * h, parameters and t0 may be arrays with a number for each state. Throws StepError if an array has another
+   * length.
    *
-   * @param {Iterable<ArrayLike<number>>} members
-   * @param {number | ArrayLike<number>} h
-   * @param {number} count
+   * @param {Iterable<ArrayLike<number>>} members initial states
+   * @param {number | ArrayLike<number>} h step size
+   * @param {number} count number of steps
    * @param {object} [options] as in the constructor, without x0
-   * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
+   * @returns {{x: Float64Array[], status: string[]}} last states; for each "OK" or the status of the failure
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
@@ -367,7 +367,7 @@ export class Solver {
     return out;
   }
 
-  /** The vector field dx/dt at a state and a time. */
+  /** The vector field dx/dt, at x and its time or at given ones. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorFieldAt(this.params, t, x, out);
@@ -375,12 +375,12 @@ export class Solver {
   }
 }
 
-/** The Hamiltonian at x and the time t. */
+/** Compute the Hamiltonian at x; it does not depend on the time t. */
 function energyAt(params, t, x, out) {
   energy(params, x, out);
 }
 
-/** The vector field dx/dt at x and the time t. */
+/** Compute the vector field dx/dt at x; it does not depend on the time t. */
 function vectorFieldAt(params, t, x, out) {
   vectorField(params, x, out);
 }

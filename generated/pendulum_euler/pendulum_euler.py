@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 38f2cbd30a674e3a649807106bb8e44a85f2c2fddc2e70187ffe960626dfcc1e
+# body-sha256: 5617573a9f6e31efb0cf63df7b278c06f8dfcafa31c09b217787947a7ddb4a6a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -21,7 +21,7 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ("g",)
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
+# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
 GAUGE = ()
 
 # A step of size h is composed of steps of these fractions of h.
@@ -44,12 +44,12 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the coefficients of some members; a single column belongs to all members."""
+    """Return the columns of coefficients for some members; a single column is that of all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return a stage for some of its members."""
+    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
@@ -62,7 +62,7 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
+    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -89,7 +89,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -99,8 +99,7 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
-    step.
+    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -137,7 +136,7 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -161,7 +160,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 149d5a9cd13b53012834093fe2b2641b49fe638c9862fa17dced382abac499ff
+ * body-sha256: b1ff8e24021318162571158b379f78c490414f2ea729b574efd747b67007e42f
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -34,7 +34,7 @@ enum { point_vortices_MOST_SWEEPS = 200 }; /* largest number of sweeps of a stag
 /* Along each axis: the smallest size. */
 static const size_t point_vortices_least[point_vortices_AXES] = { 1 };
 
-/* The stages of one step, as fractions of it, each with a row of coefficients. */
+/* The sizes of the stages, as fractions of a step, one for each row of coefficients. */
 static const double point_vortices_times[point_vortices_ROWS_OF_FLOWS] = { 0.4144907717943757,
     0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
 
@@ -420,10 +420,11 @@ enum {
 };
 /* smaller fields are measured relative to this fraction of the largest */
 #define point_vortices_LEAST_SIZE 0.001
-#define point_vortices_SETTLED 0x1p-55        /* largest expected change by further sweeps, relative to y */
-#define point_vortices_ROUNDING 0x1p-40       /* changes below this may be rounding */
-#define point_vortices_SLOW 0.6               /* slower convergence is left to Newton's method ... */
-#define point_vortices_NEARLY_SETTLED 0x1p-30 /* ... unless changes are below this */
+#define point_vortices_SETTLED 0x1p-55  /* largest expected change by further sweeps, relative to y */
+#define point_vortices_ROUNDING 0x1p-40 /* changes below this may be rounding */
+/* a change above this fraction of the one before is left to Newton's method */
+#define point_vortices_SLOW 0.6
+#define point_vortices_NEARLY_SETTLED 0x1p-30 /* changes below this are not left to Newton's method */
 
 enum { point_vortices_WIDTH = 32 }; /* number of partial results, so that loops vectorise */
 
@@ -543,8 +544,8 @@ static void point_vortices_forget(point_vortices_solver *s)
 }
 
 /* ---- Krylov spaces ---- */
-#define point_vortices_SOLVED 1e-6 /* relative residual at which the iteration for a correction ends, ... */
-#define point_vortices_USEFUL 0.9  /* ... and the largest one that is accepted */
+#define point_vortices_SOLVED 1e-6 /* relative residual at which the iteration for a correction ends */
+#define point_vortices_USEFUL 0.9  /* largest relative residual of an accepted correction */
 /* solutions farther from x than this, relative to x and its motion, are rejected */
 #define point_vortices_PLAUSIBLE 1.5
 

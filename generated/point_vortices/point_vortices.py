@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a32da0921a07cceca2779ccb1ed26be0d23217c6bdb98548448f6d918dd66b62
+# body-sha256: 72765bcf78ebdc8ddcca8e00316d4951db3b812be2f5a94745b7a4841d2a1fa4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -32,8 +32,8 @@ OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
 
-# The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
-# part of H, and its row.
+# The times of flows, as fractions of a step: one for each row of coefficients. The flows of a step in order, each as (part
+# of H, row).
 TIMES = (0.4144907717943757, 0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))
@@ -42,7 +42,7 @@ SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, NOT_FINITE; states: the frames so far.
+    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the frames so far.
     """
 
     def __init__(self, step, status, states):
@@ -54,7 +54,7 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Error in a step: the status."""
+    """Error in a step; its argument is the status."""
 
 
 def _finite(values):
@@ -91,7 +91,7 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """() for a parameter with one value."""
+        """Return the shape of the values of a parameter: () for one value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
@@ -122,23 +122,23 @@ PATIENCE = 10  # sweeps after which slow convergence is left to Newton's method
 LEAST_SIZE = 0.001  # smaller fields are measured relative to this fraction of the largest
 SETTLED = 2.0**-55  # largest expected change by further sweeps, relative to y
 ROUNDING = 2.0**-40  # changes below this may be rounding
-SLOW = 0.6  # slower convergence is left to Newton's method ...
-NEARLY_SETTLED = 2.0**-30  # ... unless changes are below this
+SLOW = 0.6  # a change above this fraction of the one before is left to Newton's method
+NEARLY_SETTLED = 2.0**-30  # changes below this are not left to Newton's method
 
 
 def _usual(y):
-    """Return the sizes of fields, none much smaller than the largest."""
+    """Return the largest magnitude of each field of y, plus a small part of that of all fields."""
     sizes = np.abs(y).max(tuple(range(1, y.ndim)))
     return sizes + LEAST_SIZE * sizes.max() + 1e-300
 
 
 def _size(change, y):
-    """Return the size of a change of y, field by field."""
+    """Return the largest change of a field of y relative to the size of the field."""
     return (np.abs(change).max(tuple(range(1, y.ndim))) / _usual(y)).max()
 
 
 def _by_sweeps(coef, x, y, sites):
-    """Return the solution y of a stage, by fixed-point sweeps from a prediction to rounding level."""
+    """Return the solution y of a stage by fixed-point sweeps from a prediction y; raises FailedError."""
     before = 0.0
     for sweeps in range(1, MOST_SWEEPS + 1):
         following = _relax(coef, x, y, sites)
@@ -147,7 +147,7 @@ def _by_sweeps(coef, x, y, sites):
         _finite(following)
         change = _size(following - y, following)
         y, shrunk = following, before - change
-        # Expected change by further sweeps, at the rate change / before; or changes that no longer shrink.
+        # Stop if the expected change by all further sweeps is below rounding, or if changes no longer shrink.
         if change * change <= shrunk * SETTLED or (shrunk <= 0.0 and change <= ROUNDING and sweeps > 1):
             return y
         if sweeps > PATIENCE and change > max(SLOW * before, NEARLY_SETTLED):
@@ -157,7 +157,7 @@ def _by_sweeps(coef, x, y, sites):
 
 
 def _remember(differences, value):
-    """Update a list of backward differences with a value; returns the order whose prediction was best."""
+    """Update backward differences with a new value; returns the number of them that predict best."""
     order, least, following = 1, np.inf, value
     for k in range(min(len(differences), DIFFERENCES)):
         last = differences[k]
@@ -183,8 +183,8 @@ def _advance(sites, rows, x, past):
 
 
 DIRECTIONS = 24  # dimension of the Krylov space of a correction
-SOLVED = 1e-6  # relative residual at which the iteration for a correction ends, ...
-USEFUL = 0.9  # ... and the largest one that is accepted
+SOLVED = 1e-6  # relative residual at which the iteration for a correction ends
+USEFUL = 0.9  # largest relative residual of an accepted correction
 PLAUSIBLE = 1.5  # solutions farther from x than this, relative to x and its motion, are rejected
 
 
@@ -219,7 +219,7 @@ def _newton(coef, x, y, sites):
 
 
 def _krylov(matrix, side, usual):
-    """Return an approximate solution of matrix(v) = side by GMRES without restart, for fields of usual sizes."""
+    """Return an approximate solution of matrix(v) = side by GMRES without restart; `usual` are the sizes of the fields."""
     usual = usual.reshape(-1, *(1,) * (side.ndim - 1))
     length = np.sqrt(((side / usual) ** 2).sum())
     if length == 0.0:
@@ -300,7 +300,7 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the densities of the Casimirs (CASIMIRS, *sizes)."""
+    """Return the terms of the Casimirs at each site, (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
@@ -317,7 +317,7 @@ def _prepare(parameters, h):
 
 
 def _over_others(values, sites):
-    """Return sums over all other sites b of values (a, b)."""
+    """Return, for each site a, the sum of values (a, b) over all other sites b."""
     values = np.array(np.broadcast_to(values, sites.sizes * 2))
     np.fill_diagonal(values, 0.0)
     return values.sum(axis=1)

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 3457d8313880223cd76d36819cf1361bc393ce0820ff639c6f4108f7568031f2
+ * body-sha256: d74196dd541be1c142cf9c98ecdadc35c0148265b4c297cf1cc7ed613d183639
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -170,7 +170,7 @@ static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_D
 /* ---- Predictors ---- */
 #define predator_prey_REACH 4.0 /* largest distance from the last value, relative to it */
 
-/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
+/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
 static int predator_prey_predict(const predator_prey_history *history, double value[predator_prey_DIM])
 {
@@ -209,8 +209,8 @@ static void predator_prey_remember(predator_prey_history *history, const double 
 #define predator_prey_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define predator_prey_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
-   at another energy, and unrelated to the motion. */
+/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
+   equation may have solutions far away, at another energy, unrelated to the motion. */
 static int predator_prey_plausible(const predator_prey_solver *s, const double increment[predator_prey_DIM])
 {
     double distance = 0.0, size = 0.0, field[predator_prey_DIM], point[predator_prey_DIM], H[3];
@@ -222,7 +222,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
     predator_prey_vector_field(&s->params, s->x, field);
     for (int i = 0; i < predator_prey_DIM; ++i) size += fabs(s->h * field[i]);
     if (distance <= predator_prey_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
         for (int i = 0; i < predator_prey_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = predator_prey_hamiltonian(&s->params, point);
     }
@@ -238,7 +238,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 /* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 #define predator_prey_SHRINKING 0.25
 
-/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
 static double predator_prey_size(const double y[predator_prey_DIM], const double delta[predator_prey_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -252,8 +252,8 @@ static double predator_prey_size(const double y[predator_prey_DIM], const double
 }
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
-   last correction changes the increment to first order, without another evaluation: it is accepted if the
-   remaining error, quadratic in it, is below predator_prey_TOLERANCE. */
+   effect of the last correction on the increment is added to first order, without another evaluation. So a
+   solution is accepted if its error, quadratic in the last correction, is below predator_prey_TOLERANCE. */
 static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
 {
     double y[predator_prey_DIM], delta[predator_prey_DIM], displacement[predator_prey_DIM],
@@ -309,7 +309,7 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     return predator_prey_OK;
 }
 
-/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
 static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 {
     const predator_prey_status status = predator_prey_attempt(s);

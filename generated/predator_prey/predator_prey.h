@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e654fe790bf9a46f34a224bc5f257efad9c18bc06c862f29561d540b9df78de2
+ * body-sha256: d371326aa04f093142be0670c59b33dc6f1ec8b56a2ec940627d4ce441b7aa8a
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -57,8 +57,8 @@ typedef struct {
 size_t predator_prey_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t predator_prey_solver_steps_done(const predator_prey_solver *s);
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. predator_prey_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns predator_prey_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM]);
 
@@ -66,13 +66,13 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
 predator_prey_status predator_prey_step(predator_prey_solver *s, double h);
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
    predator_prey_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM]);
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
-   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
+   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

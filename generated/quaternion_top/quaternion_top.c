@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: f3313d51583ee7f05ed19af140dab2eecf29f651613bdb24487df97bc2a2b700
+ * body-sha256: a8a5974d9304b14c5f86c1bd0bb8be9bcce662b254eefa7b17589bb85f062abf
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -343,7 +343,7 @@ static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_to
 /* ---- Predictors ---- */
 #define quaternion_top_REACH 4.0 /* largest distance from the last value, relative to it */
 
-/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far
+/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far
    away, where the equation of a step has solutions unrelated to the motion. */
 static int quaternion_top_predict(const quaternion_top_history *history, double value[quaternion_top_DIM])
 {
@@ -382,8 +382,8 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
 #define quaternion_top_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
-   at another energy, and unrelated to the motion. */
+/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
+   equation may have solutions far away, at another energy, unrelated to the motion. */
 static int quaternion_top_plausible(const quaternion_top_solver *s,
     const double increment[quaternion_top_DIM])
 {
@@ -396,7 +396,7 @@ static int quaternion_top_plausible(const quaternion_top_solver *s,
     quaternion_top_vector_field(&s->params, s->x, field);
     for (int i = 0; i < quaternion_top_DIM; ++i) size += fabs(s->h * field[i]);
     if (distance <= quaternion_top_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
         for (int i = 0; i < quaternion_top_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = quaternion_top_hamiltonian(&s->params, point);
     }
@@ -676,7 +676,8 @@ static void quaternion_top_path_field(const double *coef, const double p[7], con
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
     quaternion_top_LONGEST_PATH = 128, /* largest number of pieces of a path, a power of 2 */
-    /* ... of all paths of a solve: steps that need more have errors of the size of the state */
+    /* largest number of pieces of all paths of a solve; steps that need more have errors of the size of the
+       state */
     quaternion_top_MOST_PIECES = 512,
     /* iterations with the approximate Jacobian before its contraction is checked */
     quaternion_top_PATIENCE = 3,
@@ -695,9 +696,8 @@ enum {
 /* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define quaternion_top_CONTRACTING 0.05
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope. An expansion with gaps
-   between its terms, like t + t^9, or across the kink of an absolute value, may only seem to have
-   converged. */
+/* Whether the slope of an expansion at a point m is pi(m) p. If not, the expansion only seems to have
+   converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value. */
 static int quaternion_top_holds(const double *coef, const double p[quaternion_top_DIM],
     const double m[quaternion_top_DIM], const double slope[quaternion_top_DIM])
 {
@@ -709,8 +709,9 @@ static int quaternion_top_holds(const double *coef, const double p[quaternion_to
     return 1;
 }
 
-/* Path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m - start.
-   The size of the terms decides their number. Returns 0 if quaternion_top_TERMS terms do not suffice. */
+/* Compute the path m(t) from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start, mean the mean
+   of m - start. Terms are added until they are negligible. Returns 0 if quaternion_top_TERMS terms do not
+   suffice. */
 static int quaternion_top_piece(const double *coef, const double p[quaternion_top_DIM],
     const double start[quaternion_top_DIM], double change[quaternion_top_DIM],
     double mean[quaternion_top_DIM])
@@ -742,9 +743,9 @@ static int quaternion_top_piece(const double *coef, const double p[quaternion_to
     return 0;
 }
 
-/* Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path
-   lies on the symplectic leaf of x. Returns 0 if the path is too long or leaves the domain. *made counts all
-   pieces. */
+/* Compute the whole path from x, in 1, 2, 4, ... pieces until each expansion converges: change is its end
+   minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x. Returns 0
+   if the path is too long or leaves the domain. *made counts all pieces. */
 static int quaternion_top_path(const double *coef, const double x[quaternion_top_DIM],
     const double p[quaternion_top_DIM], double change[quaternion_top_DIM], double mean[quaternion_top_DIM],
     int *pieces_used)
@@ -771,8 +772,9 @@ static int quaternion_top_path(const double *coef, const double x[quaternion_top
     return 0;
 }
 
-/* Residual p - grad S_h(mean) of the equation for p, where mean is that of the path; also the change of x
-   along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
+/* Compute the residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the
+   change of x along the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be
+   followed. */
 static int quaternion_top_residual(quaternion_top_solver *s, const double *coef,
     const double p[quaternion_top_DIM], double y[quaternion_top_DIM], double residual[quaternion_top_DIM],
     double change[quaternion_top_DIM], double jacobian[quaternion_top_DIM * quaternion_top_DIM],
@@ -787,7 +789,8 @@ static int quaternion_top_residual(quaternion_top_solver *s, const double *coef,
     return 1;
 }
 
-/* Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
+/* Compute the Jacobian of the residual by differences, for steps so large that iterations with the
+   approximate Jacobian do not converge. */
 static int quaternion_top_differences(quaternion_top_solver *s, const double *coef,
     const double p[quaternion_top_DIM], const double residual[quaternion_top_DIM],
     double jacobian[quaternion_top_DIM * quaternion_top_DIM], int *pieces_used)
@@ -805,8 +808,8 @@ static int quaternion_top_differences(quaternion_top_solver *s, const double *co
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x with covector p), and move to the end of that path. If that
-   needs more than quaternion_top_MOST_PIECES pieces, the step is too large for a meaningful solution. */
+/* Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path. A step
+   that needs more than quaternion_top_MOST_PIECES pieces is too large for a meaningful solution. */
 static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
 {
     const double *coef = s->coef;
@@ -885,7 +888,7 @@ quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quater
     return quaternion_top_init_gauge(s, params, x0, NULL);
 }
 
-/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
 static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 {
     const quaternion_top_status status = quaternion_top_attempt(s);

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b3b9b1d7d7d3cf0bc343781df5bf701e7d32b3bacf2e54498bc334ca4bd1cc94
+ * body-sha256: d0ed5e437263704c9abe0a9420f03a3916094e81e3b5ad184b8c35437d76ce86
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -61,8 +61,8 @@ typedef struct {
 size_t quaternion_top_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t quaternion_top_solver_steps_done(const quaternion_top_solver *s);
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. quaternion_top_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns quaternion_top_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
 quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM]);
 
@@ -74,13 +74,13 @@ quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const 
 quaternion_top_status quaternion_top_step(quaternion_top_solver *s, double h);
 quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
    quaternion_top_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const double x[quaternion_top_DIM]);
 quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double change[quaternion_top_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
-   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
+   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 quaternion_top_status quaternion_top_ensemble(const quaternion_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

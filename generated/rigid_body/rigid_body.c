@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members: implicit
  *   steps; Ensembles
- * body-sha256: 17d7c981faf2307570683d4bf6b74816429ec6cd793890c55bcaf9236161bd1f
+ * body-sha256: 4f9d7b2fcb07ad47717bdf292bc74e8ad6052059edb04b5c4f5b05f82e3a1e5a
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -539,7 +539,7 @@ enum {
     rigid_body_LONG_WAIT = 20000 /* steps until the next fit of a recurrence that has needed many */
 };
 
-/* Predict the next value (y) from earlier ones. Returns 0 if there is no prediction. */
+/* Predict the next solution from earlier ones. Returns 0 if there is no prediction. */
 static int rigid_body_predict(const rigid_body_history *history, double value[rigid_body_DIM])
 {
     const int last = history->count - 1;
@@ -588,7 +588,8 @@ static void rigid_body_judge(rigid_body_history *history, const double value[rig
     if (history->extrapolation_order == 0) history->extrapolation_order = 1;
 }
 
-/* Drop the oldest values if the history has no room for `count` more. */
+/* Drop all but the last rigid_body_REMEMBERED solutions if there is no room for the given number of further
+   ones. */
 static void rigid_body_make_room(rigid_body_history *history, int values)
 {
     if (history->count + values <= rigid_body_STORED_VALUES) return;
@@ -617,7 +618,8 @@ static int rigid_body_fit(rigid_body_history *history)
     return fitted;
 }
 
-/* Update the predictor with a solution. A solve of one iteration needs no better prediction. */
+/* Update the predictor with a solution and the number of iterations it took; 1 means that the prediction was
+   good. */
 static void rigid_body_remember(rigid_body_history *history, const double value[rigid_body_DIM],
     int iterations)
 {
@@ -632,8 +634,8 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
 #define rigid_body_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
-   at another energy, and unrelated to the motion. */
+/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
+   equation may have solutions far away, at another energy, unrelated to the motion. */
 static int rigid_body_plausible(const rigid_body_solver *s, const double increment[rigid_body_DIM])
 {
     double distance = 0.0, size = 0.0, field[rigid_body_DIM], point[rigid_body_DIM], H[3];
@@ -645,7 +647,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
     rigid_body_vector_field(&s->params, s->x, field);
     for (int i = 0; i < rigid_body_DIM; ++i) size += fabs(s->h * field[i]);
     if (distance <= rigid_body_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
         for (int i = 0; i < rigid_body_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = rigid_body_hamiltonian(&s->params, point);
     }
@@ -661,7 +663,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 /* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 #define rigid_body_SHRINKING 0.25
 
-/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
 static double rigid_body_size(const double y[rigid_body_DIM], const double delta[rigid_body_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -675,8 +677,8 @@ static double rigid_body_size(const double y[rigid_body_DIM], const double delta
 }
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
-   last correction changes the increment to first order, without another evaluation: it is accepted if the
-   remaining error, quadratic in it, is below rigid_body_TOLERANCE. */
+   effect of the last correction on the increment is added to first order, without another evaluation. So a
+   solution is accepted if its error, quadratic in the last correction, is below rigid_body_TOLERANCE. */
 static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
 {
     double y[rigid_body_DIM], delta[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM];
@@ -754,7 +756,7 @@ static void rigid_body_sample(const rigid_body_params *params, const double x[ri
     }
 }
 
-/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+/* The sum of |pi grad S_3|^2 over the samples, where S_3 is the leading error of the method. */
 static double rigid_body_gauge_error(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
     double samples[][rigid_body_DIM])
 {
@@ -775,8 +777,8 @@ static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1],
     return error;
 }
 
-/* Shift of the multiple with index c, in units of the width of the search, that minimises the error: searched
-   on successively finer grids. */
+/* Return the shift of gauge[c], in units of width, that minimises the error, from its values on successively
+   finer grids. */
 static double rigid_body_least_on_line(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
     int c, double width, double samples[][rigid_body_DIM])
 {
@@ -864,7 +866,7 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
     return rigid_body_init_gauge(s, params, x0, NULL);
 }
 
-/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
 static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 {
     const rigid_body_status status = rigid_body_attempt(s);
@@ -1275,7 +1277,7 @@ static void rigid_body_apply(rigid_body_lanes matrix[restrict rigid_body_DIM * r
     }
 }
 
-/* Corrections of the increment by the residual. */
+/* Compute the corrections of the increment from the residual. */
 static void rigid_body_gain(rigid_body_model *model, rigid_body_lanes residual[restrict rigid_body_DIM],
     rigid_body_lanes gained[restrict rigid_body_DIM])
 {
@@ -1337,9 +1339,9 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 }
 
 /* ---- The residuals of a block ---- */
-/* Advance through the steps of a block in order, each by the linear model of its lane. If the start X of a
-   step (the state with its compensation term) changes, increment - gain residual gives the change of its end,
-   and so the next residual. X itself is summed apart. most is the largest correction in each lane. */
+/* Advance x + carry through the steps of a block in order, each by the linear model of its lane: a step adds
+   increment - gain residual. The residual of the next step follows from that of a step, without the sum. most
+   is the largest correction in each lane. */
 static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
     double x[rigid_body_DIM], double carry[rigid_body_DIM], rigid_body_lanes most)
 {
@@ -1466,7 +1468,7 @@ static void rigid_body_runge_kutta(const rigid_body_solver *s, double h, double 
     for (int i = 0; i < rigid_body_DIM; ++i) x[i] += h * mean[i];
 }
 
-/* Replace y by the points whose alpha and beta have these means, to leading order. */
+/* Replace y by the points for which y is the mean of alpha and beta, to leading order. */
 static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
     rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -1477,8 +1479,8 @@ static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_mo
     }
 }
 
-/* Predictor without recurrences: points whose alpha and beta have the means of classical Runge-Kutta steps,
-   to leading order. */
+/* Predictor without recurrences: points for which the mean of alpha and beta is, to leading order, that of
+   start and end of a classical Runge-Kutta step. */
 static void rigid_body_predict_by_march(const rigid_body_solver *s, rigid_body_table *table,
     rigid_body_model *model)
 {
@@ -1640,8 +1642,8 @@ rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
 }
 
 /* ---- Members of an ensemble ---- */
-/* Arguments of an ensemble. own = 1: member m has the parameters params[m] and the step h[m]; own = 0: all
-   have those of member 0. */
+/* Arguments of an ensemble. per_member = 1: member m has the parameters params[m] and the step h[m];
+   per_member = 0: all have those of member 0. */
 typedef struct {
     double *x;
     size_t members, steps, per_member;
@@ -2029,8 +2031,7 @@ static void rigid_body_group_frame(const rigid_body_group *group, const rigid_bo
     }
 }
 
-/* Write the results of a member. Steps that the group did not make for it are made by single steps; if one
-   fails, all steps of the member are, so that status and last state are those of a member by itself. */
+/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
 static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int lane,
     const rigid_body_members *all, size_t m, rigid_body_status status)
 {
@@ -2040,13 +2041,9 @@ static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int
     if (status != rigid_body_OK) {
         rigid_body_end_member(all, m, 0, NULL, status);
     } else if (group->steps_left[lane] > 0) {
-        rigid_body_status begun = rigid_body_begin_member(all, m, x, group->gauge[lane], &s);
+        const rigid_body_status begun = rigid_body_begin_member(all, m, x, group->gauge[lane], &s);
         for (int i = 0; i < rigid_body_DIM && begun == rigid_body_OK; ++i) s.carry[i] = group->carry[i][lane];
         status = rigid_body_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
-        if (status != rigid_body_OK) {
-            begun = rigid_body_take_member(all, m, x, &s);
-            status = rigid_body_end_member(all, m, 0, &s, begun);
-        }
         if (begun == rigid_body_OK) memcpy(x, s.x, sizeof x);
     }
     rigid_body_put_member(all, m, x, status);

@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d6ab455a5072728804626f1bad7df01d3252d2f6ddedf9e55d6d886bf3fd5bc3
+ * body-sha256: 27d7229cf825d3eaf1302b743d4cbee434a7ebfdf1fe5bd6880af5c75cac45bd
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -86,8 +86,8 @@ typedef struct {
 size_t rigid_body_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t rigid_body_solver_steps_done(const rigid_body_solver *s);
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. rigid_body_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns rigid_body_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
 rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM]);
 
@@ -99,24 +99,25 @@ rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_p
 rigid_body_status rigid_body_step(rigid_body_solver *s, double h);
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
    rigid_body_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 rigid_body_status rigid_body_set_state(rigid_body_solver *s, const double x[rigid_body_DIM]);
 rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigid_body_DIM]);
 
-/* Between steps: replace the parameters at the present state. rigid_body_BAD_ARGUMENT, with *s unchanged, for
-   parameters that rigid_body_init refuses. */
+/* Between steps: replace the parameters; the state is unchanged. Returns rigid_body_BAD_ARGUMENT, with *s
+   unchanged, for parameters that rigid_body_init refuses. */
 /* The gauge is unchanged. */
 rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_body_params *params);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
-   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
+   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 /* Members are integrated in SIMD batches; with OpenMP, batches in parallel. */
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 
-/* The same for members with parameters params[m], step size h[m], and factors gauge[m * rigid_body_GAUGES +
-   k] of the Casimirs. params may be NULL for the defaults, gauge for factors chosen at the initial states. */
+/* rigid_body_ensemble for members with parameters params[m], step size h[m], and factors gauge[m *
+   rigid_body_GAUGES + k] of Casimirs. params may be NULL for the defaults, gauge for factors chosen at the
+   initial states. */
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * rigid_body_DIM + i) *
    members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before.
    Arrays must not overlap. */

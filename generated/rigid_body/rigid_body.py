@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: ea24f5b206d4aac9c06c22acf3a67b97f483cb714e979ef7016b1562d9d7426a
+# body-sha256: 179816debac000e7da02385f5ec90b6da61355ff1b285ff6d607e9b2e002e261
 import numpy as np
 
 VERSION = "0.1.0"
@@ -25,7 +25,7 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ("I1", "I2", "I3",)
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
+# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
 GAUGE = ("C",)
 
 # A step of size h is composed of steps of these fractions of h.
@@ -48,12 +48,12 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the coefficients of some members; a single column belongs to all members."""
+    """Return the columns of coefficients for some members; a single column is that of all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return a stage for some of its members."""
+    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
@@ -66,7 +66,7 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
+    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -93,7 +93,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -103,8 +103,7 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
-    step.
+    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -446,7 +445,7 @@ def _linearise(coef, y):
 
 
 def _solve(matrix, side):
-    """Return the solutions of linear systems, NaN if the matrix is singular."""
+    """Return the solutions of linear systems, one for each member; NaN if its matrix is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -460,9 +459,9 @@ MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Return whether the increments of steps agree with the motion; arrays (members, DIM).
+    """Return for which members the increment from x to end is short, or the change of energy small.
 
-    If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
+    If a step is too large, its equation may have solutions far away, at another energy, unrelated to the motion.
     """
     _, parameters, h = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -488,7 +487,7 @@ SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows
 
 
 def _size(y, delta):
-    """Return the size of a correction relative to each component of y, or to FLOOR times the largest if that is more."""
+    """Return the largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|, for each member."""
     scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
 
@@ -496,8 +495,9 @@ def _size(y, delta):
 def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
-    The last correction changes the increment to first order; it is accepted if the remaining error, quadratic in it,
-    is below 1e-20. Returns new x, carry, y, and a status for each member, "" if good.
+    The effect of the last correction on the increment is added to first order, so a solution is accepted if its error,
+    quadratic in the last correction, is below 1e-20. Returns new x, carry, y, and a status for each member, ""
+    if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -512,7 +512,7 @@ def _attempt(coef, x, carry, y):
         status[open_[~finite]] = "NOT_FINITE"
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
-        # Second criterion: corrections no longer shrink, the solve has reached rounding level.
+        # Second criterion: corrections no longer shrink, since they are at rounding level.
         done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
@@ -534,7 +534,7 @@ def _advance(stage, x, carry, memory):
     predicted = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & predicted)
     if len(failed):
-        # A prediction may be bad: repeat from y = x.
+        # Stages that failed from the prediction are made again from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
     return following, rest, (y - x, np.where(predicted[:, np.newaxis], memory[0], y - x)), status
@@ -587,13 +587,13 @@ def _least_on_line(difference, size):
 
 
 def _direction(parameters, y):
-    """Return the direction of the motion as a unit vector; 0 at an equilibrium."""
+    """Return the direction of the motion at states y, as unit vectors; 0 at an equilibrium."""
     slope = _vector_field(parameters, y)
     return slope / (np.abs(slope).sum(axis=-1, keepdims=True) + np.finfo(float).tiny)
 
 
 def _samples(parameters, x, count=SAMPLES):
-    """Return a short piece of each trajectory, by a Runge-Kutta method with steps of equal length."""
+    """Return states on a short piece of each trajectory, by a Runge-Kutta method with steps of equal length in phase space."""
     length = SAMPLE_LENGTH * np.abs(x).sum(axis=-1, keepdims=True)
     points = [x]
     for _ in range(count - 1):
@@ -604,10 +604,10 @@ def _samples(parameters, x, count=SAMPLES):
 
 
 def _choose_gauge(parameters, x):
-    """Return the lambda that minimise the leading error along a short piece of each trajectory: (members, number of them).
+    """Return factors lambda of Casimirs that minimise the leading error along a short piece of each trajectory.
 
-    One after the other, starting from the least-squares solution of grad H = sum of lambda grad C; zero where a
-    result is not finite.
+    The result has shape (members, number of factors). The factors are optimised one after the other, starting from the
+    least-squares solution of grad H = sum of lambda grad C; 0 where a result is not finite.
     """
     points = _samples(parameters, x)
     sums = _products(parameters, points).sum(axis=0)
@@ -684,7 +684,7 @@ def _products(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters and its step size.
+    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
 
     The coefficients are arrays (coefficients, members), or (coefficients, 1).
     """
@@ -708,7 +708,7 @@ def step(x, h, gauge=None, **parameters):
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 6f881c790f568b41cb7bc41de77b9dd8e9c794147be72aa6b9326b632e9c3501
+ * body-sha256: 14db0244f7fa5fd9956e92af0c50787ed2f131e57f9ad02d8acf82283e08d8fb
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -262,8 +262,8 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
 #define thermal_spin_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
-   at another energy, and unrelated to the motion. */
+/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
+   equation may have solutions far away, at another energy, unrelated to the motion. */
 static int thermal_spin_plausible(const thermal_spin_solver *s, const double increment[thermal_spin_DIM])
 {
     double distance = 0.0, size = 0.0, field[thermal_spin_DIM], point[thermal_spin_DIM], H[3];
@@ -279,7 +279,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
     for (int k = 0; k < thermal_spin_SOURCES * thermal_spin_DIM; ++k)
         size += fabs(s->dw[k / thermal_spin_DIM] * fields[k]);
     if (distance <= thermal_spin_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* slopes before, halfway, after */
+    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
         for (int i = 0; i < thermal_spin_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = thermal_spin_hamiltonian(&s->params, point);
     }
@@ -295,7 +295,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 /* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 #define thermal_spin_SHRINKING 0.25
 
-/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
 static double thermal_spin_size(const double y[thermal_spin_DIM], const double delta[thermal_spin_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -309,8 +309,8 @@ static double thermal_spin_size(const double y[thermal_spin_DIM], const double d
 }
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
-   last correction changes the increment to first order, without another evaluation: it is accepted if the
-   remaining error, quadratic in it, is below thermal_spin_TOLERANCE. */
+   effect of the last correction on the increment is added to first order, without another evaluation. So a
+   solution is accepted if its error, quadratic in the last correction, is below thermal_spin_TOLERANCE. */
 static thermal_spin_status thermal_spin_attempt(thermal_spin_solver *s)
 {
     double y[thermal_spin_DIM], delta[thermal_spin_DIM], displacement[thermal_spin_DIM],
@@ -366,7 +366,8 @@ static double thermal_spin_bits(uint32_t high, uint32_t low)
     return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
 }
 
-/* Two independent standard normal variates (Box and Muller), truncated at thermal_spin_BOUND. */
+/* Compute two independent standard normal variates (Box and Muller) of magnitude at most
+   thermal_spin_BOUND. */
 static void thermal_spin_two_normals(uint64_t seed, uint32_t c[4], double normals[2])
 {
     thermal_spin_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
@@ -391,7 +392,8 @@ static void thermal_spin_normals(uint64_t seed, uint32_t member, uint64_t step,
     }
 }
 
-/* Increments of the next step: the given ones, or random ones. Returns 0 if one is not finite. */
+/* Set the increments of the noise in the next step to the given ones, or for NULL to random ones. Returns 0
+   if one is not finite. */
 static int thermal_spin_draw(thermal_spin_solver *s, const double *increments)
 {
     if (increments != NULL) {
@@ -442,7 +444,7 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
     return thermal_spin_OK;
 }
 
-/* Compute the coefficients of the next step that depend on the time or on the noise. */
+/* For the stages of the next step, compute the coefficients that differ from step to step. */
 static void thermal_spin_renew(thermal_spin_solver *s)
 {
     thermal_spin_at_step(s->coef, s->dw, s->coef + thermal_spin_PREPARED);

@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2ae94dabffcad709f55042c8b0f1eb6660153c0c87e22af170e4cf29fa7a6fef
+ * body-sha256: 7b67f89c001635b84177ba7f396875e7d6a54a89047319746611f50f5a27d6b5
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -52,15 +52,15 @@ typedef struct {
     double dw[thermal_spin_DRAWS]; /* increments of the noise in the last step */
     double h; /* size of the last step; NaN before the first step */
     thermal_spin_params params; /* the parameters, set by thermal_spin_init; do not change them */
-    double coef[thermal_spin_COEFFICIENTS]; /* functions of params and h, then functions of dw and time too */
+    double coef[thermal_spin_COEFFICIENTS]; /* functions of params and h, then functions of dw too */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
 } thermal_spin_solver;
 size_t thermal_spin_solver_size(void); /* bytes; for languages that cannot read the struct */
 size_t thermal_spin_solver_steps_done(const thermal_spin_solver *s);
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. thermal_spin_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns thermal_spin_BAD_ARGUMENT, with *s
+   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
 thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin_params *params,
     const double x0[thermal_spin_DIM]);
 
@@ -74,7 +74,7 @@ thermal_spin_status thermal_spin_set_noise(thermal_spin_solver *s, uint64_t seed
 thermal_spin_status thermal_spin_step(thermal_spin_solver *s, double h);
 thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs.
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns
    thermal_spin_BAD_ARGUMENT, with *s unchanged, if the new state is not finite. */
 thermal_spin_status thermal_spin_set_state(thermal_spin_solver *s, const double x[thermal_spin_DIM]);
 thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double change[thermal_spin_DIM]);
@@ -84,13 +84,13 @@ thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double chang
 thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double h, size_t steps,
     const double *dw);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the
-   last good state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
+   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 
-/* The same with the random numbers of seed: member m takes those of first_member + m, from the step
-   first_step on. thermal_spin_ensemble takes 0 for all three. With OpenMP, members are integrated in
+/* thermal_spin_ensemble with given random numbers: member m has those of seed and first_member + m, from the
+   step first_step on. thermal_spin_ensemble sets all three to 0. With OpenMP, members are integrated in
    parallel; the results do not depend on the number of threads. */
 thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);

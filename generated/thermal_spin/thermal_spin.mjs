@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ffefd4831a0f07a4a59d40c0a92693b747e7c242155cf8859c2f037a0dbfb30b
+ * body-sha256: 25f9a103e735fb56d8cfbfdc38152003f5b095ce4303b2c91b2f26725eb86528
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -48,7 +48,9 @@ const DEFAULT_PARAMETERS = Object.freeze({
 /** Parameters that must be positive. */
 const POSITIVE = ["T", "damping_rate"];
 
-/** Sources of noise, increments of each in a step, increments of all, and the bound of normal variates. */
+/**
+ * The sources of noise; the numbers of increments of each in a step, and of all; the bound of normal variates.
+ */
 const SOURCES = Object.freeze(["bath_x", "bath_y", "bath_z"]);
 const PARTS = 1;
 const DRAWS = 3;
@@ -61,12 +63,12 @@ const FRACTIONS = [1.0];
 const MIDDLES = [0.5];
 
 /**
- * Coefficients that depend on parameters and step size only; after them, those that also depend on
- * the step.
+ * The number of coefficients that depend on parameters and step size only. After them come those that also
+ * depend on the step.
  */
 const PREPARED = 7;
 
-/** Coefficients. */
+/** Number of all coefficients. */
 const COEFFICIENTS = 13;
 
 /** Largest number of iterations of an implicit step. */
@@ -299,11 +301,11 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
+/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps good steps until then
+   * @param {number} steps number of successful steps before
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {
@@ -353,7 +355,7 @@ const OPTIONS = "x0 params seed member step0".split(" ");
 
 /**
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
- * where required, and give finite coefficients for a negligibly small step.
+ * where required, and the coefficients of a very small step are finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -388,7 +390,7 @@ export class Solver {
   carry = new Float64Array(DIM);
   /** Time since the start. */
   t = 0;
-  /** The random numbers of a step are a function of these three and of the number of steps made before. */
+  /** The random numbers of a step are a function of seed, member and step0 + steps. */
   seed = 0;
   member = 0;
   step0 = 0;
@@ -396,13 +398,13 @@ export class Solver {
   dw = new Float64Array(DRAWS);
   /** Number of successful steps since the start. */
   steps = 0;
-  /** Number of evaluations of the step equations, or of explicit stages, for statistics. */
+  /** Number of evaluations of the step equations, for statistics. */
   evaluations = 0;
   /** Size of the last step. */
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size; then those of the time or noise. */
+  /** Coefficients of each stage: functions of parameters and step size, then those of noise or time too. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
@@ -477,12 +479,12 @@ export class Solver {
   }
 
   /**
-   * Return an independent solver with the same state. Predictors may start anew.
+   * Return an independent solver with the same state.
    *
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
+    const { x: x0, params, gauge, seed, member, step0 } = this; // some may be undefined
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -492,8 +494,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws
-   * StepError for values that are not admissible; then nothing changes.
+   * Between steps: change parameters; all else is unchanged. Throws StepError for values that are not
+   * admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
@@ -518,7 +520,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: add a change to the state, such as an impulse; otherwise as setState.
+   * Between steps: add a change, such as an impulse, to the state. Throws StepError as setState does.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -536,7 +538,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Replace the state by x + carry. */
+  /** Replace the state by x with the rounding error carry. */
   #place(x, carry) {
     shiftHistory(this, x);
     this.x.set(x);
@@ -545,15 +547,15 @@ export class Solver {
   }
 
   /**
-   * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
-   * they have another length.
+   * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
+   * h, parameters and t0 may be arrays with a number for each state. Throws StepError if an array has another
+   * length.
    *
-   * @param {Iterable<ArrayLike<number>>} members
-   * @param {number | ArrayLike<number>} h
-   * @param {number} count
-   * @param {object} [options] as in the constructor, without x0; member is that of the first state
-   * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
+   * @param {Iterable<ArrayLike<number>>} members initial states
+   * @param {number | ArrayLike<number>} h step size
+   * @param {number} count number of steps
+   * @param {object} [options] as in the constructor, without x0; member is the number of the first state
+   * @returns {{x: Float64Array[], status: string[]}} last states; for each "OK" or the status of the failure
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);
@@ -595,14 +597,14 @@ export class Solver {
     return out;
   }
 
-  /** sigma pi(x) grad g(x) of each source of noise, one after the other. */
+  /** The vector field sigma pi(x) grad g(x) of each source of noise, one after the other. */
   noiseFields(x = this.x, t = this.t) {
     const out = new Float64Array(SOURCES.length * DIM);
     noiseFieldsAt(this.params, t, x, out);
     return out;
   }
 
-  /** The vector field dx/dt at a state and a time. */
+  /** The vector field dx/dt, at x and its time or at given ones. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorFieldAt(this.params, t, x, out);
@@ -610,12 +612,12 @@ export class Solver {
   }
 }
 
-/** The Hamiltonian at x and the time t. */
+/** Compute the Hamiltonian at x; it does not depend on the time t. */
 function energyAt(params, t, x, out) {
   energy(params, x, out);
 }
 
-/** The vector field dx/dt at x and the time t. */
+/** Compute the vector field dx/dt at x; it does not depend on the time t. */
 function vectorFieldAt(params, t, x, out) {
   vectorField(params, x, out);
 }
@@ -655,8 +657,8 @@ function restoreState(solver, copies) {
 // ---- The implicit step, by Newton's method ----
 
 /**
- * Size of a correction relative to each component of y, or to FLOOR times the largest if that is more; NaN if
- * the correction is.
+ * The largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|; NaN or infinity if a correction
+ * is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -679,9 +681,9 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
- * last correction changes the increment to first order, without another evaluation: it is accepted if the
- * remaining error, quadratic in it, is below TOLERANCE.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
+ * a status. The effect of the last correction on the increment is added to first order, without another
+ * evaluation. So a solution is accepted if its error, quadratic in the last correction, is below TOLERANCE.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;
@@ -731,7 +733,7 @@ function upper(a, b) {
 
 /**
  * Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3
- * (2011): four random words from a counter of four.
+ * (2011): four random words, as a function of a counter of four words and a key of two.
  */
 function philox(counter, key) {
   let [a, b, c, d] = counter;
@@ -746,7 +748,7 @@ function philox(counter, key) {
   return [a, b, c, d];
 }
 
-/** A number from 0 up to, but not including, 1, from 53 bits of two words. */
+/** A number in [0, 1), from 53 bits of two words. */
 function unit(high, low) {
   return ((high >>> 5) * 67108864 + (low >>> 6)) * 2 ** -53;
 }
@@ -757,7 +759,7 @@ function words(number) {
   return [Number(bits & 0xffffffffn), Number(bits >> 32n)];
 }
 
-/** Two standard normal variates (Box and Muller), truncated at BOUND, from a counter of four words. */
+/** Two standard normal variates (Box and Muller) of magnitude at most BOUND, from a counter of four words. */
 function twoNormals(counter, key) {
   const [a, b, c, d] = philox(counter, key);
   const radius = Math.min(Math.sqrt(-2 * Math.log(unit(a, b) + 2 ** -54)), BOUND);
@@ -766,8 +768,7 @@ function twoNormals(counter, key) {
 }
 
 /**
- * Read the arguments of the random numbers from the options of a solver; throws StepError for values not
- * allowed.
+ * Seed, member and step0 from the options of a solver. Throws StepError for values that are not admissible.
  */
 function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   for (const [name, value] of Object.entries({ seed, member, step0 })) {
@@ -778,14 +779,14 @@ function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   return { seed, member, step0 };
 }
 
-/** Select the random numbers by the options of a solver. */
+/** Set seed, member and step0 of a solver from its options. */
 function takeDraws(solver, options) {
   Object.assign(solver, drawsOf(options));
 }
 
 // ---- Noise ----
 
-/** Draw normal variates of variance 1, in pairs: the increments of a step. */
+/** Compute normal variates of variance 1 for a step, in pairs. */
 function normals(seed, member, step, values) {
   const [low, high] = words(step);
   for (let k = 0; k < DRAWS; k += 2) {
@@ -795,7 +796,7 @@ function normals(seed, member, step, values) {
 }
 
 /**
- * Set the increments of the next step: the given ones, or random ones.
+ * Set the increments of the noise in the next step to the given ones, else to random ones.
  *
  * @returns {boolean} false if one is not finite, or some are missing
  */
@@ -812,38 +813,38 @@ function draw(solver, increments) {
   return dw.every(Number.isFinite);
 }
 
-/** Read the increments of the next step. Throws StepError if given ones are not admissible. */
+/** Set the increments of the noise in the next step. Throws StepError if given ones are not admissible. */
 function drawStep(solver, increments) {
   if (draw(solver, increments)) return;
   throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${increments}`);
 }
 
-/** The vector fields of the sources of noise at x and the time t. */
+/** Compute the vector fields of the sources of noise at x; they do not depend on the time t. */
 function noiseFieldsAt(params, t, x, out) {
   noiseFields(params, x, out);
 }
 
-/** The coefficients that depend on the increments dw of the noise, and on the time if H depends on it. */
+/** Compute the coefficients that depend on the increments dw of the noise; none depends on the time t. */
 function refreshAt(row, t, dw, out) {
   refresh(row, dw, out);
 }
 
-/** Compute the coefficients of the next step that depend on the time or on the noise. */
+/** For the stages of the next step, compute the coefficients that differ from step to step. */
 function renew({ coef, t, h, dw }) {
   coef.forEach((row, stage) => refreshAt(row, t + MIDDLES[stage] * h, dw, row.subarray(PREPARED)));
 }
 
-/** Clear the predictor of a stage. */
+/** Clear the predictor of a stage, if it has one. */
 function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Shift the predictors of all stages with the state, to x. */
+/** Shift the predictors of all stages by the change of the state of a solver to x. */
 function shiftHistory(solver, x) {
   for (const history of solver.history) history.shift(solver.x, x);
 }
 
-/** Set y to x: solutions of steps with noise cannot be predicted. */
+/** Set y to x, without a prediction: solutions of steps with noise cannot be predicted. */
 function startFrom(history, x, y) {
   y.set(x);
 }
@@ -851,7 +852,7 @@ function startFrom(history, x, y) {
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution and its backward differences, from which the next one is extrapolated. Affects
+ * Predictor: the last solution and its backward differences, which extrapolate to the next solution. Affects
  * the speed only.
  */
 class History {
@@ -868,7 +869,7 @@ class History {
   }
 
   /**
-   * Shift the last value with the state, after this has been changed; differences are unchanged.
+   * Add the change of the state, to - from, to the last solution; differences are unchanged.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -877,13 +878,13 @@ class History {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 
-  /** The last value. */
+  /** The last solution. */
   last() {
     return Float64Array.from(this.#difference[0]);
   }
 
   /**
-   * Predict the next value by the sum of the differences.
+   * Predict the next solution by the sum of the differences.
    *
    * @param {Float64Array} value is overwritten
    * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
@@ -935,8 +936,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
- * at another energy, and unrelated to the motion.
+ * Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
+ * equation may have solutions far away, at another energy, unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -966,7 +967,7 @@ function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage. If it fails from the predicted value, it is tried again from the state.
+ * Make one stage. If attempt fails from the predicted solution, it is called again without a prediction.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -983,7 +984,7 @@ function retried(solver, stage, attempt) {
 
 const fields = new Float64Array(SOURCES.length * DIM);
 
-/** Size of the noise in the increments of the state by a step. */
+/** Contribution of noise to the size of the increment of the state in a step: the sum of |dw| |field|. */
 function sizeOfNoise({ params, t, x, dw }) {
   noiseFieldsAt(params, t, x, fields);
   return fields.reduce((sum, field, k) => sum + Math.abs(dw[Math.floor(k / DIM)] * field), 0);

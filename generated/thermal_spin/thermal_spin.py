@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 07ef894e00104ed242adaa9543030f23da0920eab645b139458b411a22f2744f
+# body-sha256: e629c8ca6d6042607f419bb932a62b13fec4f47fc3f5bb735368b9cea9a5dec5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -30,7 +30,7 @@ DEFAULT_PARAMETERS = {
 # Parameters that must be positive.
 POSITIVE = ("T", "damping_rate",)
 
-# Casimirs of which the solver subtracts multiples from the Hamiltonian: see gauge().
+# Casimirs of which the solver subtracts multiples from the Hamiltonian; gauge() returns the factors.
 GAUGE = ()
 
 # A step of size h is composed of steps of these fractions of h.
@@ -53,12 +53,12 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the coefficients of some members; a single column belongs to all members."""
+    """Return the columns of coefficients for some members; a single column is that of all members."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
 def _stage_at(stage, members):
-    """Return a stage for some of its members."""
+    """Return the data of a stage for some members; arguments with one value for all members are unchanged."""
     coef, parameters, *times = stage
     parameters_of_members = {name: value[members] if np.ndim(value) else value for name, value in parameters.items()}
     return (_at(coef, members), parameters_of_members, *(time[members] if np.ndim(time) else time for time in times))
@@ -71,7 +71,7 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values, arrays or numbers, along a last axis, which replaces that of `like`."""
+    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -98,7 +98,7 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -108,8 +108,7 @@ def _values(parameters):
 def _admissible(values):
     """Return whether steps can be made with these parameters.
 
-    They must be finite, positive where the spec requires it, and give finite coefficients for a negligibly small
-    step.
+    They must be finite, positive where the spec requires it, and the coefficients of a very small step must be finite.
     """
     if not all(np.isfinite(value).all() for value in values.values()):
         return False
@@ -288,7 +287,7 @@ def _linearise(coef, y):
 
 
 def _solve(matrix, side):
-    """Return the solutions of linear systems, NaN if the matrix is singular."""
+    """Return the solutions of linear systems, one for each member; NaN if its matrix is singular."""
     try:
         return np.linalg.solve(matrix, side[..., np.newaxis])[..., 0]
     except np.linalg.LinAlgError:
@@ -302,9 +301,9 @@ MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Return whether the increments of steps agree with the motion; arrays (members, DIM).
+    """Return for which members the increment from x to end is short, or the change of energy small.
 
-    If the step is too large, the solution found may be far away, at another energy, and unrelated to the motion.
+    If a step is too large, its equation may have solutions far away, at another energy, unrelated to the motion.
     """
     _, parameters, h, dw = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -332,7 +331,7 @@ SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows
 
 
 def _size(y, delta):
-    """Return the size of a correction relative to each component of y, or to FLOOR times the largest if that is more."""
+    """Return the largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|, for each member."""
     scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
 
@@ -340,8 +339,9 @@ def _size(y, delta):
 def _attempt(coef, x, carry, y):
     """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
 
-    The last correction changes the increment to first order; it is accepted if the remaining error, quadratic in it,
-    is below 1e-20. Returns new x, carry, y, and a status for each member, "" if good.
+    The effect of the last correction on the increment is added to first order, so a solution is accepted if its error,
+    quadratic in the last correction, is below 1e-20. Returns new x, carry, y, and a status for each member, ""
+    if good.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -356,7 +356,7 @@ def _attempt(coef, x, carry, y):
         status[open_[~finite]] = "NOT_FINITE"
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
-        # Second criterion: corrections no longer shrink, the solve has reached rounding level.
+        # Second criterion: corrections no longer shrink, since they are at rounding level.
         done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
@@ -372,7 +372,7 @@ def _attempt(coef, x, carry, y):
 
 
 def _advance(stage, x, carry, memory):
-    """Make one stage of all members. `memory` holds the last offset y - x only: steps with noise cannot be
+    """Make one stage of all members. `memory` holds the last offset y - x only, since steps with noise cannot be
     predicted."""
     following, rest, y, status = _solved(stage, x, carry, x)
     return following, rest, (y - x, y - x), status
@@ -383,15 +383,18 @@ def _choose_gauge(parameters, x):
     return np.zeros((len(x), 0))
 
 
-# The sources of noise; the increments of each in a step; the parts of a step with increments of their own; the bound of
-# normal variates, since rare larger ones would make steps fail.
+# The sources of noise; the number of increments in a step; the number of parts of a step with increments of their own;
+# the bound of normal variates, since rare larger ones would make steps fail.
 SOURCES = ("bath_x", "bath_y", "bath_z",)
 PARTS = 1
 BOUND = 6.0
 
 
 def _philox(counter, key):
-    """Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw (2011): four words of 32 bits, as uint64, from four."""
+    """Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw (2011): four random words from a counter of four.
+
+    Words have 32 bits, stored as uint64; the key has two words.
+    """
     low = np.uint64(0xFFFFFFFF)
     a, b, c, d = counter
     for turn in range(10):
@@ -403,12 +406,12 @@ def _philox(counter, key):
 
 
 def _unit(high, low):
-    """Numbers from 0 up to, but not including, 1, from 53 bits of two words."""
+    """Return numbers in [0, 1), from 53 bits of two words."""
     return ((high >> np.uint64(5)) * 67108864.0 + (low >> np.uint64(6))) * 2.0**-53
 
 
 def _two_normals(seed, counter):
-    """Return two arrays of independent standard normal variates (Box and Muller), from the words of a counter."""
+    """Return two arrays of independent standard normal variates (Box and Muller), from a counter of four words."""
     a, b, c, d = _philox(counter, (seed & 0xFFFFFFFF, seed >> 32))
     radius = np.minimum(np.sqrt(-2.0 * np.log(_unit(a, b) + 2.0**-54)), BOUND)
     angle = 6.283185307179586 * _unit(c, d)
@@ -416,7 +419,7 @@ def _two_normals(seed, counter):
 
 
 def _normals(seed, members, step):
-    """Normal variates of variance 1: (increments in a step, members)."""
+    """Return normal variates of variance 1 for a step: (increments in a step, members)."""
     count, word, normals = PARTS * len(SOURCES), 0xFFFFFFFF, []
     for pair in range((count + 1) // 2):
         counter = [np.full(members.shape, w, dtype=np.uint64) for w in (step & word, step >> 32, 0, pair)]
@@ -428,20 +431,21 @@ def _normals(seed, members, step):
 def _drawing(h, count, seed=0, member=0, step0=0, increments=None):
     """Return the increments of the noise as a function of the number of steps done: (increments, members).
 
-    They are a function of seed, member (that of the first, or an array of all) and the number of the step, step0 +
-    done, only; or `increments` (steps, increments) for all members, or (steps, members, increments).
+    Random increments depend only on seed, member (a number for the first member, or an array for all), and the number of
+    the step, step0 + done. `increments`, if given, are used instead: (steps, increments) for all members, or (steps,
+    members, increments).
     """
     members = np.arange(count) + member if np.ndim(member) == 0 else np.asarray(member)
     if increments is None:
-        size = np.sign(h) * np.sqrt(abs(h) / PARTS)  # so that a step of -h is the inverse of one of h
+        size = np.sign(h) * np.sqrt(abs(h) / PARTS)  # so that a step of -h inverts one of h
         return lambda done: size * _normals(int(seed), members, int(step0) + done)
     draws = PARTS * len(SOURCES)
     return lambda done: np.broadcast_to(np.asarray(increments[done], dtype=float), (count, draws)).T
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data that depend on parameters and step only: coefficients (coefficients, members or 1),
-    parameters, step."""
+    """Return the data of each stage that depend on parameters and step size only: coefficients, (coefficients, members or
+    1), parameters and step size."""
     return [(_table(_prepare(parameters, h)), parameters, h)]
 
 
@@ -467,7 +471,7 @@ def step(x, h, seed=0, member=0, step0=0, increments=None, gauge=None, **paramet
 
 
 def _of_members(value, x):
-    """Return a number, or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
@@ -579,7 +583,7 @@ def casimirs(x, **parameters):
 
 
 def noise_fields(x, **parameters):
-    """Return sigma pi(x) grad g(x) of each source of noise: (..., DIM) -> (..., len(SOURCES), DIM)."""
+    """Return the vector field sigma pi(x) grad g(x) of each source of noise: (..., DIM) -> (..., len(SOURCES), DIM)."""
     x, values = np.asarray(x, dtype=float), _values(parameters)
     with np.errstate(all="ignore"):
         return _noise_fields(values, x).reshape(x.shape[:-1] + (len(SOURCES), DIM))

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 450a71eccc700a8c835bded74e215a78fa62cc30737cc56698c8d44422c3e8a0
+ * body-sha256: 8a00fc3a551f422e1f4bc08e9bf92413c97a1cee97b253e9a185e4c5530c5ad0
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -28,7 +28,7 @@ const AXES = Object.freeze(["i"]);
 const COORDINATES = Object.freeze(["a", "b"]);
 const CASIMIRS = Object.freeze(["momentum", "length"]);
 
-/** Kind of each Casimir: its value at each of the "sites", or their "sum" or "product". */
+/** The kind of each Casimir: a value at each of the "sites", or their "sum" or "product". */
 const CASIMIR_KINDS = Object.freeze(["sum", "product"]);
 
 /**
@@ -37,7 +37,7 @@ const CASIMIR_KINDS = Object.freeze(["sum", "product"]);
 const DEFAULT_PARAMETERS = Object.freeze({
 });
 
-/** Parameters that must be positive, and those with a value at each site, or bond. */
+/** Parameters that must be positive, and those that may have a value at each site. */
 const POSITIVE = [];
 const AT_SITES = [];
 
@@ -52,15 +52,15 @@ const NEAR = [[-1], [1]];
 /** Terms of H that open ends remove: the smallest and the largest offset of their sites along each axis. */
 const BOUNDS = [];
 
-/** Numbers that depend on parameters and step size only, in each of their rows. */
+/** Number of coefficients in a row. */
 const COEFFICIENTS = 2;
 
-/** The times of the flows of a step, as fractions of it, each with a row. */
+/** The times of the flows, as fractions of a step: one for each row of coefficients. */
 const TIMES = [0.08298440641740498, 0.2452989571842711, 0.39630980149836803, 0.6048726657110799,
   -0.03905630492234843, -0.35017162289535103, 0.11952419401315083, -0.35017162289535103, -0.03905630492234843,
   0.6048726657110799, 0.39630980149836803, 0.2452989571842711, 0.08298440641740498];
 
-/** The flows of a step in order: a part of H, and a row of TIMES. */
+/** The flows of a step in order, each as [part of H, row of TIMES]. */
 const SCHEDULE = [[0, 0], [1, 1], [0, 2], [1, 3], [0, 4], [1, 5], [0, 6], [1, 7], [0, 8], [1, 9], [0, 10],
   [1, 11], [0, 12]];
 
@@ -151,11 +151,11 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
+/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps good steps until then
+   * @param {number} steps number of successful steps before
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {
@@ -199,7 +199,7 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 /** The options of the constructor. */
 const OPTIONS = "x0 sizes params".split(" ");
 
-/** The coefficients of all flows or stages of a step: a row for each time. */
+/** Compute the coefficients of a step: a row for each of TIMES. */
 function prepareStep(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
   return rows;
@@ -230,7 +230,7 @@ export class Solver {
   static CASIMIR_KINDS = CASIMIR_KINDS;
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state, one field after the other, each with the last axis fastest; read only. */
+  /** The state, to be read only: one field after the other, each with the last axis fastest. */
   x;
   /** Time since the start. */
   t = 0;
@@ -244,7 +244,7 @@ export class Solver {
   rows = emptyRows();
   /** The state before a step. */
   before;
-  /** Predictors and other results of steps of one size, for later steps. */
+  /** Predictors of steps of one size. */
   past = {};
   /** Steps and time at the last change of h, from which the time is counted. */
   #stepsBefore = 0;
@@ -279,7 +279,7 @@ export class Solver {
     return this.sites.sizes;
   }
 
-  /** The values of a field at all sites, as a part of x; to be read only. */
+  /** The values of a field at all sites, a part of x; to be read only. */
   field(name) {
     const k = COORDINATES.indexOf(name);
     if (k < 0) throw new StepError("BAD_ARGUMENT", this.steps, `there is no field ${name}`);
@@ -345,7 +345,7 @@ export class Solver {
     return march(this, h, count);
   }
 
-  /** The density of the Hamiltonian at each site, of x and its time or of others. */
+  /** The density of the Hamiltonian at each site, at x and its time or at given ones. */
   density(x = this.x, t = this.t) {
     const out = new Float64Array(this.sites.count);
     this.sites.t = t;
@@ -353,14 +353,14 @@ export class Solver {
     return out;
   }
 
-  /** The Hamiltonian, of x or of another state. */
+  /** The Hamiltonian, at x and its time or at given ones. */
   hamiltonian(...at) {
     return sumOf(this.density(...at));
   }
 
   /**
-   * The Casimirs at each site, one after the other in the order of CASIMIRS. By CASIMIR_KINDS, a Casimir is
-   * each value ("sites"), their sum, or their product.
+   * The terms of the Casimirs at each site, one Casimir after the other in the order of CASIMIRS.
+   * CASIMIR_KINDS says whether a Casimir is the value at each site ("sites"), their sum, or their product.
    */
   casimirs(x = this.x) {
     const out = new Float64Array(CASIMIRS.length * this.sites.count);
@@ -368,7 +368,7 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H at x and its time or at others, laid out as x. */
+  /** The right-hand side pi(x) grad H, laid out as x, at x and its time or at given ones. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(x.length);
     this.sites.t = t;
@@ -377,14 +377,14 @@ export class Solver {
   }
 }
 
-/** Compute the coefficients of a flow or stage. */
+/** Compute a row of coefficients. */
 function prepareRow(params, time, h, row) {
   prepare(params, time * h, row);
 }
 
 // ---- The sites ----
 
-/** The sum of values, compensated after A. Neumaier. */
+/** The sum of values, by the compensated summation of A. Neumaier. */
 function sumOf(values) {
   let sum = 0, rest = 0;
   for (const value of values) {
@@ -397,7 +397,7 @@ function sumOf(values) {
 
 /** The sites of a lattice: their parameters, and tables of the neighbours that kernels read. */
 class Sites {
-  /** Initialise from the options of a solver, with the sizes; throws StepError for values not allowed. */
+  /** Initialise from the options of a solver. Throws StepError for values that are not admissible. */
   constructor(sizes, options) {
     const fits = (n, axis) => Number.isInteger(n) && n >= LEAST[axis] && n % PERIODS[axis] === 0;
     if (sizes.length !== AXES.length || !sizes.every(fits)) {
@@ -408,17 +408,15 @@ class Sites {
     this.count = sizes.reduce((product, n) => product * n, 1);
     this.params = this.#admitted(options.params ?? {});
     const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
-    /**
-     * The neighbours of each site, and 1 or 0 for terms of H that exist there or not, for each kind of term.
-     */
+    /** The neighbour of each site, for each offset of NEAR. Below: 1 or 0 where terms of H exist or not. */
     this.near = NEAR.map((offset) => every(Int32Array, (i) => this.#beside(i, offset)));
     this.present = BOUNDS.map((bounds) => every(Float64Array, (i) => this.#holds(i, bounds)));
-    /** The flows of a step: a part of H, a row of coefficients. */
+    /** The flows of a step, each as [part of H, row of coefficients]. */
     this.flows = SCHEDULE;
   }
 
   /**
-   * All parameters: the given ones, and defaults. Throws StepError unless they are known and finite, and
+   * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, and
    * positive where required.
    */
   #admitted(overrides) {
@@ -426,7 +424,7 @@ class Sites {
     if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
     const params = Object.create(null);
     for (const [name, value] of Object.entries({ ...DEFAULT_PARAMETERS, ...overrides })) {
-      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: one number
+      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: not an array
       const listed = typeof value === "object" && length !== undefined;
       const values = listed ? finite(value, length, name) : [value];
       if (!values.every((v) => Number.isFinite(v) && (v > 0 || !POSITIVE.includes(name)))) {
@@ -453,7 +451,7 @@ class Sites {
     return place;
   }
 
-  /** The site at an offset; beyond open ends any site, since kernels multiply it by 0. */
+  /** The site at an offset from a site; beyond open ends any site, since kernels multiply its values by 0. */
   #beside(site, offset) {
     return this.#place(site).reduce((sum, from, axis) => {
       const size = this.sizes[axis];
@@ -464,7 +462,7 @@ class Sites {
     }, 0);
   }
 
-  /** 1 where all sites from offset low to offset high exist, along each open axis, else 0. */
+  /** 1 if all sites from offset low to offset high exist, along each open axis, else 0. */
   #holds(site, bounds) {
     const place = this.#place(site);
     const inside = ([low, high], axis) => place[axis] + low >= 0 && place[axis] + high < this.sizes[axis];

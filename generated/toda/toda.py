@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: c136a01389faceb9e79bdc9337088b9ddc2038c6e2cb165609e294c564d11b47
+# body-sha256: 984e139b1d2f1bcfa78e4d9b21e03a8addd381e796a2a9f79bc572454d603a75
 import numpy as np
 
 VERSION = "0.1.0"
@@ -28,8 +28,8 @@ OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
 
-# The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
-# part of H, and its row.
+# The times of flows, as fractions of a step: one for each row of coefficients. The flows of a step in order, each as (part
+# of H, row).
 TIMES = (0.08298440641740498, 0.2452989571842711, 0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083, -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711, 0.08298440641740498,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12))
@@ -38,7 +38,7 @@ SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 
 class StepError(ArithmeticError):
     """A step failed.
 
-    step: number of the failing step, from 0; status: NO_CONVERGENCE, NOT_FINITE; states: the frames so far.
+    step: number of the failing step, from 0; status: NO_CONVERGENCE or NOT_FINITE; states: the frames so far.
     """
 
     def __init__(self, step, status, states):
@@ -50,7 +50,7 @@ class StepError(ArithmeticError):
 
 
 class FailedError(ArithmeticError):
-    """Error in a step: the status."""
+    """Error in a step; its argument is the status."""
 
 
 def _finite(values):
@@ -85,7 +85,7 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """() for a parameter with one value."""
+        """Return the shape of the values of a parameter: () for one value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
@@ -110,7 +110,7 @@ class _Sites:
 
 
 def _advance(sites, rows, x, past):
-    """Make one step; raises FailedError. There is no predictor."""
+    """Make one step; raises FailedError. `past` is unused: nothing is predicted."""
     for part, row in SCHEDULE:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -171,7 +171,7 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the densities of the Casimirs (CASIMIRS, *sizes)."""
+    """Return the terms of the Casimirs at each site, (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 

@@ -48,7 +48,7 @@ def stage_attitude(
     p, slope = list(generating.turning), "grad S_h(y), without the forces," if generating.free else "p = grad S_h(y)"
     values = coefficients.hoist(_element_less_one(group, p, cayley))
     purpose = f"the attitude increment of {slope}, a {'matrix' if group.matrices else 'quaternion'} minus 1"
-    purpose += ", and what it translates by" * bool(group.translation)
+    purpose += ", and its translation" * bool(group.translation)
     if group.matrices and not cayley:
         purpose = f"{slope.rstrip(',')}, and {SIZE_OF_COVECTOR}"
     inputs = {"coef": coefficients.slots, "y": system.coordinates}

@@ -31,14 +31,8 @@ NEWTON_OPERATION, CACHED_OPERATIONS, UNCACHED_OPERATION = 0.04, 3000, 0.1
 #: Nanoseconds of a step by Newton's method for each entry of its matrix.
 NEWTON_ENTRY = 8.0
 #: Nanoseconds, in all sweeps of a Gauss step, of an operation at eight stages in lanes and of a function; nanoseconds
-#: of the rest of a step.
-STAGE_OPERATION, STAGE_FUNCTION, GAUSS_STEP = 3.0, 70.0, 130.0
-#: Nanoseconds of the change of frame of the increments of two steps. Measured at eight stages: 14 on the rigid body, 22
-#: on so(4), 39 on the Kowalevski top.
-CHANGE_OF_FRAME = 30.0
-#: Time of operations with up to four stages, relative to that with eight. Measured in sweeps: 0.54 on the Kowalevski
-#: top, 0.58 on so(4), 0.63 on the rigid body, 0.69 on Hénon–Heiles.
-HALF_VECTOR = 0.5
+#: of the rest of a step, and of a change of frame. With up to four stages, operations take half of the time.
+STAGE_OPERATION, STAGE_FUNCTION, GAUSS_STEP, CHANGE_OF_FRAME = 3.0, 70.0, 130.0, 30.0
 #: Number of additions that take the time of a division.
 DIVISION = 4
 #: Number of stages that fill a SIMD vector.
@@ -105,7 +99,7 @@ def _gauss(program: Program, grown: float) -> float:
     step = cast(Gauss, program.step)
     counts = operation_counts(step.reduced.slope.roots) if step.reduced else program.about.operations
     operations, functions = _counted(counts)
-    lanes = 1.0 if step.tableau.stages > LANES // 2 else HALF_VECTOR
+    lanes = 1.0 if step.tableau.stages > LANES // 2 else 0.5
     once = GAUSS_STEP + (CHANGE_OF_FRAME if step.frame else 0.0)
     return once + lanes * grown * (STAGE_OPERATION * operations + STAGE_FUNCTION * functions)
 

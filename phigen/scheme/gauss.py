@@ -241,11 +241,11 @@ def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge,
     if not realisation.exact:
         yield "structure: to truncation; a step is not a Poisson map, and conserves Casimirs of degree 1 and 2 only"
     elif realisation.groups:
-        momenta = "; ".join(", ".join(system.coordinates[i] for i in g.indices) for g in realisation.groups)
-        yield f"structure: exact; quadratic momentum maps for {momenta}"
+        group_names = "; ".join(", ".join(system.coordinates[i] for i in g.indices) for g in realisation.groups)
+        yield f"structure: exact; quadratic momentum maps for {group_names}"
     elif realisation.logarithms:
-        positive = ", ".join(system.coordinates[i] for part in realisation.logarithms for i in part.indices)
-        yield f"structure: exact, as brackets are constant with the logarithms of {positive}"
+        group_names = ", ".join(system.coordinates[i] for part in realisation.logarithms for i in part.indices)
+        yield f"structure: exact, as brackets are constant with the logarithms of {group_names}"
     else:
         yield "structure: exact, as the brackets are constant"
     yield from gauge.facts

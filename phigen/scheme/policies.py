@@ -72,7 +72,8 @@ class PathPolicy(Policy):
 
     longest_path: int = count(128, "largest number of pieces of a path, a power of 2")
     most_pieces: int = count(
-        512, "... of all paths of a solve: steps that need more have errors of the size of the state"
+        512,
+        "largest number of pieces of all paths of a solve; steps that need more have errors of the size of the state",
     )
     patience: int = count(3, "iterations with the approximate Jacobian before its contraction is checked")
     negligible: float = number(1e-17, "terms of a series below this, relative to the path, are rounding")
@@ -144,9 +145,9 @@ class GaugeSearch(Policy):
 class TangentPolicy(Policy):
     """The additional solve for the point of a step, to the last bit, before its derivative is computed."""
 
-    tangent_solved: float = number(1e-15, "a correction below this is rounding;")
-    tangent_nearly_solved: float = number(1e-10, "one below this is rounding too ...")
-    tangent_shrinking: float = number(0.25, "... if it exceeds this fraction of the one before")
+    tangent_solved: float = number(1e-15, "a correction below this is rounding")
+    tangent_nearly_solved: float = number(1e-10, "a correction below this that no longer shrinks is rounding too")
+    tangent_shrinking: float = number(0.25, "a correction shrinks if below this fraction of the one before")
 
 
 @dataclass(frozen=True)
@@ -190,8 +191,8 @@ class LatticeSweepPolicy(Policy):
     least_size: float = number(1e-3, "smaller fields are measured relative to this fraction of the largest")
     settled: float = number(2.0**-55, "largest expected change by further sweeps, relative to y")
     rounding: float = number(2.0**-40, "changes below this may be rounding")
-    slow: float = number(0.6, "slower convergence is left to Newton's method ...")
-    nearly_settled: float = number(2.0**-30, "... unless changes are below this")
+    slow: float = number(0.6, "a change above this fraction of the one before is left to Newton's method")
+    nearly_settled: float = number(2.0**-30, "changes below this are not left to Newton's method")
 
 
 @dataclass(frozen=True)
@@ -199,8 +200,8 @@ class LatticeNewtonPolicy(Policy):
     """Newton's method for a stage for which sweeps do not converge, with linear equations in Krylov spaces."""
 
     directions: int = count(24, "dimension of the Krylov space of a correction")
-    solved: float = number(1e-6, "relative residual at which the iteration for a correction ends, ...")
-    useful: float = number(0.9, "... and the largest one that is accepted")
+    solved: float = number(1e-6, "relative residual at which the iteration for a correction ends")
+    useful: float = number(0.9, "largest relative residual of an accepted correction")
     plausible: float = number(1.5, "solutions farther from x than this, relative to x and its motion, are rejected")
 
 
@@ -208,9 +209,9 @@ class LatticeNewtonPolicy(Policy):
 class LatticeTangentPolicy(Policy):
     """The equation of a tangent vector of a lattice, solved by corrections."""
 
-    carried: float = number(2.0**-54, "a relative residual of a tangent vector below this is rounding;")
-    nearly_carried: float = number(1e-11, "one below this is rounding too ...")
-    carried_shrinking: float = number(0.5, "... if it exceeds this fraction of the one before")
+    carried: float = number(2.0**-54, "a relative residual of a tangent vector below this is rounding")
+    nearly_carried: float = number(1e-11, "a residual below this that no longer shrinks is rounding too")
+    carried_shrinking: float = number(0.5, "a residual shrinks if below this fraction of the one before")
 
 
 #: The policies of all runtimes by the names of the files that hold their constants.

@@ -67,9 +67,10 @@ STATE = (
     ),
     StateBlock(
         "evaluations",
-        "!IMPLICIT && !GAUSS",
-        ("size_t evaluations;    /* number of computed stages (splitting: of steps), for statistics */",),
+        "!IMPLICIT && !GAUSS && !SPLITTING",
+        ("size_t evaluations;    /* number of computed stages, for statistics */",),
     ),
+    StateBlock("evaluations", "SPLITTING", ("size_t evaluations;    /* number of computed steps, for statistics */",)),
     StateBlock(
         "t",
         "MONITOR",
@@ -110,8 +111,13 @@ STATE = (
     StateBlock("common", "COMMON", ("PHI_COMMON_MEMBER",)),
     StateBlock(
         "coef",
-        "NOISE",
+        "NOISE && TIMED",
         (f"{_COEFFICIENTS} /* functions of params and h, then functions of dw and time too */",),
+    ),
+    StateBlock(
+        "coef",
+        "NOISE && !TIMED",
+        (f"{_COEFFICIENTS} /* functions of params and h, then functions of dw too */",),
     ),
     StateBlock(
         "coef",

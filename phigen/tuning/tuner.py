@@ -19,24 +19,13 @@ from phigen.tuning.search import Curve
 from phigen.tuning.settings import SPLITTING, Setting, direct, own_setting
 from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
 
-#: Share of the budget by which all builds must have ended. A quarter is left for the scans of the last round.
-LAST_BUILD = 0.65
-#: Shares of the budget for one round of builds, and for one scan. A search has three rounds or more, so a round that
-#: compiles slowly, or a candidate with slow steps, must not take all of it.
-BUILD_ROUND, SCAN = 0.2, 0.1
-#: Share of the budget for the expected builds of the first guesses: half of what a round may take, as the times of
-#: builds are estimated from one build only.
-FIRST_ROUND = 0.1
-#: Share of the budget for one reference solution. Up to three spans are tried, each by two methods.
-REFERENCE = 0.05
-#: Share of the budget after which no candidate is scanned. The rest is for confirming runs, which take 0.05 each.
-LAST_SCAN = 0.9
-#: The same for classical methods: half of a scan earlier, as the result does not depend on them.
-LAST_PEER = 0.85
-#: Cost, relative to the best so far, above which the scan of a candidate ends: it cannot be the result.
-MAX_CANDIDATE_COST = 4.0
-#: The same for a classical method, which is in the figure even if it is far more expensive.
-MAX_PEER_COST = 100.0
+#: Shares of the budget: after which no build starts; for one round of builds; for the expected time of a first guess;
+#: for one scan; and for one reference solution.
+SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
+#: Shares of the budget after which no candidate, and no classical method, is scanned.
+SCANNED, COMPARED = 0.9, 0.85
+#: Largest cost of a candidate, and of a classical method, relative to the best so far.
+WORTH, WORTH_KNOWING = 4.0, 100.0
 #: Classical methods with which the result is compared: their names in tables, and orders.
 PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
 
@@ -110,9 +99,9 @@ class Tuner:
         """Try candidates. Return true if no further candidate is promising, false if the time is up."""
         assert current.setting is not None
         guesses = self.problem.guesses(current.setting)
-        limit = FIRST_ROUND * self.clock.budget
+        limit = GUESSING * self.clock.budget
         proposed = [s for s in guesses if expected_seconds(s, [current]) < limit]
-        while proposed and self.clock.left(LAST_BUILD) > 0:
+        while proposed and self.clock.left(SEARCHING) > 0:
             self.try_all(proposed)
             proposed = search.proposals(self.tried, list(self.refused), self.accuracy)
         return not proposed
@@ -133,23 +122,23 @@ class Tuner:
     def peers(self) -> list[Curve]:
         """Return the curves of the classical methods; none if there is no time to compile them."""
         current = next(iter(self.tried.values()))
-        if self._race is None and current.seconds > self.clock.left(LAST_PEER):
+        if self._race is None and current.seconds > self.clock.left(COMPARED):
             return []
         curves = []
         for name, (label, order) in PEERS.items():
-            if self.clock.left(LAST_PEER) <= 0:
+            if self.clock.left(COMPARED) <= 0:
                 break
             method = self._classical(name)
             label = f"{label} in {self._raced.language}"
             self.methods[label] = method
-            points = self._scanned(self.methods[label], order, MAX_PEER_COST * self.least, bounded=False)
+            points = self._scanned(self.methods[label], order, WORTH_KNOWING * self.least, bounded=False)
             curves.append(Curve(label, order, points, bounded=False))
         return curves
 
     def try_all(self, settings: Sequence[Setting]) -> None:
         """Build settings in parallel, and measure them when all builds have ended."""
         outcomes: dict[Setting, Outcome] = {s: self._made[s] for s in settings if s in self._made}
-        until = min(self.clock.at(LAST_BUILD), time.perf_counter() + BUILD_ROUND * self.clock.budget)
+        until = min(self.clock.at(SEARCHING), time.perf_counter() + BUILDING * self.clock.budget)
         affordable = self._affordable([s for s in settings if s not in self._made])
         if affordable:
             self.note(f"building {len(affordable)} more")
@@ -162,10 +151,10 @@ class Tuner:
                 self.refused[setting] = "it is not a Poisson map to round-off"
             elif outcome.fingerprint in self._known:
                 self.refused[setting] = ""
-            elif self.clock.left(LAST_SCAN) <= 0:
+            elif self.clock.left(SCANNED) <= 0:
                 self.refused[setting] = "there was no time to measure it"
             else:
-                curve = self.add(outcome, self.problem.method(outcome.solver()), MAX_CANDIDATE_COST * self.least)
+                curve = self.add(outcome, self.problem.method(outcome.solver()), WORTH * self.least)
                 cost = curve.cost(self.accuracy)
                 duration = f"{1e-6 * cost * self.problem.horizon:.3g} ms" if math.isfinite(cost) else "not reached"
                 self.note(f"{curve.title}: {duration}")
@@ -181,7 +170,7 @@ class Tuner:
         states = self.methods[curve.key].rows(h, stride * count, stride)
         if states is None or self._race is None:
             return None
-        seconds = REFERENCE * self.clock.budget
+        seconds = REFERRING * self.clock.budget
         return orbit_error(states, stride * h, self._classical("dop853"), self.problem.step, seconds)
 
     def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
@@ -189,14 +178,14 @@ class Tuner:
         affordable = []
         for setting in settings:
             expected = expected_seconds(setting, self.tried.values())
-            if expected > self.clock.left(LAST_BUILD):
+            if expected > self.clock.left(SEARCHING):
                 self.refused[setting] = f"building it would take some {expected:.0f} s"
             else:
                 affordable.append(setting)
         return affordable
 
     def _scanned(self, method: CompiledMethod, order: int, worth: float, *, bounded: bool) -> tuple[Point, ...]:
-        until = time.perf_counter() + min(SCAN * self.clock.budget, max(self.clock.left(LAST_SCAN), 0.0))
+        until = time.perf_counter() + min(SCANNING * self.clock.budget, max(self.clock.left(SCANNED), 0.0))
         measure, span = self.measures[bounded], self.piece
         return search.scan(
             lambda h: measure(method, h, span), self.problem.step, self.most, self.accuracy, order, worth,
@@ -215,7 +204,7 @@ class Tuner:
 
     def _refer(self, setting: Setting, method: Candidate) -> None:
         """Measure orbit errors from now on, against a solver of higher order if there is one, confirmed by DOP853."""
-        problem, until = self.problem, time.perf_counter() + BUILD_ROUND * self.clock.budget
+        problem, until = self.problem, time.perf_counter() + BUILDING * self.clock.budget
         high = replace(setting, order=max(setting.order, 8), composition=direct(setting))
         candidates = [s for s in (Setting(SPLITTING, 8, "none", "auto"), high) if s != setting]
         if high != setting:
@@ -235,7 +224,7 @@ class Tuner:
 
     def _reference(self, method: CompiledMethod) -> Reference:
         """Return the reference over the piece, which is shortened if rounding or chaos require it."""
-        problem, second, seconds = self.problem, self._classical("dop853"), REFERENCE * self.clock.budget
+        problem, second, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
         step, clock = problem.step, problem.clock
         for shorter in (1, 4, 16):
             span = self.piece / shorter

@@ -6,7 +6,6 @@ from support import COMMAND
 
 from phigen.api import compilation_of
 from phigen.compiler import emit
-from phigen.targets.device.members import group_size
 
 pytestmark = pytest.mark.skipif(not nvrtc.is_installed(), reason="the wheels of NVRTC and ptxas are not installed")
 
@@ -55,14 +54,3 @@ def test_four_blocks_of_a_rigid_body_fit_into_the_registers_of_a_multiprocessor(
     assert (used.spilled, used.stack) == (0, 0)
     assert 4 * 128 * used.registers <= 65_536
     assert 4 * 128 * resources_of("rigid_body", architecture, tmp_path, 4, options[0]).registers > 65_536
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["henon_heiles", "kowalevski_top"])
-def test_one_block_more_than_by_default_fits_if_the_user_asks_for_it(name, tmp_path):
-    """In work groups of 128 and of 64, with 65,536 registers; the second system spills some, by default too."""
-    group = group_size(compilation_of(name, order=4, profile="small").program)
-    common, architecture = f"-D{name}_COMMON", nvrtc.ARCHITECTURES[0]
-    by_default = 65_536 // (group * resources_of(name, architecture, tmp_path, 4, common).registers)
-    used = resources_of(name, architecture, tmp_path, 4, common, f"-D{name}_BLOCKS={by_default + 1}")
-    assert (by_default + 1) * group * used.registers <= 65_536

@@ -7,7 +7,6 @@ from support import BODY, compile_text, slow_but, spec_of
 
 from phigen.compiler import compile_spec
 from phigen.errors import SpecError
-from phigen.scheme import efficiency
 from phigen.spec import loads
 
 #: The fastest scheme at an orbit error of 10^(−order), measured: in all of these cases by more than 1.3.
@@ -28,24 +27,6 @@ def automatic(name, order, **more):
 @pytest.mark.parametrize(("name", "order"), slow_but(FAST, FASTEST))
 def test_the_choice_is_the_fastest(name, order):
     assert automatic(name, order).scheme_name == FASTEST[name, order]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "order", "scheme", "changed"),
-    [
-        ("spin_chain5", 6, "gauss", {"HALF_VECTOR": 1.0}),
-        ("so4_manakov", 6, "splitting", {"HALF_VECTOR": 0.25}),
-        ("spin_chain5", 6, "gauss", {"CHANGE_OF_FRAME": 90.0}),
-        ("maxwell_bloch", 12, "series", {"CHANGE_OF_FRAME": 0.0}),
-    ],
-)
-def test_close_choices_follow_from_measured_times_of_gauss_steps(name, order, scheme, changed, monkeypatch):
-    """Times a factor of two, or a change of frame, apart from those measured give another choice."""
-    assert automatic(name, order).scheme_name == scheme
-    for constant, value in changed.items():
-        monkeypatch.setattr(efficiency, constant, value)
-    assert automatic(name, order).scheme_name != scheme
 
 
 def test_the_program_is_that_of_the_scheme():

@@ -50,7 +50,7 @@ LATTICE = (
     StateBlock(
         "placed",
         "JACOBI",
-        ("double *placed[PHI_ARRAYS]; /* as x, with the positions of bodies from the first one */",),
+        ("double *placed[PHI_ARRAYS]; /* as x, but with positions relative to the first body */",),
         reset=(
             "memcpy(s->placed, s->x, sizeof s->x);",
             "for (int k = 0; k < PHI_BODY_AXES; ++k, memory += block) s->placed[phi_body_axes[k][0]] = memory;",
@@ -83,7 +83,7 @@ LATTICE = (
     StateBlock(
         "at_bonds",
         "GRAPH && BOND_PARAMETERS",
-        ("double *at_bonds[PHI_BOND_ARRAYS]; /* for each of these, parameters at bonds */",),
+        ("double *at_bonds[PHI_BOND_ARRAYS]; /* for each entry of other, the parameters at the bond */",),
     ),
     StateBlock(
         "colours",

@@ -17,7 +17,7 @@ TABLE = (
         "march",
         "COMPOSED && !PATH",
         (
-            "int marching; /* 1 if the last steps were a block, whose slopes these are */",
+            "int marching; /* 1 if the last steps were a block; slope then holds its slopes */",
             "double slope[PHI_DIM][PHI_SLOPES];",
         ),
     ),
@@ -54,9 +54,9 @@ MODEL = (
         "middle",
         "PATH",
         (
-            "phi_lanes middle[PHI_DIM]; /* the middle of the path, less y */",
+            "phi_lanes middle[PHI_DIM]; /* the middle of the path minus y */",
             "phi_lanes alpha_y[PHI_DIM * PHI_DIM], increment_y[PHI_DIM * PHI_DIM];"
-            " /* of alpha and beta - alpha, with p held fixed */",
+            " /* derivatives of alpha and of beta - alpha by y, with p held fixed */",
         ),
     ),
 )
@@ -70,7 +70,7 @@ MEMBERS = (
         "ATTITUDES",
         (
             "double *attitude; /* the attitudes, in the layout of x, or NULL */",
-            "double *attitudes; /* receives their values after each stride of steps, or NULL */",
+            "double *attitudes; /* receives the attitudes after every stride-th step, or NULL */",
         ),
     ),
     StateBlock(
@@ -92,7 +92,7 @@ COTANGENT = (
             "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* by the coefficients of each stage */",
         ),
     ),
-    StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state at which x is taken */",)),
+    StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state by which x are derivatives */",)),
     StateBlock(
         "after",
         "GAUSS",
@@ -159,7 +159,7 @@ TRANSPOSE = (
             "double *tape;               /* states at the starts of the legs of a segment */",
             "size_t leg;                 /* number of steps of a leg */",
             "int lost;                   /* 1 if inverse flows of a leg have led to another state than its start */",
-            "int anew;                   /* 1 if the flows of a step are repeated, as inverse flows do not serve */",
+            "int anew;                   /* 1 if flows are repeated, since inverse flows are inaccurate */",
         ),
     ),
     StateBlock(
@@ -170,18 +170,20 @@ TRANSPOSE = (
             "double *x[PHI_ARRAYS];      /* fields before the sweep that the reverse pass reached last */",
         ),
     ),
-    StateBlock("end", members=("double *end[PHI_DIM];       /* state after all steps, from which others continue */",)),
+    StateBlock("end", members=("double *end[PHI_DIM];       /* state after all steps of the run */",)),
     StateBlock(
         "last_far",
         "!SERIES",
-        ("size_t last_far;            /* number of these that use full-range functions */",),
+        ("size_t last_far;            /* value of s->far after all steps */",),
     ),
-    StateBlock("block", members=("size_t block;               /* numbers of one field, in doubles */",)),
+    StateBlock("block", members=("size_t block;               /* size of a field, in doubles */",)),
     StateBlock("of_step", "!RECOMPUTED", ("size_t of_step;             /* numbers that a step writes to the tape */",)),
     StateBlock("states", members=("double *states;             /* checkpoints: states at the starts of segments */",)),
-    StateBlock("marks", "SERIES", ("size_t *marks;              /* for each, the number of its step */",)),
+    StateBlock("marks", "SERIES", ("size_t *marks;              /* for each checkpoint, the number of its step */",)),
     StateBlock(
-        "marks", "!SERIES", ("size_t *marks;              /* for each, the number of its step, and s->far there */",)
+        "marks",
+        "!SERIES",
+        ("size_t *marks;              /* for each checkpoint, number of its step and value of s->far */",),
     ),
     StateBlock(
         "counts",
@@ -213,7 +215,7 @@ FLOW = (
     StateBlock(
         "go",
         "RECOMPUTED && TAKES",
-        ("int go;                     /* 0 forward; 1, 2 reverse: by the array that takes derivatives */",),
+        ("int go;                     /* 0 forward; 1 or 2 reverse, for even or odd flows */",),
     ),
     StateBlock(
         "go",

@@ -79,7 +79,7 @@ SOLVER = (
     StateFields(
         "NOISE",
         (
-            "/** The random numbers of a step are a function of these three and of the number of steps made before. */",
+            "/** The random numbers of a step are a function of seed, member and step0 + steps. */",
             "seed = 0;",
             "member = 0;",
             "step0 = 0;",
@@ -93,12 +93,16 @@ SOLVER = (
         ),
         arguments=("@param {ArrayLike<number>} [dw] increments of the noise; random ones by default",),
     ),
+    StateFields(fields=("/** Number of successful steps since the start. */", "steps = 0;")),
+    StateFields("GAUSS", ("/** Number of sweeps over the stages, for statistics. */", "evaluations = 0;")),
+    StateFields(
+        "IMPLICIT && !GAUSS",
+        ("/** Number of evaluations of the step equations, for statistics. */", "evaluations = 0;"),
+    ),
+    StateFields("EXPLICIT", ("/** Number of computed stages, for statistics. */", "evaluations = 0;")),
+    StateFields("SPLITTING", ("/** Number of computed steps, for statistics. */", "evaluations = 0;")),
     StateFields(
         fields=(
-            "/** Number of successful steps since the start. */",
-            "steps = 0;",
-            "/** Number of evaluations of the step equations, or of explicit stages, for statistics. */",
-            "evaluations = 0;",
             "/** Size of the last step. */",
             "h = NaN;",
             "/** @type {Readonly<Parameters>} */",
@@ -118,8 +122,12 @@ SOLVER = (
         ),
     ),
     StateFields(
-        "RENEWED",
-        ("/** Coefficients of each stage: functions of parameters and step size; then those of the time or noise. */",),
+        "RENEWED && NOISE",
+        ("/** Coefficients of each stage: functions of parameters and step size, then those of noise or time too. */",),
+    ),
+    StateFields(
+        "RENEWED && !NOISE",
+        ("/** Coefficients of each stage: functions of parameters and step size, then those of the time too. */",),
     ),
     StateFields("!RENEWED", ("/** Coefficients of each stage: functions of parameters and step size. */",)),
     StateFields(fields=("coef = emptyTables();",)),

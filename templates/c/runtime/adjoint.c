@@ -10,7 +10,7 @@
 #include "solver.c"
 #include "adjoint_lanes.c"
 
-/* Set all of *s but the state to the values before its last step. */
+/* Set all members of *s but the state to their values before the last step. */
 static void phi_rewind(phi_solver *s)
 {
     --s->steps;
@@ -18,7 +18,7 @@ static void phi_rewind(phi_solver *s)
     phi_renew(s);
 }
 
-/* Add the derivatives of L by the row written after a given number of steps, if that step writes one. */
+/* If a row is written after done steps, add the derivatives of L by it. */
 static void phi_join(phi_cotangent *bar, const double *rows_bar, size_t done, size_t steps, size_t stride)
 {
     if (done != steps && done % stride != 0) return;

@@ -5,7 +5,7 @@
 
 #include "adjoint.c"
 
-/* The reverse pass of a run that ended at s, from its tape, vectorised over stages. */
+/* Reverse pass of the steps that led to s, from their tape, vectorised over stages. */
 static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const double *rows_bar,
     phi_step_tape *tape, phi_cotangent *bar)
 {

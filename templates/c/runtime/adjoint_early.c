@@ -4,8 +4,8 @@
 
 #include "adjoint_stage.c"
 
-/* Pull derivatives by the coefficients that are functions of the time back to derivatives by the other coefficients of
-   their row. */
+/* Add the derivatives by time-dependent coefficients, times their derivatives by the other coefficients of the row, to
+   the derivatives by these. */
 static void phi_early(const double *coef, double *coef_bar, double t)
 {
     double bar_of_prepared[PHI_PREPARED + 1];

@@ -34,7 +34,7 @@ static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lan
 {
 #if PHI_STAGED
     phi_lanes x[PHI_DIM], coef[PHI_COEFFICIENTS];
-    memset(coef, 0, sizeof coef); /* there may be no such cotangents */
+    memset(coef, 0, sizeof coef); /* the field at a stage may depend on no coefficient */
     phi_stage_start_adjoint_lanes(s->coef, point, z, weights, increments_bar, x, coef);
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k][i];
@@ -65,7 +65,7 @@ static void phi_mixed_back(const double end_bar[PHI_UNKNOWNS], phi_lanes *z_bar,
     }
 }
 
-/* Largest change of a cotangent at any stage; no squares, which could underflow. */
+/* Largest change of a cotangent at any stage, as sums of magnitudes: squares could underflow. */
 static double phi_change_back(phi_lanes *before, phi_lanes *after)
 {
     double largest = 0.0;
@@ -81,8 +81,8 @@ static double phi_change_back(phi_lanes *before, phi_lanes *after)
 }
 
 #if PHI_FRAMED
-/* Cotangents of unknowns from those in the frame of the end of the step: the transpose of the change of frame, whose
-   columns are the images of unit vectors. */
+/* Transform cotangents of unknowns from the frame of the end of the step to that of its start: multiply them by the
+   transpose of the change of frame, whose columns are the images of unit vectors. */
 static void phi_see_back(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *bar)
 {
     phi_lanes next_frame_bar[PHI_UNKNOWNS], unit[PHI_UNKNOWNS];

@@ -8,8 +8,8 @@
 
 #define PHI_BACK_NEGLIGIBLE 1e-18    /* largest terms that rounding hides in their sum, relative to start and sum */
 #define PHI_BACK_ROUNDED_SLOPE 1e-13 /* rounding of slopes, relative to the path and its slope */
-#define PHI_ANCHORED 8               /* most iterations that bring an end to its place ... */
-#define PHI_ANCHORED_TO 1e-15        /* ... with this accuracy, relative to the state */
+#define PHI_ANCHORED 8               /* most corrections of the end of a path, so that its mean is the solution y */
+#define PHI_ANCHORED_TO 1e-15        /* accuracy of the mean after these corrections, relative to the state */
 
 /* Offsets of the groups of quantities in a path that is integrated backward: the state, its cotangent, and the
    cotangents of p and of the coefficients. */
@@ -19,7 +19,7 @@ static void phi_back_sizes(const double values[PHI_BACK], double sizes[4])
     for (int i = 0; i < PHI_BACK; ++i) sizes[i < 3 * PHI_DIM ? i / PHI_DIM : 3] += fabs(values[i]);
 }
 
-/* Whether a path that is integrated backward satisfies its equation at m, where its expansion has the given slope. */
+/* Whether the slope of an expansion at m is that of the equation of a path integrated backward. */
 static int phi_back_holds(const double *coef, const double p[PHI_BACK], const double m[PHI_BACK],
     const double slope[PHI_BACK])
 {
@@ -34,7 +34,7 @@ static int phi_back_holds(const double *coef, const double p[PHI_BACK], const do
     return 1;
 }
 
-/* Path integrated backward with its cotangents, 0 <= t <= 1, by Taylor series: change is the end minus the start.
+/* Integrate a path backward with its cotangents, 0 <= t <= 1, by Taylor series: change is the end minus the start.
    Returns 0 if PHI_TERMS terms do not suffice. */
 static int phi_back_piece(const double *coef, const double p[PHI_BACK], const double start[PHI_BACK],
     double change[PHI_BACK])

@@ -8,7 +8,7 @@
 #define PHI_BACK_ACCURACY 1e-17 /* accuracy of the derivatives of paths */
 
 #if PHI_ALONG
-/* Derivatives of the paths by the coefficients that pi depends on, to as many orders as those by p. */
+/* Compute the derivatives of the paths by the coefficients that pi depends on, to as many orders as those by p. */
 static void phi_vary_coefficients(phi_expansion *e)
 {
     memset(e->w[0], 0, sizeof e->w[0]);
@@ -35,7 +35,8 @@ static void phi_vary_coefficients(phi_expansion *e)
 }
 
 #endif
-/* Derivatives of start and change of the paths, by their middles and p: sums of the even and of the odd terms. */
+/* Compute the derivatives of the start and the change of the paths, by their middles and p, from the sums of the even
+   and of the odd terms. */
 static void phi_ends_of_slopes(phi_expansion *e)
 {
     for (int i = 0; i < 2 * PHI_DIM * PHI_DIM; ++i) {

@@ -5,12 +5,12 @@
 
 #include "adjoint_segments.c"
 
-/* The states before flows are recomputed by the inverse flows, each over -h, with the functions that its transpose
-   reads. Each segment restarts from a stored state, so rounding errors do not accumulate over segments. */
+/* The states before flows are recomputed by the inverse flows, each over -h. Each segment restarts from a stored state,
+   so rounding errors do not accumulate over segments. */
 #define PHI_UNLIKE 1e-13 /* largest accepted difference from the stored state at the start of a segment, relative to the state */
 
-/* Restore the state at the start of a segment, after all its steps have been recomputed by the inverse flow. If a
-   recomputed state differs too much, the derivatives of that member become infinite. */
+/* Restore the stored state at the start of a segment, after all its steps have been recomputed by the inverse flows. If
+   the recomputed state of a member differs too much, its derivatives become infinite. */
 static void phi_pull_arrive(phi_group *group, const phi_pulled *all, size_t begin, phi_back_group *bar)
 {
     for (int k = 0; k < group->packs; ++k) {

@@ -6,7 +6,8 @@
 #include "adjoint_stage.c"
 #include "adjoint_flows.h"
 
-/* Pull a cotangent back through the flows of a run of one step, the last one first; they started at y. */
+/* Pull a cotangent back through the flows first to last of a step, the last one first. y are the states before all
+   flows. */
 static void phi_flows_back(const double *coef, phi_step_tape y, int first, int last, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {
@@ -16,7 +17,7 @@ static void phi_flows_back(const double *coef, phi_step_tape y, int first, int l
     }
 }
 
-/* Pull a cotangent back through a step whose flows started at y. */
+/* Pull a cotangent back through a step; y are the states before its flows. */
 static phi_status phi_stage_adjoint(const double *coef, phi_step_tape y, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {

@@ -4,7 +4,7 @@
 
 #include "adjoint_stage.c"
 
-/* Compute the starts of all later stages of a step from that of the first. */
+/* Compute the states before all later stages of a step from the state before the first. */
 static void phi_find_starts(const phi_solver *s, phi_step_tape tape)
 {
     double change[PHI_DIM];

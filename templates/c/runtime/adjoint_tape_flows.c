@@ -6,7 +6,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_int
 
 #define PHI_AT_ONCE ((size_t)-1) /* flows write the tape while steps are made, for any number of steps */
 
-/* Make a few steps and write their tape. On failure *s is unchanged. */
+/* Make steps and write their tape. On failure *s is unchanged. */
 static phi_status phi_record_steps(phi_solver *s, size_t steps, phi_step_tape *tape)
 {
     const phi_solver before = *s;

@@ -13,7 +13,7 @@ static int phi_remembered(const phi_solver *s, size_t steps, phi_step_tape *tape
     return 1;
 }
 
-/* Make a few steps and write their tape. On failure *s is unchanged. */
+/* Make steps and write their tape. On failure *s is unchanged. */
 static phi_status phi_record_steps(phi_solver *s, size_t steps, phi_step_tape *tape)
 {
     const phi_solver before = *s;

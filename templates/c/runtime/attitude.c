@@ -11,8 +11,8 @@
 #include "attitude_position.c"
 #include "attitude_gauge.c"
 
-/* Multiply the group element of the attitude by the attitude increment of a step, given minus the identity, in
-   compensated arithmetic. */
+/* Multiply the group element of the attitude by 1 + factor, the attitude increment of a step, in compensated arithmetic.
+   */
 #if PHI_RATE_OF_GAUGE
 /* The group element `aside` of the gauge rotation, the same in every step, multiplies from the other side. It may be
    NULL. */
@@ -35,7 +35,7 @@ static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND
 #include "attitude_element.c"
 #include "attitude_covector.c"
 
-/* Replace the first increment by the product of both; all are given minus the identity. */
+/* Compute the product of two attitude increments; all three are stored minus the identity. */
 static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_ELEMENT], double both[PHI_ELEMENT])
 {
     double element_of_first[PHI_ELEMENT], change[PHI_ELEMENT];
@@ -45,7 +45,7 @@ static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_
     for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = first[i] + change[i];
 }
 
-/* Multiply the attitude by the increments of the stages of a block, in their order. */
+/* Multiply the attitude by the increments of all stages in a block, in order of time; they are overwritten. */
 static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int count)
 {
     for (; count % 2 == 0; count /= 2) /* products of neighbours first: they do not depend on each other */

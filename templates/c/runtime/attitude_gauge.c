@@ -6,7 +6,8 @@
 
 /* ---- Gauge rotation: in the frame where momenta are constant, subtracting multiples of Casimirs from H adds a uniform
    rotation of the body ---- */
-/* Copy the gauge rotation of a step, minus the identity, into an element and its compensation term; zeros for NULL. */
+/* Add to an element and to its compensation term the change of s->turned by multiplication by 1 + aside, the gauge
+   rotation of a step; NULL for none. */
 static inline void phi_add_aside(phi_solver *s, const double *aside, double element[PHI_ELEMENT], double carry[PHI_ELEMENT])
 {
     double change[PHI_ELEMENT];

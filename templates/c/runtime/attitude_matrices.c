@@ -5,7 +5,7 @@
 #include <string.h>
 #include "model.h"
 
-/* The product of two square matrices. */
+/* Compute the product of two square matrices. */
 static void phi_group_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT], double product[PHI_ELEMENT])
 {
     enum { N = PHI_ROWS_OF_ATTITUDE };
@@ -33,8 +33,8 @@ static int phi_doublings(double square)
     return doublings;
 }
 
-/* exp(P) - 1 by scaling and squaring: exp(P/2^k) - 1, doubled k times. Rounding errors double too; for orthogonal
-   matrices orthogonality is restored after each doubling. */
+/* Compute exp(P) - 1 for the matrix P of a covector: exp(P/2^k) is squared k times. Each squaring doubles rounding
+   errors; orthogonal matrices are made orthogonal again after it. */
 static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[PHI_ELEMENT])
 {
     double small[PHI_COVECTOR], square[PHI_ELEMENT];
@@ -52,7 +52,7 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
     }
 }
 
-/* Element, minus 1, of the motion with a constant rate over a given time. */
+/* Compute the element of the motion with a constant rate for the time t, minus 1. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     double p[PHI_RATE];
@@ -61,7 +61,7 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     phi_matrix_exponential(p, element);
 }
 
-/* Set the initial element: s->turned is the product of all later increments. */
+/* Set the initial element; s->turned, the product of all later increments, becomes the identity. */
 static void phi_take_element(phi_solver *s, const double first[PHI_ELEMENT])
 {
     memmove(s->first, first, sizeof s->first);

@@ -9,7 +9,7 @@
 #include "attitude_velocity_first.c"
 #include "attitude_velocity_last.c"
 
-/* Product of two quaternions. */
+/* Compute the product of two quaternions. */
 static inline void phi_group_product(const double a[4], const double b[4], double product[4])
 {
     product[0] = (a[0] * b[0] - a[1] * b[1]) - (a[2] * b[2] + a[3] * b[3]);
@@ -18,7 +18,7 @@ static inline void phi_group_product(const double a[4], const double b[4], doubl
     product[3] = (a[0] * b[3] + a[3] * b[0]) + (a[1] * b[2] - a[2] * b[1]);
 }
 
-/* Change of a vector under rotation by a quaternion. */
+/* Compute the change of a vector under rotation by a quaternion. */
 static void phi_rotation(const double q[4], const double v[3], double change[3])
 {
     const double x = q[2] * v[2] - q[3] * v[1], y = q[3] * v[0] - q[1] * v[2], z = q[1] * v[1] - q[2] * v[0];
@@ -27,7 +27,7 @@ static void phi_rotation(const double q[4], const double v[3], double change[3])
     change[2] = 2.0 * (q[0] * z + (q[1] * y - q[2] * x));
 }
 
-/* Change of an element under multiplication from the left. The quaternion of the factor is given minus 1. */
+/* Compute the change of an element by multiplication by 1 + factor from the left. */
 static inline void phi_added_left(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
     double change[PHI_ELEMENT])
 {
@@ -37,7 +37,7 @@ static inline void phi_added_left(const double element[PHI_ELEMENT], const doubl
     for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
-/* Change of an element under multiplication from the right. The quaternion of the factor is given minus 1. */
+/* Compute the change of an element by multiplication by 1 + factor from the right. */
 static inline void phi_added_right(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
     double change[PHI_ELEMENT])
 {
@@ -46,7 +46,7 @@ static inline void phi_added_right(const double element[PHI_ELEMENT], const doub
     for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
-/* Element, minus 1, of the motion with a constant rate over a given time. */
+/* Compute the element of the motion with a constant rate for the time t, minus 1. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     const double speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2])), quarter = 0.25 * (t * speed);

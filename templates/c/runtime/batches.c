@@ -71,13 +71,13 @@ PHI_APART static void phi_steps_far_lanes(phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step) {
         phi_begin_lanes(group);
-        phi_flows_far_lanes(0, 1, group); /* own = 1 is correct for every group */
+        phi_flows_far_lanes(0, 1, group); /* correct for equal coefficients too */
         phi_end_lanes(group);
     }
 }
 
 #endif
-/* Number of active members with values that are not finite; marks them. */
+/* Number of active members with values that are not finite; lost marks them. */
 static int phi_group_lost(const phi_group *group, int lost[PHI_GROUP])
 {
     int count = 0;

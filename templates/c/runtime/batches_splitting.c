@@ -19,8 +19,8 @@ static void phi_end_lanes(phi_group *group)
     }
 }
 
-/* Make steps of a group: as in phi_stages, each flow for all batches. own = 0: all members have the coefficients of the
-   first lane. */
+/* Make steps of a group as in phi_stages: each flow for all batches. distinct_coef = 0: all members have the
+   coefficients of the first lane. */
 PHI_IN_PLACE static inline void phi_steps_lanes(int distinct_coef, phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step) {

@@ -12,7 +12,7 @@ enum {
 #define PHI_ASTRAY 1e-3 /* largest difference of prediction and correction, relative to value and increment; measured */
 #define PHI_FADING 0.4  /* weight of the earlier stages in the fitted factor, per stage; measured */
 
-/* The next steps are not a block: the next block computes its slopes anew. */
+/* Called if the next steps are not a block: the next block computes its slopes anew. */
 static void phi_end_march(phi_table *table) { table->marching = 0; }
 
 /* Runge-Kutta step of size h from the time t. */
@@ -32,9 +32,9 @@ static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES
     for (int i = 0; i < PHI_DIM; ++i) slope[i][done] = here[i];
 }
 
-/* Make a step of Adams' method of order 9, predicted by that of order 8, from x after done steps. Returns 0, with x
-   unchanged, where both differ much: then the step is too long for them. Slopes up to x must be known; the slope at the
-   prediction is stored. */
+/* Make a step of Adams' method of order 9 from x after done steps, with a prediction of order 8. Returns 0, with x
+   unchanged, if the results of both orders differ much, since the step is too long for the method. Slopes up to x must be
+   known; the slope at the prediction is stored. */
 static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, double x[PHI_DIM])
 {
     static const double predict[PHI_PAST] = { -36799.0 / 120960.0, 295767.0 / 120960.0, -1041723.0 / 120960.0,
@@ -62,7 +62,7 @@ static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int
     return 1;
 }
 
-/* Slopes at the ends of earlier steps of this size, by integrating backward from the state. */
+/* Compute the slopes at the ends of earlier steps of this size, by integrating backward from the state. */
 static void phi_look_back(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES])
 {
     double x[PHI_DIM];
@@ -73,8 +73,8 @@ static void phi_look_back(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES]
     }
 }
 
-/* Starts of all steps, one after the other: by Adams' method while it is accurate enough, else by the Runge-Kutta
-   method. */
+/* Compute the starts of all steps of a block, one after the other: by Adams' method while it is accurate enough, else by
+   the Runge-Kutta method. */
 static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI_DIM])
 {
     double x[PHI_DIM];
@@ -93,7 +93,7 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI
     table->marching = 1;
 }
 
-/* Increment of the exact motion over one stage, in all lanes. */
+/* Compute the increment of the exact motion over one stage, in all lanes, from the slopes. */
 static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lanes predicted[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {
@@ -107,8 +107,8 @@ static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lan
     }
 }
 
-/* Start the iteration of a stage at its begin plus half of the increment of the exact motion, minus the expected error
-   of that. */
+/* Set the points of a stage to its begin plus half of the increment of the exact motion, minus the expected error of
+   this approximation. */
 static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM], phi_lanes predicted[restrict PHI_DIM],
     phi_lanes missed[restrict PHI_DIM], double part)
 {

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "blocks.c"
 
-/* Replace y by the points whose alpha and beta have these means, to leading order. */
+/* Replace y by the points for which y is the mean of alpha and beta, to leading order. */
 static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 {
     phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -15,8 +15,8 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
     }
 }
 
-/* Predictor without recurrences: points whose alpha and beta have the means of classical Runge-Kutta steps, to leading
-   order. */
+/* Predictor without recurrences: points for which the mean of alpha and beta is, to leading order, that of start and end
+   of a classical Runge-Kutta step. */
 static void phi_predict_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     double x[PHI_DIM], mean[PHI_DIM];

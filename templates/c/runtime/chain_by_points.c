@@ -4,9 +4,9 @@
 #include "model.h"
 #include "newton_lanes.c"
 
-/* Advance through the steps of a block in order, each by the linear model of its lane. If the start X of a step (the
-   state with its compensation term) changes, increment - gain residual gives the change of its end, and so the next
-   residual. X itself is summed apart. most is the largest correction in each lane. */
+/* Advance x + carry through the steps of a block in order, each by the linear model of its lane: a step adds increment -
+   gain residual. The residual of the next step follows from that of a step, without the sum. most is the largest
+   correction in each lane. */
 static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double x[PHI_DIM], double carry[PHI_DIM],
     phi_lanes most)
 {

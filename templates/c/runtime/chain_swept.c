@@ -4,7 +4,8 @@
 #include "model.h"
 #include "newton_lanes.c"
 
-/* Propagate a residual of the first stage of a step to that of the next step: each stage multiplies it by 1 + gain. */
+/* Compute the matrices that multiply the residual of the first stage of a step to give that of the next step: products
+   of 1 + gain over the stages. */
 static void phi_turn_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM])
 {
     memset(turn, 0, PHI_DIM * PHI_DIM * sizeof turn[0]);
@@ -91,9 +92,9 @@ static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], p
 #endif
 }
 
-/* Correct the points of all stages by their residuals, along their linear models, and compute the ends of all steps. X,
-   the state with its compensation term, gains increment - gain residual, which gives the next residual; X itself is
-   summed apart. most is the largest correction in each lane. */
+/* Correct the points of all stages by their residuals, along their linear models, and advance x + carry through all
+   steps: a stage adds increment - gain residual. The residual of the next stage follows from that of a stage, without the
+   sum. most is the largest correction in each lane. */
 static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], phi_lanes unit[restrict PHI_DIM],
     double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
 {

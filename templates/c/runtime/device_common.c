@@ -3,8 +3,8 @@
 #include "device_solver.c"
 
 /* ---- The kernel of coefficients ---- */
-/* One work item computes the coefficients of steps of size h[0]. Where all members have the same parameters and step
-   (and gauge, if there is one), they may share them: see PHI_COMMON. */
+/* One work item computes the coefficients of steps of size h[0]. Members with equal arguments may share them: see
+   PHI_COMMON. */
 PHI_KERNEL void phi_coefficients_kernel(PHI_GLOBAL const phi_params *params, PHI_GAUGE_ARGUMENT PHI_GLOBAL const double *h,
     PHI_GLOBAL phi_coefficients *coefficients)
 {

@@ -10,7 +10,7 @@ static int phi_place_of(int k, int i) { return (k * PHI_DIM + i) * PHI_GROUP; }
 /* All loops have constant bounds, and selections in place of branches, so that a compiler can keep all values in
    registers. */
 
-/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far away, where
+/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far away, where
    the equation of a step has solutions unrelated to the motion. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {

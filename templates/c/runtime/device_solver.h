@@ -3,12 +3,12 @@
 #include "history_gauss.h"
 #include "device_history.h"
 
-/* A solver in the memory of one work item. Kernels of your own may call the functions below. */
+/* A solver in the memory of one work item. Other kernels may call the functions below. */
 typedef struct {
 #include "state_members.h"
 } phi_solver;
 
-/* Initialise *s with the state x0. PHI_BAD_ARGUMENT, with *s unchanged, if a value or a coefficient is not finite, or if a
+/* Initialise *s with the state x0. Returns PHI_BAD_ARGUMENT, with *s unchanged, if a value or a coefficient is not finite, or if a
    parameter that must be positive is not. */
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM]);
 

@@ -9,7 +9,7 @@ static void phi_forget(phi_history *history)
     PHI_FORGET_ORDER(history)
 }
 
-/* Make one stage. If it fails from the predicted value, it is tried again from the state. */
+/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
 static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
     phi_status status = PHI_OK;

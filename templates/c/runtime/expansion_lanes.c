@@ -111,8 +111,8 @@ static void phi_extend(phi_lanes coef[restrict], phi_expansion *e, double accura
     }
 }
 
-/* phi_holds in all lanes, at one end of the paths, where the expansions have the given slope: infinite where the
-   equation does not hold. */
+/* phi_holds in all lanes, at one end of the paths, where the expansions have the given slope. wrong becomes infinite in
+   lanes where the equation does not hold. */
 static void phi_check_end(phi_lanes coef[restrict], phi_expansion *e, phi_lanes m[restrict PHI_DIM],
     phi_lanes slope[restrict PHI_DIM], phi_lanes wrong)
 {

@@ -145,7 +145,7 @@ static phi_status phi_fmu_part(phi_fmu_state *f, double target)
 
 static bool phi_fmu_within(uint32_t variable, uint32_t first, uint32_t end) { return variable >= first && variable < end; }
 
-/* Whether a variable is the seed, which exists with noise only, and is the only whole number. */
+/* Whether a variable is the seed of the noise, the only variable that is a whole number. */
 static bool phi_fmu_is_whole(uint32_t variable) { return phi_fmu_within(variable, PHI_FMU_SEED, PHI_FMU_ATTITUDE); }
 
 /* Return the place of a variable that the state stores as a number of the solver; NULL for other variables. */

@@ -36,7 +36,7 @@ static void phi_sample(const phi_params *params, const double x[PHI_DIM], double
     }
 }
 
-/* Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+/* The sum of |pi grad S_3|^2 over the samples, where S_3 is the leading error of the method. */
 static double phi_gauge_error(const phi_params *params, const double gauge[PHI_GAUGES], double samples[][PHI_DIM])
 {
     double error[PHI_DIM], sum = 0.0;
@@ -55,7 +55,7 @@ static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
     return error;
 }
 
-/* Shift of the multiple with index c, in units of the width of the search, that minimises the error: searched on successively finer
+/* Return the shift of gauge[c], in units of width, that minimises the error, from its values on successively finer
    grids. */
 static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
     double samples[][PHI_DIM])

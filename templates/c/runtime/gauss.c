@@ -20,7 +20,7 @@ typedef double phi_lanes[PHI_WIDTH]; /* one value for each stage */
 #endif
 
 /* ---- The implicit step, by Gauss collocation ---- */
-/* Start of a step: the coordinates, the time if H depends on it, and frames of group elements if there are any. */
+/* Copy the data of the start of a step, PHI_POINT numbers, the coordinates first. */
 static void phi_start(const phi_solver *s, double point[PHI_POINT])
 {
     PHI_COPY(point, s->x, s->x, PHI_DIM);
@@ -32,13 +32,13 @@ static void phi_start(const phi_solver *s, double point[PHI_POINT])
 #endif
 }
 
-/* Sum of the increments of all stages. */
+/* Compute the sum of the increments of all stages. */
 static void phi_end(phi_lanes *increments, double end[PHI_UNKNOWNS])
 {
     for (int k = 0; k < PHI_UNKNOWNS; ++k) end[k] = phi_total(increments[k]);
 }
 
-/* h b_j times the vector field at each stage, for unknowns z; the weights are h b_j. */
+/* Compute the increments of all stages: the weights h b_j times the vector field at the unknowns z. */
 static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z, phi_lanes *increments)
 {
 #if PHI_STAGED
@@ -53,8 +53,9 @@ static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_
 #endif
 }
 
-/* Collocation polynomial: factors of the stage increments in the offsets of the unknowns from the end of a step, at a
-   fraction of the step. They are integrals of Lagrange polynomials from 1 on, as sums of Legendre polynomials. */
+/* Compute factors f_j: the collocation polynomial at a fraction of a step, minus its value at the end of the step, is the
+   sum of f_j times the increment of stage j. The factors are integrals of Lagrange polynomials from 1 to the fraction,
+   divided by the weights, by sums of Legendre polynomials. */
 static void phi_factors_at(double fraction, double factor[PHI_NODES])
 {
     const double x = 2.0 * fraction - 1.0;

@@ -21,14 +21,14 @@ typedef phi_lanes phi_batch[PHI_NODES][PHI_UNKNOWNS];
 
 /* Members of an ensemble, one in each lane. */
 typedef struct {
-    phi_lanes x[PHI_POINT]; /* the coordinates, and the time if H depends on it */
+    phi_lanes x[PHI_POINT]; /* data of the start of a step, as phi_start copies them */
     phi_lanes carry[PHI_DIM], coef[PHI_COEFFICIENTS];
     phi_lanes weights[PHI_NODES][1]; /* h b_j */
     phi_batch increments[PHI_EARLIER];    /* stage increments of the last steps, in the frame of the end of the last one */
     int latest;    /* index of the last step in increments */
     int count;     /* steps in increments */
     int predictor; /* row of phi_prediction that predicts the next step */
-    int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS */
+    int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS steps */
     int sweeps;    /* number of the first sweep whose change is measured */
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int active[PHI_LANES];        /* whether the lane holds a member that has not failed */

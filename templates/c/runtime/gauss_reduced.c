@@ -2,7 +2,7 @@
 #define PHI_FILE_GAUSS_REDUCED
 #include <string.h>
 
-/* Sweeps iterate some unknowns, and read integrals of their increments: the other unknowns follow from these. */
+/* Sweeps iterate some unknowns only. They read integrals of the increments of these; the other unknowns follow. */
 #define PHI_READ(r) phi_iterated[phi_reads[r]] /* the unknown whose increments a value is the integral of */
 
 /* Set the factors of each stage that a sweep reads: its weight, its time and h. */
@@ -32,7 +32,7 @@ static void phi_complete_stages(const phi_solver *s, double point[PHI_POINT], ph
     for (int r = 0; r < PHI_ITERATED; ++r) memcpy(increments[phi_iterated[r]], now[r], sizeof z[0]);
 }
 
-/* The ends of unknowns that follow from others: with the factors 1 - c_j of the increments the step is symplectic. */
+/* Compute the ends of the unknowns that are not iterated. The factors 1 - c_j of increments make the step symplectic. */
 static void phi_end_followers(const phi_solver *s, double point[PHI_POINT], phi_lanes *increments, double end[PHI_UNKNOWNS])
 {
     double reads[PHI_READS], offsets[PHI_FOLLOWERS], time[2] = { 1.0, s->h };

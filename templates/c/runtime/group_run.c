@@ -17,8 +17,7 @@ static void phi_group_frame(const phi_group *group, const phi_members *all, size
     }
 }
 
-/* Write the results of a member. Steps that the group did not make for it are made by single steps; if one fails, all steps
-   of the member are, so that status and last state are those of a member by itself. */
+/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
 static phi_status phi_group_end(const phi_group *group, int lane, const phi_members *all, size_t m,
     phi_status status)
 {
@@ -28,17 +27,13 @@ static phi_status phi_group_end(const phi_group *group, int lane, const phi_memb
     if (status != PHI_OK) {
         phi_end_member(all, m, 0, NULL, status);
     } else if (group->steps_left[lane] > 0) {
-        phi_status begun = phi_begin_member(all, m, x PHI_AND_GAUGE(group->gauge[lane]), &s);
+        const phi_status begun = phi_begin_member(all, m, x PHI_AND_GAUGE(group->gauge[lane]), &s);
         for (int i = 0; i < PHI_DIM && begun == PHI_OK; ++i) s.carry[i] = group->carry[i][lane];
 #if PHI_TIMED
         if (begun == PHI_OK) s.steps = all->steps - group->steps_left[lane];
         if (begun == PHI_OK) s.t = s.t_before_h + (double)s.steps * s.h;
 #endif
         status = phi_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
-        if (status != PHI_OK) {
-            begun = phi_take_member(all, m, x, &s);
-            status = phi_end_member(all, m, 0, &s, begun);
-        }
         if (begun == PHI_OK) memcpy(x, s.x, sizeof x);
     }
     phi_put_member(all, m, x, status);

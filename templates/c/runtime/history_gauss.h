@@ -10,7 +10,7 @@ typedef struct {
     int sweeps;    /* number of the first sweep over the stages whose change is measured */
 #if PHI_STAGED
     int predictor; /* row of phi_prediction that predicts the next step */
-    int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS */
+    int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS steps */
 #endif
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int kicked;    /* whether the state was changed since the last step */

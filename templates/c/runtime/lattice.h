@@ -16,7 +16,7 @@ typedef struct {
 #include "lattice_graph.h"
 #include "lattice_grid.h"
 
-/* The same at the time t0; phi_init starts at the time 0. */
+/* As phi_init, at the time t0; phi_init starts at the time 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, PHI_SIZES, const double *x0, double t0, void *work);
 
 /* Select the random numbers of the next steps, a function of the seed, the member of an ensemble, the number of the step,
@@ -68,7 +68,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
    NULL for none. */
 void phi_ask(phi_solver *s, int (*stop)(void));
 
-/* The same for one step; trail has phi_trail_size(s, 1) bytes, and x0_bar may be x1_bar. */
+/* phi_pullback for one step; trail has phi_trail_size(s, 1) bytes, and x0_bar may be x1_bar. */
 phi_status phi_step_adjoint(phi_solver *s, double h, const double *x1_bar, double *x0_bar, phi_params_bar *params_bar,
     void *trail);
 

@@ -6,12 +6,12 @@
 #include "sweeps.h"
 
 /* ---- Relative coordinates of bodies ---- */
-/* Flows act on a position and a velocity of each body but the first, and at the first on those of the centre of mass.
-   Positions are relative to the centre of mass of all bodies before (Jacobi), or to the first body (democratic
-   heliocentric); velocities then are those from the centre of mass. */
+/* Flows act on relative positions and velocities; the first body has those of the centre of mass instead. In Jacobi
+   coordinates, those of each other body are relative to the centre of mass of all bodies before. In democratic
+   heliocentric coordinates, positions are relative to the first body, velocities to the centre of mass of all bodies. */
 
-/* Compute the masses that Kepler motions are about; 0 if the mass of all bodies is not finite, or a mass is negative, or
-   0 where none may be: that of the first body, and of bodies with momenta, whose velocities would be undefined. */
+/* Compute the central masses of Kepler motions. Returns 0 if a mass is not admissible: masses must not be negative, their
+   sum must be finite, and the first body, and bodies with momenta, must have one. */
 static int phi_weigh(phi_solver *s)
 {
     const double *m = s->x[PHI_MASS];
@@ -70,7 +70,8 @@ static void phi_place_bodies(const phi_solver *s, double *const *x, double *cons
     }
 }
 
-/* Subtract from the pull on each body that on the centre of mass of the bodies before; sums begin at `first`. */
+/* Subtract from the acceleration of each body that of the centre of mass of all bodies before; accelerations are the sums
+   from index first on. */
 static void phi_join_pulls(const phi_solver *s, int first)
 {
     const double *m = s->x[PHI_MASS], *inner = s->x[PHI_INNER];
@@ -99,7 +100,7 @@ static void phi_shift_bodies(const phi_solver *s, double *q, double value)
     for (ptrdiff_t i = 1; i < s->length; ++i) q[i] += value;
 }
 
-/* Store the sum of m v over all bodies but the first, per mass of the first, for each of these. */
+/* Store the velocity (sum of m v over all bodies but the first) / m[0] for each body but the first. */
 static void phi_join_shifts(const phi_solver *s, double *const *x, int first)
 {
     for (int axis = 0; axis < PHI_BODY_AXES; ++axis) {
@@ -181,10 +182,10 @@ static void phi_gather_pulls(const phi_solver *s, const double *coef)
 #endif
 
 #if PHI_TANGENT
-/* The same for a tangent vector v. */
+/* Compute the derivatives of these sums along a tangent vector v; called by all threads together. */
 static void phi_gather_varied_pulls(const phi_solver *s, const double *coef, double *const *v, size_t first, size_t end)
 {
-    phi_wait(); /* for the use of the sums before */
+    phi_wait(); /* until all threads have read the former sums */
 #if PHI_JACOBI
     if (PHI_THREAD == 0) phi_place_bodies(s, s->x, s->placed);
     if (PHI_THREAD == 0) phi_place_bodies(s, v, s->placed_varied);
@@ -200,7 +201,7 @@ static void phi_gather_varied_pulls(const phi_solver *s, const double *coef, dou
 }
 #endif
 
-/* Move the centre of mass, which is free. */
+/* Move the centre of mass at its constant velocity for a time. */
 static void phi_move_centre(double *const *x, double time)
 {
     for (int axis = 0; axis < PHI_BODY_AXES; ++axis)

@@ -74,11 +74,11 @@ static int phi_fits(size_t room, size_t longest, size_t of_step, size_t of_state
 }
 
 #if PHI_SERIES
-/* Divide the memory between the tape of one segment and checkpoints: the longest segments for which every step but
-   those of the last segment is made twice; or one half each. */
+/* Divide the memory between the tape of one segment and checkpoints. Segments are as long as checkpoints of all segments
+   allow, so that each step is made at most twice; if these never fit, each gets one half. */
 #else
-/* Divide the memory between the tape of one segment and checkpoints: the shortest segments for which every step is made
-   at most twice, but long enough to fill the cache; or one half each. */
+/* Divide the memory between the tape of one segment and checkpoints. Segments fill the cache, or are longer if only then
+   checkpoints of all segments fit, so that each step is made at most twice; if these never fit, each gets one half. */
 #endif
 static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t steps, void *memory, size_t size)
 {
@@ -127,7 +127,7 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
 
 enum { PHI_UNASKED = 1 << 22 }; /* site updates between calls of s->stop */
 
-/* Whether to stop; called after some more steps. */
+/* Whether to stop: asks s->stop, but only after PHI_UNASKED site updates since the last call. */
 static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
 {
     g->unasked += steps * s->sites;

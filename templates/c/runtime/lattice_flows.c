@@ -73,7 +73,8 @@ static void phi_draw(const phi_solver *s, size_t steps, int part)
 #if PHI_NOISE
 /* Make some steps: flows of the noise, those of H, and those of the noise in reverse order. */
 #elif PHI_CORRECTED
-/* Make some steps, after the flows before a run where one begins. 0 steps: the flows after a run alone. */
+/* Make some steps; if they are the first of a run, after the flows of the corrector. 0 steps: make the flows of the
+   corrector at the end of a run. */
 #else
 /* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
 #endif

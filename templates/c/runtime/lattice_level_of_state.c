@@ -4,7 +4,7 @@
 #include "model.h"
 #include "lattice_monitor.c"
 
-/* Take the energy level of the state that a solver is moved to; where it has none, go back to the state before. */
+/* Set the energy level of a new state; if the state is not admissible, restore the former state and level. */
 static phi_status phi_begin_level(phi_solver *s)
 {
     const double level = s->level;

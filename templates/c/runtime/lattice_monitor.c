@@ -27,7 +27,7 @@ static double phi_sum_of_densities(const phi_solver *s)
     return sum + rest;
 }
 
-/* A part of H. */
+/* The value of a part of H, the same for all threads. */
 static double phi_part_energy(const phi_solver *s, int part)
 {
     size_t first, end = phi_share(phi_units(s), &first);
@@ -38,14 +38,14 @@ static double phi_part_energy(const phi_solver *s, int part)
     return phi_sum_of_densities(s);
 }
 
-/* A + e or -B: the flow of a part of K is that of the part of H over a time that is smaller by this factor. */
+/* A + e or -B: the flow of a part of K for a time is that of the part of H for the time divided by this. */
 static double phi_rate(const phi_solver *s, int part)
 {
     const double energy = phi_part_energy(s, part);
     return part == PHI_NEGATIVE ? -energy : energy + s->level;
 }
 
-/* Set e = -H of the state; 0 if the physical time does not increase there. */
+/* Set e = -H at the state. Returns 0 if H is not finite, or -B not positive, so that time would not increase. */
 static int phi_take_level(phi_solver *s)
 {
     const double negative = phi_part_energy(s, PHI_NEGATIVE), energy = phi_part_energy(s, 3 - PHI_NEGATIVE) + negative;
@@ -53,7 +53,7 @@ static int phi_take_level(phi_solver *s)
     return isfinite(energy) && negative < 0.0;
 }
 
-/* The physical time of x gains that of a flow; its compensation term is beside it. */
+/* Add the time of a flow to the physical time of x, clock[0], with the compensation term clock[1]. */
 static void phi_pass(const phi_solver *s, double time)
 {
     const double before = s->clock[0], sum = before + time, added = sum - before;
@@ -61,7 +61,7 @@ static void phi_pass(const phi_solver *s, double time)
     s->clock[0] = sum;
 }
 
-/* The physical time goes with the fields, which are x or those before. */
+/* Copy the physical time with the fields: clock[0] and clock[1] are those of x, the next two those of s->before. */
 static void phi_copy_clock(const phi_solver *s, double *const *to)
 {
     const size_t into = to == s->before ? 2 : 0;

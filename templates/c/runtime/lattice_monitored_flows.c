@@ -5,8 +5,8 @@
 #include "lattice_monitor.c"
 #include "lattice_late_flows.c"
 
-/* The flow of that number in a step, of a part of K; after those of a step the last and the first together. Where its time
-   would not be positive, the state is no number afterwards. */
+/* Apply flow `number` of a step, that of a part of K; number PHI_FLOWS is the last merged with the first. If its time is
+   not positive, the state becomes NaN. */
 static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
 {
     double coef[PHI_ROW];

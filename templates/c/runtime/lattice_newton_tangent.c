@@ -5,8 +5,8 @@
 
 #include "lattice_tangent_policy.h"
 
-/* Carry a tangent vector through a stage with solution s->y[now]: solve dy = (derivative of a sweep) dy + side, and add
-   its increment. */
+/* Multiply a tangent vector by the derivative of a stage with solution s->y[now]: solve dy = (derivative of a sweep) dy +
+   side, and add the increment that dy gives. */
 static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t number)
 {
     const size_t units = phi_units(s);

@@ -9,7 +9,7 @@ static size_t phi_number_of(size_t step, int number) { return step * PHI_OWN_FLO
 /* Arrays for contributions of a flow to other sites: two sets, used alternately. */
 static double *const *phi_handed_by(const phi_transpose *g, size_t flow) { return g->handed + flow % 2 * (PHI_HANDED / 2); }
 
-/* Before a reverse pass: the flow after the first one contributes nothing. */
+/* Clear the contributions of a flow to other sites, before a reverse pass. */
 static void phi_hand_nothing(const phi_solver *s, const phi_transpose *g, size_t flow)
 {
     size_t first, end = phi_share(phi_units(s), &first);

@@ -10,7 +10,7 @@ static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], 
     gauge[0] = -phi_hamiltonian(params, x);
 }
 
-/* Whether the monitor is positive at a state, so that the physical time increases with tau. */
+/* Whether the monitor is positive and finite at a state, so that the physical time increases with tau. */
 static int phi_time_passes(const phi_params *params, const double x[PHI_DIM])
 {
     const double rate = phi_monitor(params, x);

@@ -9,8 +9,8 @@
 #include "solver.c"
 
 /* ---- Members of an ensemble ---- */
-/* Arguments of an ensemble. own = 1: member m has the parameters params[m] and the step h[m]; own = 0: all have those
-   of member 0. */
+/* Arguments of an ensemble. per_member = 1: member m has the parameters params[m] and the step h[m]; per_member = 0: all
+   have those of member 0. */
 typedef struct {
     double *x;
     size_t members, steps, per_member;

@@ -14,7 +14,7 @@
 #include "measure_policy.h"
 #include "newton_policy.h"
 
-/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
+/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
 static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -27,9 +27,9 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
     return size;
 }
 
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The last
-   correction changes the increment to first order, without another evaluation: it is accepted if the remaining error,
-   quadratic in it, is below PHI_TOLERANCE. */
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The effect of the
+   last correction on the increment is added to first order, without another evaluation. So a solution is accepted if its
+   error, quadratic in the last correction, is below PHI_TOLERANCE. */
 static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];

@@ -18,7 +18,7 @@ static void phi_apply(phi_lanes matrix[restrict PHI_DIM * PHI_DIM], phi_lanes ve
     }
 }
 
-/* Corrections of the increment by the residual. */
+/* Compute the corrections of the increment from the residual. */
 static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes gained[restrict PHI_DIM])
 {
 #if PHI_CENTRED

@@ -22,7 +22,8 @@ static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double no
 
 #include "noise_of_flows.c"
 
-/* Increments of the next step: the given ones, or random ones. Returns 0 if one is not finite. */
+/* Set the increments of the noise in the next step to the given ones, or for NULL to random ones. Returns 0 if one is not
+   finite. */
 static int phi_draw(phi_solver *s, const double *increments)
 {
     if (increments != NULL) {

@@ -2,7 +2,7 @@
 #define PHI_FILE_NOISE_OF_FLOWS
 #include "solver.h"
 
-/* Steps of -h recompute those of h in the opposite order: the last increments of a step come first. */
+/* Exchange the increments of the first and the second half of a step of size h < 0: it reverses a step of size -h. */
 static void phi_order_draws(phi_solver *s)
 {
     for (int k = 0; k < PHI_SOURCES && s->h < 0.0; ++k) {

@@ -14,8 +14,8 @@
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 #include "path_policy.h"
 
-/* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope. An expansion with gaps between
-   its terms, like t + t^9, or across the kink of an absolute value, may only seem to have converged. */
+/* Whether the slope of an expansion at a point m is pi(m) p. If not, the expansion only seems to have converged: it has
+   gaps between its terms, as t + t^9, or extends across the kink of an absolute value. */
 static int phi_holds(const double *coef, const double p[PHI_DIM], const double m[PHI_DIM],
     const double slope[PHI_DIM])
 {
@@ -27,8 +27,8 @@ static int phi_holds(const double *coef, const double p[PHI_DIM], const double m
     return 1;
 }
 
-/* Path for 0 <= t <= 1, from start, by its Taylor series: change is m(1) - start, mean the mean of m - start. The size
-   of the terms decides their number. Returns 0 if PHI_TERMS terms do not suffice. */
+/* Compute the path m(t) from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start, mean the mean of m -
+   start. Terms are added until they are negligible. Returns 0 if PHI_TERMS terms do not suffice. */
 static int phi_piece(const double *coef, const double p[PHI_DIM], const double start[PHI_DIM], double change[PHI_DIM],
     double mean[PHI_DIM])
 {
@@ -58,8 +58,9 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
     return 0;
 }
 
-/* Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path lies on the
-   symplectic leaf of x. Returns 0 if the path is too long or leaves the domain. *made counts all pieces. */
+/* Compute the whole path from x, in 1, 2, 4, ... pieces until each expansion converges: change is its end minus x, mean
+   its mean minus x. For any p, the end of the path lies on the symplectic leaf of x. Returns 0 if the path is too long or
+   leaves the domain. *made counts all pieces. */
 static int phi_path(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], double change[PHI_DIM],
     double mean[PHI_DIM], int *pieces_used)
 {
@@ -84,8 +85,8 @@ static int phi_path(const double *coef, const double x[PHI_DIM], const double p[
     return 0;
 }
 
-/* Residual p - grad S_h(mean) of the equation for p, where mean is that of the path; also the change of x along the
-   path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
+/* Compute the residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the change of x along
+   the path and an approximate Jacobian of the residual. Returns 0 if the path cannot be followed. */
 static int phi_residual(phi_solver *s, const double *coef, const double p[PHI_DIM], double y[PHI_DIM],
     double residual[PHI_DIM], double change[PHI_DIM], double jacobian[PHI_DIM * PHI_DIM], int *pieces_used)
 {
@@ -98,7 +99,8 @@ static int phi_residual(phi_solver *s, const double *coef, const double p[PHI_DI
     return 1;
 }
 
-/* Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
+/* Compute the Jacobian of the residual by differences, for steps so large that iterations with the approximate Jacobian
+   do not converge. */
 static int phi_differences(phi_solver *s, const double *coef, const double p[PHI_DIM], const double residual[PHI_DIM],
     double jacobian[PHI_DIM * PHI_DIM], int *pieces_used)
 {
@@ -113,8 +115,8 @@ static int phi_differences(phi_solver *s, const double *coef, const double p[PHI
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x with covector p), and move to the end of that path. If that needs more
-   than PHI_MOST_PIECES pieces, the step is too large for a meaningful solution. */
+/* Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path. A step that needs more
+   than PHI_MOST_PIECES pieces is too large for a meaningful solution. */
 static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     const double *coef = PHI_OF(s->coef, stage);

@@ -13,7 +13,7 @@
 #define PHI_MIDDLES_SETTLED 1e-9 /* accuracy of middles; Newton iterations remove the remaining error */
 #define PHI_PREDICTION_ACCURACY 1e-6 /* accuracy of expansions in predictions, which are not more accurate */
 
-/* alpha - y and beta - alpha to leading order, by one short expansion. */
+/* Compute alpha - y and beta - alpha to leading order, by one short expansion. */
 static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM],
     phi_lanes displacement[restrict PHI_DIM], phi_lanes increment[restrict PHI_DIM])
 {
@@ -31,8 +31,8 @@ static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PH
     }
 }
 
-/* alpha - y and beta - alpha, by an expansion whose mean differs from y a little, corrected to first order in that
-   difference. */
+/* Compute alpha - y and beta - alpha from an expansion. Its mean differs a little from y; results are corrected to first
+   order in the difference. */
 static void phi_read_ends(phi_model *model, phi_expansion *e, const phi_lanes wrong)
 {
     phi_lanes miss[PHI_DIM];
@@ -55,8 +55,8 @@ static void phi_read_ends(phi_model *model, phi_expansion *e, const phi_lanes wr
         }
 }
 
-/* Matrices of a stage, from the derivatives of the paths and the Hessian of S_h. Seven digits suffice: the error of an
-   accepted correction is then below rounding. */
+/* Compute the matrices of a stage, from the derivatives of the paths and the Hessian of S_h. Seven digits suffice: the
+   error of an accepted correction is then below rounding. */
 static void phi_linearise_paths(phi_lanes coef[restrict], phi_model *model, phi_expansion *e,
     phi_lanes hessian[restrict PHI_DIM * PHI_DIM])
 {

@@ -6,7 +6,8 @@
 #include "algebra.c"
 #include "level.c"
 
-/* Set the energy level after the state was moved to s->x. Returns 0, with the former state, if that has none. */
+/* Set the energy level to that of the new state s->x. Returns 0, with the former state, if the new state is not
+   admissible. */
 static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const double carry[PHI_DIM])
 {
     double level[PHI_GAUGES];

@@ -5,7 +5,7 @@
 #include "model.h"
 #include "predictor_policy.h"
 
-/* Predict the next value by the sum of differences. Returns 0 if there is no prediction, or if it is far away, where
+/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far away, where
    the equation of a step has solutions unrelated to the motion. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {

@@ -23,7 +23,7 @@ enum {
     PHI_LONG_WAIT = 20000 /* steps until the next fit of a recurrence that has needed many */
 };
 
-/* Predict the next value (y) from earlier ones. Returns 0 if there is no prediction. */
+/* Predict the next solution from earlier ones. Returns 0 if there is no prediction. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     const int last = history->count - 1;
@@ -71,7 +71,7 @@ static void phi_judge(phi_history *history, const double value[PHI_DIM])
     if (history->extrapolation_order == 0) history->extrapolation_order = 1;
 }
 
-/* Drop the oldest values if the history has no room for `count` more. */
+/* Drop all but the last PHI_REMEMBERED solutions if there is no room for the given number of further ones. */
 static void phi_make_room(phi_history *history, int values)
 {
     if (history->count + values <= PHI_STORED_VALUES) return;
@@ -99,7 +99,7 @@ static int phi_fit(phi_history *history)
     return fitted;
 }
 
-/* Update the predictor with a solution. A solve of one iteration needs no better prediction. */
+/* Update the predictor with a solution and the number of iterations it took; 1 means that the prediction was good. */
 static void phi_remember(phi_history *history, const double value[PHI_DIM], int iterations)
 {
     if (iterations > 1) phi_judge(history, value);

@@ -2,7 +2,7 @@
 #define PHI_FILE_RENEWED_FLOWS
 #include "model.h"
 
-/* Compute the coefficients of the flows of the next step that depend on the time. */
+/* For the flows of the next step, compute the coefficients that depend on the time. */
 static void phi_renew(phi_solver *s)
 {
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {

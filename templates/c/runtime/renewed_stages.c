@@ -2,7 +2,7 @@
 #define PHI_FILE_RENEWED_STAGES
 #include "model.h"
 
-/* Compute the coefficients of the next step that depend on the time or on the noise. */
+/* For the stages of the next step, compute the coefficients that differ from step to step. */
 static void phi_renew(phi_solver *s)
 {
     PHI_EACH_STAGE

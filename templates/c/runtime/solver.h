@@ -26,14 +26,14 @@ void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]);
 size_t phi_trail_size(void); /* PHI_TRAIL, the number of doubles */
 size_t phi_trail_size_each(void); /* PHI_TRAIL_EACH, the number of doubles */
 
-/* Initialise *s with the state x0. params may be NULL for the defaults. PHI_BAD_ARGUMENT, with *s unchanged, if a value
-   or a coefficient is not finite, or if a parameter that must be positive is not. */
+/* Initialise *s with x0; params = NULL means the defaults. Returns PHI_BAD_ARGUMENT, with *s unchanged, if a
+   value or a coefficient is not finite, or a parameter that must be positive is not. */
 #if PHI_MONITOR
-/* Also if phi_monitor is not positive at x0. */
+/* It returns the same if phi_monitor is not positive at x0. */
 #endif
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM]);
 
-/* The same at the time t0; phi_init starts at the time 0. */
+/* As phi_init, at the time t0; phi_init starts at the time 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
 
 /* Select the random numbers of the next steps. They are a function of the seed, the member and the number of the step
@@ -69,7 +69,7 @@ phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double 
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
-/* Between steps: replace the state by x, or add change to it; this may change Casimirs. PHI_BAD_ARGUMENT, with *s
+/* Between steps: replace the state by x, or add change to it; this may change Casimirs. Returns PHI_BAD_ARGUMENT, with *s
    unchanged, if the new state is not finite. */
 #if PHI_MONITOR
 /* The energy level e becomes -H of the new state, at which phi_monitor must be positive. */
@@ -77,8 +77,8 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM]);
 phi_status phi_kick(phi_solver *s, const double change[PHI_DIM]);
 
-/* Between steps: replace the parameters at the present state. PHI_BAD_ARGUMENT, with *s unchanged, for parameters that
-   phi_init refuses. */
+/* Between steps: replace the parameters; the state is unchanged. Returns PHI_BAD_ARGUMENT, with *s unchanged, for
+   parameters that phi_init refuses. */
 #if PHI_MONITOR
 /* The energy level e becomes -H with the new parameters. */
 #elif PHI_GAUGE
@@ -91,40 +91,40 @@ phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw);
 
 /* The states at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial: x[r * PHI_DIM
-   + i] is x_i at fraction[r]. They are far less accurate than steps, and off the leaf by their error: they serve to find
-   events. The state at an event, as accurate as those of whole steps, is reached by a copy of *s in a step of size
-   (fraction - 1) h. PHI_BAD_ARGUMENT before the first step, and after a change of the state. */
+   + i] is x_i at fraction[r]. They are far less accurate than steps, and off the symplectic leaf by their error; they
+   serve to find events. To get the state at an event as accurately as by whole steps, make a step of size (fraction - 1) h
+   with a copy of *s. Returns PHI_BAD_ARGUMENT before the first step, and after a change of the state. */
 phi_status phi_interpolate(const phi_solver *s, const double *fraction, size_t count, double *x);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members have the last good
-   state. status (or NULL) receives the status of each; the first that is not OK is returned. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the last good
+   state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
 #if PHI_GROUPS || PHI_PACKS
 /* Members are integrated in SIMD batches; with OpenMP, batches in parallel. */
 #endif
 phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status);
 
-/* The same with the random numbers of seed: member m takes those of first_member + m, from the step first_step on.
-   phi_ensemble takes 0 for all three. With OpenMP, members are integrated in parallel; the results do not depend on the
+/* phi_ensemble with given random numbers: member m has those of seed and first_member + m, from the step first_step on.
+   phi_ensemble sets all three to 0. With OpenMP, members are integrated in parallel; the results do not depend on the
    number of threads. */
 phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members PHI_AND_T0, double h, size_t steps,
     uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
 
-/* The same from the time t0 on; phi_ensemble starts at the time 0. */
+/* phi_ensemble from the time t0 on; phi_ensemble starts at the time 0. */
 phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
     unsigned char *status);
 
 #if PHI_TIMED
-/* The same for members with parameters params[m], initial time t0[m] and step size h[m]. params may be NULL for the
+/* phi_ensemble for members with parameters params[m], initial time t0[m] and step size h[m]. params may be NULL for the
    defaults. */
 #elif PHI_MONITOR
-/* The same for members with parameters params[m], energy level gauge[m] and step size h[m]. params may be NULL for the
+/* phi_ensemble for members with parameters params[m], energy level gauge[m] and step size h[m]. params may be NULL for the
    defaults, gauge for -H of the initial states. */
 #elif PHI_GAUGE
-/* The same for members with parameters params[m], step size h[m], and factors gauge[m * PHI_GAUGES + k] of the Casimirs.
+/* phi_ensemble for members with parameters params[m], step size h[m], and factors gauge[m * PHI_GAUGES + k] of Casimirs.
    params may be NULL for the defaults, gauge for factors chosen at the initial states. */
 #else
-/* The same for members with parameters params[m] and step size h[m]. params may be NULL for the defaults. */
+/* phi_ensemble for members with parameters params[m] and step size h[m]. params may be NULL for the defaults. */
 #endif
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
    coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. Arrays must not overlap. */
@@ -143,13 +143,13 @@ phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *a
     size_t stride, double *frames, double *attitudes, unsigned char *status);
 
 /* Make one step as phi_step does, and compute its derivative: tangent[i * PHI_DIM + j] is the derivative of the new x_i
-   by the old x_j, exact to round-off, for a fixed gauge or energy level. On failure *s and tangent are unchanged. */
+   by the old x_j with all else fixed, exact to round-off. On failure *s and tangent are unchanged. */
 phi_status phi_step_tangent(phi_solver *s, double h, double tangent[PHI_DIM * PHI_DIM]);
 
 /* Make one step as phi_step does, and its reverse pass (vector-Jacobian product). For L = sum of x1_bar[i] * x[i] with the
    new x, x0_bar receives the derivatives of L by the old x, and the derivatives by the parameters are added to
-   *params_bar, if not NULL. Derivatives are exact to round-off, for a fixed gauge or energy level. x0_bar may be x1_bar.
-   On failure all arguments are unchanged. */
+   *params_bar, if not NULL. Derivatives are those with all else fixed, exact to round-off. x0_bar may be x1_bar. On failure all arguments are
+   unchanged. */
 phi_status phi_step_adjoint(phi_solver *s, double h, const double x1_bar[PHI_DIM], double x0_bar[PHI_DIM],
     phi_params *params_bar);
 

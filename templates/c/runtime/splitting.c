@@ -8,7 +8,7 @@
 #include "attitude.c"
 #include "flows.h"
 
-/* The coefficients of all flows of a step: a row for each time. */
+/* Compute the coefficients of all flows of a step: a row for each time. */
 #if PHI_MONITOR
 static void phi_prepare(const phi_params *params, const double gauge[PHI_GAUGES], double h, double *coef)
 #else
@@ -111,8 +111,8 @@ static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_TAPE)
     return PHI_OK;
 }
 
-/* End a run that started at `before`; returns the status of its last step, or that of the corrector. Without a
-   successful step, or if the corrector fails, the state is that before the run. */
+/* End a run that started at `before`, by the corrector; returns the status of the last step or, if the corrector fails,
+   that of the corrector. If no step succeeded, or if the corrector fails, the state before the run is restored. */
 static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status PHI_AND_STATES_TAPE)
 {
     const phi_status corrected = s->steps == before->steps ? PHI_OK : phi_correct(s, 1 PHI_AND_TAPE_AT(-PHI_BEGUN));

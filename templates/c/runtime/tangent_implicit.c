@@ -5,7 +5,7 @@
 #include "algebra.c"
 #include "tangent_policy.h"
 
-/* Whether a solve has reached rounding level, by its last two corrections. */
+/* Whether Newton's method has reached rounding level, by the sizes of its last two corrections. */
 static int phi_tangent_solved(double size, double previous)
 {
     const int stalled = size < PHI_TANGENT_NEARLY_SOLVED && size > PHI_TANGENT_SHRINKING * previous;

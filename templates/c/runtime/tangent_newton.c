@@ -9,8 +9,8 @@
 #include "tangent_implicit.c"
 #include "tangent_product.c"
 
-/* Derivative of one implicit stage: alpha = x gives Dy = jacobian^-1, and the stage has the derivative 1 +
-   increment_jacobian Dy. y is solved to rounding level, starting from the stored value. */
+/* Compute the derivative of one implicit stage, 1 + increment_jacobian Dy with Dy = jacobian^-1 from alpha(y) = x. The
+   solution y is refined to rounding level, starting from the stored value. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

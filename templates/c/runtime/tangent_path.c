@@ -11,7 +11,7 @@
 #include "path_tangent_policy.h"
 #include "tangent_product.c"
 
-/* Whether the path and its variation satisfy their equation at m, where their expansions have the given slope. */
+/* Whether the slopes of a path and of its variation at a point m are those of their equations. */
 static int phi_tangent_holds(const double *coef, const double p[2 * PHI_DIM], const double m[2 * PHI_DIM],
     const double slope[2 * PHI_DIM])
 {
@@ -23,8 +23,8 @@ static int phi_tangent_holds(const double *coef, const double p[2 * PHI_DIM], co
     return 1;
 }
 
-/* Path dm/dt = pi(m) p with its variation, 0 <= t <= 1, by Taylor series: change is the end minus the start, mean the
-   mean minus the start. Returns 0 if PHI_TERMS terms do not suffice. */
+/* Compute the path dm/dt = pi(m) p, 0 <= t <= 1, with its variation, by Taylor series: change is the end minus the start,
+   mean the mean minus the start. Returns 0 if PHI_TERMS terms do not suffice. */
 static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], const double start[2 * PHI_DIM],
     double change[2 * PHI_DIM], double mean[2 * PHI_DIM])
 {
@@ -53,9 +53,8 @@ static int phi_tangent_piece(const double *coef, const double p[2 * PHI_DIM], co
     return 0;
 }
 
-/* End and mean of the whole path from x with covector p, minus x, with their variations under a variation of x (the
-   first PHI_DIM seeds) or of p (the others). change and mean hold the state, then its variation. Returns 0 if the path
-   cannot be followed. */
+/* Compute the end (change) and the mean of the whole path from x with covector p, minus x; each followed by its variation
+   under a variation of x[seed], or of p[seed - PHI_DIM] if seed >= PHI_DIM. Returns 0 if the path cannot be followed. */
 static int phi_tangent_seed(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], int seed,
     double change[2 * PHI_DIM], double mean[2 * PHI_DIM])
 {
@@ -82,8 +81,8 @@ static int phi_tangent_seed(const double *coef, const double x[PHI_DIM], const d
     return 0;
 }
 
-/* Derivative of one stage: p = grad S_h(mean) gives (1 - H mean_p) Dp = H mean_x with H the Hessian of S_h, and the
-   stage has the derivative end_x + end_p Dp. p is solved to rounding level, starting from the stored mean in value. */
+/* Compute the derivative of one stage, end_x + end_p Dp. p = grad S_h(mean) gives (1 - H mean_p) Dp = H mean_x, where H is
+   the Hessian of S_h. p is refined to rounding level, starting from the stored mean in value. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

@@ -2,7 +2,7 @@
 #define PHI_FILE_TANGENT_PRODUCT
 #include "solver.h"
 
-/* The product of two matrices, into a third. */
+/* Compute the product of two matrices. */
 static void phi_tangent_product(const double a[PHI_DIM * PHI_DIM], const double b[PHI_DIM * PHI_DIM], double product[PHI_DIM * PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i)

@@ -10,7 +10,7 @@ static double phi_taylor_product(const double *a, const double *b, int k)
     return sum;
 }
 
-/* Coefficient k >= 1 of the Taylor series of f(a); d is the series of f'(a): f(a)' = f'(a) a'. */
+/* Coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'; d is the series of f'(a). */
 static double phi_taylor_chain(const double *a, const double *d, int k)
 {
     double sum = 0.0;
@@ -18,7 +18,7 @@ static double phi_taylor_chain(const double *a, const double *d, int k)
     return sum / (double)k;
 }
 
-/* Coefficient k >= 1 of the Taylor series of b = a^r, times a[0]: a b' = r a' b. */
+/* a[0] times coefficient k >= 1 of the Taylor series of b = a^r, from a b' = r a' b. */
 static double phi_taylor_power(const double *a, const double *b, double r, int k)
 {
     double sum = 0.0;

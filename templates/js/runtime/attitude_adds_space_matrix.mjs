@@ -1,6 +1,6 @@
 import { matrixProduct } from "./attitude_matrices.mjs";
 
-/** Compute the change of an element under multiplication by a factor, given minus 1. */
+/** Compute the change of an element by multiplication by 1 + factor from the left. */
 export function turnAdds(element, factor, added) {
   matrixProduct(factor, element, added);
 }

@@ -1,6 +1,6 @@
 import { elementProduct } from "./attitude_quaternions.mjs";
 
-/** The product of an element and a later one, of rotations in body coordinates. */
+/** Compute first · later: later rotations, in body coordinates, are factors on the right. */
 export function multiplyAfter(first, later, product) {
   elementProduct(first, later, product);
 }

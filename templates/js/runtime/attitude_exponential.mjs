@@ -6,9 +6,9 @@ const smallCovector = new Float64Array(COVECTOR);
 const squared = new Float64Array(ELEMENT);
 
 /**
- * exp(P) - 1 by scaling and squaring: exp(P/2^k) - 1, doubled k times. The last number of the covector bounds
- * the square of its norm. Rounding errors double too; for orthogonal matrices orthogonality is restored after
- * each doubling.
+ * Compute exp(P) - 1 for the matrix P of a covector: exp(P/2^k) is squared k times. The last number of the
+ * covector bounds the square of the norm of P. Each squaring doubles rounding errors; orthogonal matrices are
+ * made orthogonal again after it.
  */
 export function fromCovector(covector, element) {
   let size = covector[COVECTOR - 1];

@@ -1,4 +1,4 @@
-/** The group element from which a trajectory started. */
+/** The group element at the start of a trajectory. */
 export function firstOf(solver) {
   return solver.firstElement;
 }

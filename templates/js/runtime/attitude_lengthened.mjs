@@ -1,6 +1,6 @@
 /**
- * Divide a quaternion, given minus 1, by its length. The sign is such that the real part is not negative:
- * otherwise corrections of lengths would act in reverse.
+ * Divide the quaternion 1 + q by its length, in place of q. If its real part is negative, its sign is changed
+ * first: otherwise corrections of lengths would act in reverse.
  */
 export function shorten(q) {
   if (q[0] < -1) {

@@ -2,7 +2,7 @@ import { ELEMENT, ROWS } from "./model.mjs";
 
 // ---- Attitude: matrices ----
 
-/** The product of two square matrices. */
+/** Compute the product of two square matrices. */
 export function matrixProduct(a, b, product) {
   for (let i = 0; i < ROWS; i++) {
     for (let j = 0; j < ROWS; j++) {
@@ -13,12 +13,12 @@ export function matrixProduct(a, b, product) {
   }
 }
 
-/** The product of two elements. */
+/** Compute the product of two group elements. */
 export function elementProduct(a, b, product) {
   matrixProduct(a, b, product);
 }
 
-/** The identity. */
+/** The identity matrix, row by row. */
 export function identityElement() {
   const one = new Float64Array(ELEMENT);
   for (let i = 0; i < ELEMENT; i += ROWS + 1) one[i] = 1;

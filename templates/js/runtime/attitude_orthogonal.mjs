@@ -1,7 +1,7 @@
 import { identityElement } from "./attitude_matrices.mjs";
 import { ROWS } from "./model.mjs";
 
-/** Bring a nearly orthogonal matrix G nearer to an orthogonal one: subtract G (G^T G - 1)/2. */
+/** Subtract G (G^T G - 1)/2 from carry: G + carry is then nearer to an orthogonal matrix than G. */
 export function normalise(g, carry) {
   for (let i = 0; i < ROWS; i++) {
     for (let j = 0; j < ROWS; j++) {
@@ -12,7 +12,7 @@ export function normalise(g, carry) {
   }
 }
 
-/** Correct a matrix, given minus 1, whose sum with 1 is nearly orthogonal. */
+/** Change an element so that 1 + element, a nearly orthogonal matrix, is nearer to an orthogonal one. */
 export function makeOrthogonal(element) {
   normalise(identityElement().map((one, i) => one + element[i]), element);
 }

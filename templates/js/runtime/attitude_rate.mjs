@@ -1,7 +1,7 @@
 import { moveUniformly } from "./attitude_rate_position.mjs";
 import { ELEMENT } from "./model.mjs";
 
-/** The element of the motion with a constant rate over a given time. */
+/** The group element of the motion with the constant rate turning for the time t. */
 export function uniformMotion(turning, t) {
   const element = new Float64Array(ELEMENT);
   const [a, b, c] = turning;

@@ -1,4 +1,4 @@
-/** Change of the vector at the end of an element under rotation by a quaternion, given minus 1. */
+/** The change of the position in an element by a rotation, the quaternion (w, q[1], q[2], q[3]). */
 export function rotationAdds(w, q, element) {
   const [v1, v2, v3] = element.subarray(4);
   const x = q[2] * v3 - q[3] * v2;
@@ -11,7 +11,7 @@ export function rotationAdds(w, q, element) {
   ];
 }
 
-/** The positions of the product of two elements. */
+/** Compute the position in the product of two elements. */
 export function multiplyPositions(a, b, product) {
   rotationAdds(a[0], a, b).forEach((change, i) => {
     product[4 + i] = change + a[4 + i] + b[4 + i];

@@ -1,11 +1,11 @@
 import { energy, vectorField } from "./model.mjs";
 
-/** The Hamiltonian at x and the time t. */
+/** Compute the Hamiltonian at x; it does not depend on the time t. */
 export function energyAt(params, t, x, out) {
   energy(params, x, out);
 }
 
-/** The vector field dx/dt at x and the time t. */
+/** Compute the vector field dx/dt at x; it does not depend on the time t. */
 export function vectorFieldAt(params, t, x, out) {
   vectorField(params, x, out);
 }

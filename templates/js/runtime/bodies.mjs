@@ -3,11 +3,11 @@ import { BODY_AXES, MASS, REMAINDER } from "./model.mjs";
 import { bodiesFrom, innerMasses, relativeFrom } from "./bodies_jacobi.mjs";
 
 // ---- Relative coordinates of bodies ----
-// Flows act on a position and a velocity of each body but the first, and at the first on those of the centre
-// of mass. Positions are relative to the centre of mass of all bodies before (Jacobi), or to the first body
-// (democratic heliocentric); velocities then are those from the centre of mass.
+// Flows act on relative positions and velocities. The first body has those of the centre of mass instead.
+// Jacobi: those of other bodies are relative to the centre of mass of all bodies before. Democratic
+// heliocentric: positions are relative to the first body, velocities to the centre of mass of all bodies.
 
-/** Compute the masses that Kepler motions are about, and the number of bodies up to the last with a mass. */
+/** Compute the central masses of Kepler motions, the total mass, and the last body with mass. */
 export function weigh(sites) {
   const m = sites.params[MASS];
   sites.mass = m.reduce((sum, mass) => sum + mass, 0);
@@ -33,7 +33,9 @@ export function fieldOf(x, k, sites) {
   return x.subarray(k * sites.count, (k + 1) * sites.count);
 }
 
-/** The positions and velocities, or momenta, of the state of a solver and of its tangent vectors, by axes. */
+/**
+ * For the state of a solver and each tangent vector: along each axis, positions with velocities or momenta.
+ */
 function axesOf({ x, vectors = [], sites }) {
   return [x, ...vectors].flatMap((y) => BODY_AXES.map((axis) => axis.map((k) => fieldOf(y, k, sites))));
 }
@@ -64,7 +66,9 @@ export function multiplyByMass(v, sites) {
   for (let i = 0; i < v.length; i++) v[i] *= sites.params[MASS][i];
 }
 
-/** Move the centre of mass, which is free, in the flow of a part of H. */
+/**
+ * Move the centre of mass at its constant velocity for a time, in the flow of the part of H that moves it.
+ */
 export function moveCentre(solver, part, time) {
   if (part === REMAINDER) return;
   for (const [q, v] of axesOf(solver)) q[0] += time * v[0];

@@ -1,7 +1,7 @@
 import { BODY_AXES, MASS } from "./model.mjs";
 import { fieldOf } from "./bodies.mjs";
 
-/** The mass of the first body, for each. */
+/** The central masses of the Kepler motions of all bodies: the mass of the first body. */
 export function innerMasses(m) {
   return m.map(() => m[0]);
 }
@@ -14,12 +14,12 @@ function momentOf(q, sites) {
   return sum;
 }
 
-/** Add a value to that of each body but the first. */
+/** Add a value to the coordinate of each body but the first. */
 function shiftBodies(q, value) {
   for (let i = 1; i < q.length; i++) q[i] += value;
 }
 
-/** Transform positions to those from the first body, and velocities to those from the centre of mass. */
+/** Make positions relative to the first body, and velocities relative to the centre of mass. */
 export function relativeFrom(q, v, sites) {
   const first = v[0];
   shiftBodies(q, -q[0]);
@@ -38,12 +38,12 @@ export function bodiesFrom(q, v, sites) {
   v[0] -= recoil;
 }
 
-/** The state, or a variation, that sums over bodies read. */
+/** The state, or a variation, as sums over bodies read it: unchanged. */
 export function placed(x) {
   return x;
 }
 
-/** Store the sum of m v over all bodies but the first, per mass of the first, behind the other sums. */
+/** Store the velocity (sum of m v over all bodies but the first) / m[0], after the other sums. */
 export function joinSums(x, sites, first) {
   BODY_AXES.forEach(([, velocity], axis) => {
     const shift = momentOf(fieldOf(x, velocity, sites), sites) / sites.params[MASS][0];

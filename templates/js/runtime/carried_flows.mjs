@@ -2,7 +2,7 @@ import { COEFFICIENTS, NEGATIVE, TANGENTS, part1Slope, part2Slope } from "./mode
 import { totalOf } from "./site_level.mjs";
 import { prepareRow } from "./rows_delayed.mjs";
 
-/** Carry the tangent vectors along by a flow over a time that depends on the state: time = tau / rate. */
+/** Multiply tangent vectors by the derivative of a flow over a time that depends on the state: tau / rate. */
 export function carryVectors({ params, sites, x, vectors }, part, time, rate) {
   const coef = new Float64Array(COEFFICIENTS);
   for (const v of vectors) {

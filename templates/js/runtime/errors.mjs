@@ -8,11 +8,11 @@ const STATUS = {
   BAD_ARGUMENT: "bad argument",
 };
 
-/** Error for a step that failed, or a solver that cannot be made; the state before it stays. */
+/** Error for a failed step, which leaves the state unchanged, or for arguments that are not admissible. */
 export class StepError extends Error {
   /**
    * @param {"NO_CONVERGENCE" | "SINGULAR" | "NOT_FINITE" | "BAD_ARGUMENT"} status
-   * @param {number} steps good steps until then
+   * @param {number} steps number of successful steps before
    * @param {string} [detail]
    */
   constructor(status, steps, detail = "") {

@@ -33,7 +33,7 @@ function sampled(params, x) {
   return states;
 }
 
-/** Sum of |pi grad S_3|^2, the leading error of the method, over the samples. */
+/** The sum of |pi grad S_3|^2 over the samples, where S_3 is the leading error of the method. */
 function gaugeError(params, gauge, samples) {
   const error = new Float64Array(DIM);
   let sum = 0;
@@ -52,8 +52,8 @@ function errorOnLine(difference, t) {
 }
 
 /**
- * Shift of the multiple with index c, in units of width, that minimises the error: searched on successively
- * finer grids.
+ * The shift of gauge[c], in units of width, that minimises the error, from its values on successively finer
+ * grids.
  */
 function leastOnLine(params, gauge, c, width, samples) {
   const errors = [];

@@ -24,7 +24,7 @@ export class History {
   /** Sweeps of the last step, and the factor by which their changes shrink. */
   sweeps = 2;
   rate = 0.5;
-  /** Increments of the stages of the last step, in the frame of its end, and its size. */
+  /** Increments of the stages of the last step, in the frame of its end; size of the last step. */
   increments = stages();
   h = NaN;
 
@@ -46,15 +46,15 @@ export class History {
   }
 }
 
-/** Forget the last step, which does not lead to the state. */
+/** Clear the predictors, after parameters have been changed. */
 export function forgetSteps(solver) {
   for (const history of solver.history) history.clear();
 }
 
 /**
- * The factors of the increments in the offsets of the unknowns from the end of a step, at a fraction of it:
- * the collocation polynomial, as integrals of Lagrange polynomials from 1 on, by sums of Legendre
- * polynomials.
+ * Factors f_j with: collocation polynomial at a fraction of a step, minus its value at the end of the step, =
+ * sum of f_j times the increment of stage j. These are integrals of Lagrange polynomials from 1 to the
+ * fraction, divided by the weights, by sums of Legendre polynomials.
  */
 export function factorsAt(fraction) {
   const x = 2 * fraction - 1;
@@ -96,7 +96,7 @@ export function mixed(matrix, increments, z) {
 
 const weight = new Float64Array(1);
 
-/** h b_j times the vector field at all stages. */
+/** Compute the increments of all stages: h b_j times the vector field at the unknowns z. */
 function slopes(solver, stage, start, z, increments) {
   for (let i = 0; i < NODES; i++) {
     weight[0] = solver.h * WEIGHTS[i];
@@ -104,7 +104,7 @@ function slopes(solver, stage, start, z, increments) {
   }
 }
 
-/** The largest change at any stage, in units of the unknowns: |x| for coordinates, 1 for group elements. */
+/** The largest change of an increment at any stage; for coordinates relative to |x|. */
 function changeOf(start, before, after) {
   let norm = 0;
   for (let i = 0; i < DIM; i++) norm += start[i] * start[i];
@@ -131,7 +131,7 @@ const predicted = stages();
 const mixedIncrements = stages();
 
 /**
- * Solve for the increments of all stages by fixed-point sweeps, starting from the prediction; returns a
+ * Solve the equations of a step for increments.now by fixed-point sweeps from the prediction; returns a
  * status.
  */
 export function collocate(solver, stage, start, history, increments) {
@@ -165,7 +165,7 @@ export function collocate(solver, stage, start, history, increments) {
     const slow = rate >= 1 || rate > Math.max(STALLED, 1.5 * history.rate);
     if (rate >= 1 && change <= NEARLY_ROUNDING) rises++;
     if (solved || (slow && change <= ROUNDING) || rises > 1) {
-      // the first change was at rounding level
+      // early: there were more sweeps than needed
       const early = sweep === history.sweeps || rate > 2 * history.rate;
       history.sweeps = Math.max(2, early ? history.sweeps - 1 : sweep - 1);
       return "OK";

@@ -18,7 +18,7 @@ import { makeStep } from "./flows.mjs";
 /** The options of the constructor. */
 // #state lattice_names
 
-/** The coefficients of all flows or stages of a step: a row for each time. */
+/** Compute the coefficients of a step: a row for each of TIMES. */
 function prepareStep(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
   return rows;
@@ -51,7 +51,7 @@ export class Solver {
   // #members lattice_field_constants
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
-  /** The state, one field after the other, each with the last axis fastest; read only. */
+  /** The state, to be read only: one field after the other, each with the last axis fastest. */
   x;
   // #if TIMED
   /** The time of x. */
@@ -62,8 +62,7 @@ export class Solver {
   // #endif
   // #if NOISE
   /**
-   * The random numbers of a site are a function of these three, the number of steps made before, and the
-   * site.
+   * The random numbers of a site are a function of seed, member, step0 + steps, and the site.
    */
   seed = 0;
   member = 0;
@@ -83,7 +82,7 @@ export class Solver {
   rows = emptyRows();
   /** The state before a step. */
   before;
-  /** Predictors and other results of steps of one size, for later steps. */
+  /** Predictors of steps of one size. */
   past = {};
   /** Steps and time at the last change of h, from which the time is counted. */
   #stepsBefore = 0;
@@ -119,7 +118,7 @@ export class Solver {
     return this.sites.sizes;
   }
 
-  /** The values of a field at all sites, as a part of x; to be read only. */
+  /** The values of a field at all sites, a part of x; to be read only. */
   field(name) {
     const k = COORDINATES.indexOf(name);
     if (k < 0) throw new StepError("BAD_ARGUMENT", this.steps, `there is no field ${name}`);
@@ -195,7 +194,7 @@ export class Solver {
     return march(this, h, count);
   }
 
-  /** The density of the Hamiltonian at each site, of x and its time or of others. */
+  /** The density of the Hamiltonian at each site, at x and its time or at given ones. */
   density(x = this.x, t = this.t) {
     const out = new Float64Array(this.sites.count);
     this.sites.t = t;
@@ -203,14 +202,14 @@ export class Solver {
     return out;
   }
 
-  /** The Hamiltonian, of x or of another state. */
+  /** The Hamiltonian, at x and its time or at given ones. */
   hamiltonian(...at) {
     return sumOf(this.density(...at));
   }
 
   /**
-   * The Casimirs at each site, one after the other in the order of CASIMIRS. By CASIMIR_KINDS, a Casimir is
-   * each value ("sites"), their sum, or their product.
+   * The terms of the Casimirs at each site, one Casimir after the other in the order of CASIMIRS.
+   * CASIMIR_KINDS says whether a Casimir is the value at each site ("sites"), their sum, or their product.
    */
   casimirs(x = this.x) {
     const out = new Float64Array(CASIMIRS.length * this.sites.count);
@@ -220,7 +219,7 @@ export class Solver {
 
   // #members lattice_observed
   // #members lattice_observed_fields
-  /** The right-hand side pi(x) grad H at x and its time or at others, laid out as x. */
+  /** The right-hand side pi(x) grad H, laid out as x, at x and its time or at given ones. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(x.length);
     this.sites.t = t;

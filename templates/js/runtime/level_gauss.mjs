@@ -3,8 +3,7 @@ import { WEIGHTS, elapsed } from "./model.mjs";
 const timeOfNode = new Float64Array(1);
 
 /**
- * Physical time of a step, from its start and the unknowns at its stages; NaN unless it has the sign of the
- * step.
+ * Physical time of a step with the unknowns z at its stages; NaN unless it has the sign of the step.
  */
 export function timeOfStep(solver, stage, start, z) {
   let sum = 0;

@@ -2,7 +2,10 @@ import { StepError } from "./errors.mjs";
 import { chooseGauge, rateAt } from "./level.mjs";
 import { FRACTIONS, prepare } from "./model.mjs";
 
-/** Set the energy level after the state was changed. Throws StepError if the new state has none. */
+/**
+ * Set the energy level to that of a new state x. Throws StepError if it or the monitor is not
+ * admissible at x.
+ */
 export function takeLevel(solver, x) {
   const [rate, level] = [rateAt(solver.params, x), chooseGauge(solver.params, x)];
   if (!(Number.isFinite(rate) && rate > 0 && Number.isFinite(level[0]))) {

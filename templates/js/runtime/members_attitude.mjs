@@ -5,8 +5,7 @@ import { ATTITUDE } from "./model.mjs";
 /** Members of Solver: the attitude of a body. */
 export class Attitudes {
   /**
-   * The attitude: a quaternion (w, x, y, z) that rotates body into space coordinates, or a matrix by
-   * rows.
+   * The attitude. It transforms body to space coordinates: a quaternion (w, x, y, z), or a matrix row by row.
    */
   get attitude() {
     return currentElement(this).slice(0, ATTITUDE);

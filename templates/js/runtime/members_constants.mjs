@@ -1,6 +1,6 @@
 import { OBSERVABLES } from "./model.mjs";
 
-/** Members of Solver: their number and names. */
+/** Members of Solver: the names of observables. */
 export class Constants {
   static OBSERVABLES = OBSERVABLES;
 }

@@ -5,19 +5,22 @@ import { Solver } from "./solver.mjs";
 /** Members of Solver: runs of many states. */
 export class Ensemble {
   /**
-   * Integrate many states, each with its own gauge, if there is one. A state that fails keeps its last
-   * good value. h and the values of options may be arrays, with a number for each state; throws StepError if
-   * they have another length.
+   * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
+   * #if GAUGE
+   * Each state has its own gauge unless options.gauge is given.
+   * #endif
+   * h, parameters and t0 may be arrays with a number for each state. Throws StepError if an array has another
+   * length.
    *
-   * @param {Iterable<ArrayLike<number>>} members
-   * @param {number | ArrayLike<number>} h
-   * @param {number} count
+   * @param {Iterable<ArrayLike<number>>} members initial states
+   * @param {number | ArrayLike<number>} h step size
+   * @param {number} count number of steps
    * #if NOISE
-   * @param {object} [options] as in the constructor, without x0; member is that of the first state
+   * @param {object} [options] as in the constructor, without x0; member is the number of the first state
    * #else
    * @param {object} [options] as in the constructor, without x0
    * #endif
-   * @returns {{x: Float64Array[], status: string[]}} last states, and "OK" or a status for each
+   * @returns {{x: Float64Array[], status: string[]}} last states; for each "OK" or the status of the failure
    */
   static ensemble(members, h, count, options = {}) {
     const starts = Array.from(members);

@@ -7,9 +7,9 @@ import { stageChange } from "./model.mjs";
 export class Interpolation {
   /**
    * The states at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial.
-   * They are far less accurate than steps, and off the leaf by their error: they serve to find events. The
-   * state at an event, as accurate as those of whole steps, is reached by a copy of the solver in a step of
-   * size (fraction - 1) h. Throws StepError before the first step, and after a change of the state.
+   * They are far less accurate than steps, and off the symplectic leaf by their error; they serve to find
+   * events. To get the state at an event as accurately as by whole steps, make a step of size (fraction - 1)
+   * h with a copy of the solver. Throws StepError before the first step, and after a change of the state.
    *
    * @param {number[]} fractions
    * @returns {Float64Array[]}

@@ -21,7 +21,7 @@ export class Kicks {
   }
 
   /**
-   * Between steps: add a change to the state, such as an impulse; otherwise as setState.
+   * Between steps: add a change, such as an impulse, to the state. Throws StepError as setState does.
    *
    * @param {ArrayLike<number>} change
    * @returns {this}
@@ -39,7 +39,7 @@ export class Kicks {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Replace the state by x + carry. */
+  /** Replace the state by x with the rounding error carry. */
   #place(x, carry) {
     takeLevel(this, x);
     shiftHistory(this, x);

@@ -4,7 +4,9 @@ const number = new Float64Array(1);
 
 /** Members of Solver: the modified Hamiltonian. */
 export class Modified {
-  /** The Hamiltonian whose flow is a step of size h, up to O(h^MODIFIED_POWER), at x or another state. */
+  /**
+   * The Hamiltonian whose exact flow is a step of size h, up to O(h^MODIFIED_POWER), at x or a given state.
+   */
   modifiedHamiltonian(h, x = this.x) {
     modified(this.params, h, x, number);
     return number[0];

@@ -6,8 +6,11 @@ import { forgetSteps } from "./gauss.mjs";
 /** Members of Solver: the derivative of a step. */
 export class Tangent {
   /**
-   * Make one step as `step` does, and compute its derivative, exact to round-off, for a fixed gauge. Throws
-   * StepError; then the state is unchanged.
+   * Make one step as `step` does, and compute its derivative, exact to round-off.
+   * #if GAUGE
+   * The gauge is held fixed.
+   * #endif
+   * Throws StepError; then the state is unchanged.
    *
    * @param {number} h
    * @returns {Float64Array} entry i * DIM + j is the derivative of the new x[i] by the old x[j]

@@ -7,7 +7,7 @@ import { carryVectors } from "./carried_flows.mjs";
 
 // ---- The step of a splitting: flows of parts of K, one after the other ----
 
-/** One step: a status. If it fails, the state is of no use. */
+/** Make one step; returns a status. If it fails, the state is undefined. */
 export function makeStep(solver) {
   const { x, rows, sites, params, h } = solver;
   const [t, tCarry] = [solver.t, solver.tCarry];

@@ -12,8 +12,8 @@ import { DIM, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
 // ---- The implicit step, by Newton's method ----
 
 /**
- * Size of a correction relative to each component of y, or to FLOOR times the largest if that is more; NaN if
- * the correction is.
+ * The largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|; NaN or infinity if a correction
+ * is.
  */
 export function relativeSize(y, correction) {
   let norm = 0;
@@ -36,9 +36,9 @@ const jacobian = new Float64Array(DIM * DIM);
 const incrementJacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance. The
- * last correction changes the increment to first order, without another evaluation: it is accepted if the
- * remaining error, quadratic in it, is below TOLERANCE.
+ * Solve (y - x) + displacement(y) = 0 for y by Newton's method from the predicted value, and advance; returns
+ * a status. The effect of the last correction on the increment is added to first order, without another
+ * evaluation. So a solution is accepted if its error, quadratic in the last correction, is below TOLERANCE.
  */
 function attempt(solver, stage) {
   const { x, carry } = solver;

@@ -5,7 +5,7 @@ import { twoNormals, words } from "./philox.mjs";
 
 // ---- Noise ----
 
-/** Draw normal variates of variance 1, in pairs: the increments of a step. */
+/** Compute normal variates of variance 1 for a step, in pairs. */
 function normals(seed, member, step, values) {
   const [low, high] = words(step);
   for (let k = 0; k < DRAWS; k += 2) {
@@ -15,7 +15,7 @@ function normals(seed, member, step, values) {
 }
 
 /**
- * Set the increments of the next step: the given ones, or random ones.
+ * Set the increments of the noise in the next step to the given ones, else to random ones.
  *
  * @returns {boolean} false if one is not finite, or some are missing
  */
@@ -33,7 +33,7 @@ function draw(solver, increments) {
   return dw.every(Number.isFinite);
 }
 
-/** Read the increments of the next step. Throws StepError if given ones are not admissible. */
+/** Set the increments of the noise in the next step. Throws StepError if given ones are not admissible. */
 export function drawStep(solver, increments) {
   if (draw(solver, increments)) return;
   throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${increments}`);

@@ -1,4 +1,4 @@
-/** Size of the noise in the increments of the state: 0. */
+/** Contribution of noise to the size of an increment of the state: 0, since there is no noise. */
 export function sizeOfNoise() {
   return 0;
 }

@@ -3,7 +3,7 @@ import { DIM, SOURCES } from "./model.mjs";
 
 const fields = new Float64Array(SOURCES.length * DIM);
 
-/** Size of the noise in the increments of the state by a step. */
+/** Contribution of noise to the size of the increment of the state in a step: the sum of |dw| |field|. */
 export function sizeOfNoise({ params, t, x, dw }) {
   noiseFieldsAt(params, t, x, fields);
   return fields.reduce((sum, field, k) => sum + Math.abs(dw[Math.floor(k / DIM)] * field), 0);

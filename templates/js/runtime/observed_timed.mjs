@@ -1,6 +1,6 @@
 import { observables } from "./model.mjs";
 
-/** The observables at x and the time t. */
+/** Compute the observables at x and the time t. */
 export function observablesAt(params, t, x, out) {
   observables(params, t, x, out);
 }

@@ -1,4 +1,4 @@
-/** The time of a solver gains that of a stage. */
+/** Add the time of a stage or flow to that of a solver, in compensated arithmetic. */
 export function pass(solver, time) {
   const sum = solver.t + time;
   const added = sum - solver.t;

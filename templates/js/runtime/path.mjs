@@ -19,9 +19,8 @@ const end = new Float64Array(DIM);
 const field = new Float64Array(DIM);
 
 /**
- * Whether dm/dt = pi(m) p holds at the end of an expansion, where it has the given slope. An expansion with
- * gaps between its terms, like t + t^9, or across the kink of an absolute value, may only seem to have
- * converged.
+ * Whether the slope of an expansion at its end is pi(m) p. If not, the expansion only seems to have
+ * converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value.
  */
 function holds(coef, p) {
   pathField(coef, p, fixed, end, field);
@@ -34,8 +33,8 @@ function holds(coef, p) {
 }
 
 /**
- * Path for 0 <= t <= 1, from start, by its Taylor series: shift is m(1) - start, mean the mean of m - start.
- * The size of the terms decides their number. Returns false if TERMS terms do not suffice.
+ * Compute the path m(t) from start, 0 <= t <= 1, by its Taylor series: shift is m(1) - start, mean the mean
+ * of m - start. Terms are added until they are negligible. Returns false if TERMS terms do not suffice.
  */
 function followPiece(coef, p, start, shift, mean) {
   let norm = 0;
@@ -70,11 +69,11 @@ const shift = new Float64Array(DIM);
 const local = new Float64Array(DIM);
 
 /**
- * Whole path from x, in 1, 2, 4, ... pieces until each expansion converges. For any p, the end of the path
- * lies on the symplectic leaf of x.
+ * Compute the whole path from x, in 1, 2, 4, ... pieces until each expansion converges: change is its end
+ * minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x.
  *
  * @returns {{good: boolean, piecesUsed: number}} good: whether the path is short enough and in the domain;
- *     piecesUsed: number of all pieces
+ *     piecesUsed: number of pieces computed
  */
 function followPath(coef, x, p, change, mean) {
   let piecesUsed = 0;
@@ -101,8 +100,8 @@ function followPath(coef, x, p, change, mean) {
 const mean = new Float64Array(DIM);
 
 /**
- * Residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the change of x along
- * the path and an approximate Jacobian of the residual. Returns the value of `followPath`.
+ * Compute the residual p - grad S_h(y) of the equation for p, where y is the mean of the path; also the
+ * change of x along the path and an approximate Jacobian of the residual. Returns the value of `followPath`.
  */
 function findResidual(solver, coef, p, y, residual, change, jacobian) {
   const path = followPath(coef, solver.x, p, change, mean);
@@ -119,7 +118,10 @@ const elsewhere = new Float64Array(DIM);
 const other = new Float64Array(DIM);
 const unused = new Float64Array(DIM * DIM);
 
-/** Jacobian of the residual by differences, for steps so large that the approximate one does not contract. */
+/**
+ * Compute the Jacobian of the residual by differences, for steps so large that iterations with the
+ * approximate Jacobian do not converge.
+ */
 function differentiate(solver, coef, p, residual, jacobian) {
   let norm = TINY;
   let piecesUsed = 0;
@@ -142,8 +144,8 @@ const change = new Float64Array(DIM);
 const jacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve p = grad S_h(mean of the path from x with covector p), and move to the end of that path. If that
- * needs more than MOST_PIECES pieces, the step is too large for a meaningful solution.
+ * Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path; returns a
+ * status. A step that needs more than MOST_PIECES pieces is too large for a meaningful solution.
  */
 function attempt(solver, stage) {
   const coef = solver.coef[stage];
@@ -164,7 +166,7 @@ function attempt(solver, stage) {
       norm = Math.max(norm, Math.abs(p[i]));
     }
     size /= norm;
-    // Second criterion: residuals no longer shrink, the solve has reached rounding level.
+    // solved, or residuals no longer shrink since they are at rounding level
     if (size <= SOLVED || (previous < NEARLY_SOLVED && size > SHRINKING * previous)) {
       if (!plausible(solver, stage, change)) return "NO_CONVERGENCE";
       // #if MONITOR

@@ -13,7 +13,7 @@ function upper(a, b) {
 
 /**
  * Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3
- * (2011): four random words from a counter of four.
+ * (2011): four random words, as a function of a counter of four words and a key of two.
  */
 function philox(counter, key) {
   let [a, b, c, d] = counter;
@@ -28,7 +28,7 @@ function philox(counter, key) {
   return [a, b, c, d];
 }
 
-/** A number from 0 up to, but not including, 1, from 53 bits of two words. */
+/** A number in [0, 1), from 53 bits of two words. */
 function unit(high, low) {
   return ((high >>> 5) * 67108864 + (low >>> 6)) * 2 ** -53;
 }
@@ -39,7 +39,7 @@ export function words(number) {
   return [Number(bits & 0xffffffffn), Number(bits >> 32n)];
 }
 
-/** Two standard normal variates (Box and Muller), truncated at BOUND, from a counter of four words. */
+/** Two standard normal variates (Box and Muller) of magnitude at most BOUND, from a counter of four words. */
 export function twoNormals(counter, key) {
   const [a, b, c, d] = philox(counter, key);
   const radius = Math.min(Math.sqrt(-2 * Math.log(unit(a, b) + 2 ** -54)), BOUND);
@@ -48,8 +48,7 @@ export function twoNormals(counter, key) {
 }
 
 /**
- * Read the arguments of the random numbers from the options of a solver; throws StepError for values not
- * allowed.
+ * Seed, member and step0 from the options of a solver. Throws StepError for values that are not admissible.
  */
 export function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   for (const [name, value] of Object.entries({ seed, member, step0 })) {
@@ -60,7 +59,7 @@ export function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   return { seed, member, step0 };
 }
 
-/** Select the random numbers by the options of a solver. */
+/** Set seed, member and step0 of a solver from its options. */
 export function takeDraws(solver, options) {
   Object.assign(solver, drawsOf(options));
 }

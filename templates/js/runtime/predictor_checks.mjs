@@ -8,7 +8,7 @@ import { DIM, FRACTIONS } from "./model.mjs";
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution and its backward differences, from which the next one is extrapolated. Affects
+ * Predictor: the last solution and its backward differences, which extrapolate to the next solution. Affects
  * the speed only.
  */
 export class History {
@@ -25,7 +25,7 @@ export class History {
   }
 
   /**
-   * Shift the last value with the state, after this has been changed; differences are unchanged.
+   * Add the change of the state, to - from, to the last solution; differences are unchanged.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
@@ -34,13 +34,13 @@ export class History {
     for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 
-  /** The last value. */
+  /** The last solution. */
   last() {
     return Float64Array.from(this.#difference[0]);
   }
 
   /**
-   * Predict the next value by the sum of the differences.
+   * Predict the next solution by the sum of the differences.
    *
    * @param {Float64Array} value is overwritten
    * @returns {boolean} false if there is no prediction, or if it is far away, where the equation of a step
@@ -92,8 +92,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment agrees with the motion. If the step is too large, the solution found may be far away,
- * at another energy, and unrelated to the motion.
+ * Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
+ * equation may have solutions far away, at another energy, unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -124,7 +124,7 @@ export function plausible(solver, stage, increment) {
 }
 
 /**
- * Make one stage. If it fails from the predicted value, it is tried again from the state.
+ * Make one stage. If attempt fails from the predicted solution, it is called again without a prediction.
  *
  * @param {Solver} solver
  * @param {number} stage

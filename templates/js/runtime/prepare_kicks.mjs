@@ -1,6 +1,6 @@
 import { MULTIPLES, TIMES, prepareRow } from "./model.mjs";
 
-/** The coefficients of all flows of a step, a row for each time. Some of them depend on h squared too. */
+/** Compute the coefficients of all flows of a step, a row for each time. Some depend on h squared too. */
 export function prepare(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time * h, [MULTIPLES[k] * (h * h)], rows[k]));
 }

@@ -1,6 +1,6 @@
 import { refresh } from "./model.mjs";
 
-/** The coefficients that depend on the time. */
+/** Compute the coefficients that depend on the time; there is no noise dw. */
 export function refreshAt(row, t, dw, out) {
   refresh(row, t, out);
 }

@@ -1,6 +1,6 @@
 import { prepare } from "./model.mjs";
 
-/** Compute the coefficients of a flow, which is so late along a tangent vector. */
+/** Compute the coefficients of a flow; late is the derivative of its time along a tangent vector. */
 export function prepareRow(params, time, h, row, k, late = 0) {
   prepare(params, time * h, [late], row);
 }

@@ -1,6 +1,6 @@
 import { prepare } from "./model.mjs";
 
-/** Compute the coefficients of a flow or stage. */
+/** Compute a row of coefficients. */
 export function prepareRow(params, time, h, row) {
   prepare(params, time * h, row);
 }

@@ -1,6 +1,6 @@
 import { SCHEDULE } from "./model.mjs";
 
-/** The flows of a run of one step. */
+/** The flows of one step. */
 export function flowsOfRun() {
   return SCHEDULE;
 }

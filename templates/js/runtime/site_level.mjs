@@ -4,21 +4,21 @@ import { sumOf } from "./sites.mjs";
 
 // ---- Steps equal in tau: those of K = log(A + e) - log(-B), where H = A + B ----
 
-/** The sum of the densities that a function computes at sites. */
+/** The sum over all sites of the values that the function density computes. */
 export function totalOf(density, params, sites, ...at) {
   const values = new Float64Array(sites.count);
   density(params, ...at, sites, values);
   return sumOf(values);
 }
 
-/** A part of H. */
+/** The value of a part of H. */
 function partEnergy(part, { params, sites, x }) {
   return totalOf([part1, part2][part], params, sites, x);
 }
 
 /**
- * Set the energy level e = -H(x0), constant along a trajectory, and the compensation term of the time t.
- * Throws StepError where the physical time does not increase.
+ * Set the energy level e = -H(x0), constant along a trajectory, and clear the rounding error of t. Throws
+ * StepError unless -B is positive at x0.
  */
 export function beginLevel(solver) {
   solver.tCarry = 0;
@@ -29,7 +29,7 @@ export function beginLevel(solver) {
   throw new StepError("BAD_ARGUMENT", 0, `the part of H that must be negative is ${energy} at x0`);
 }
 
-/** A + e or -B: a part of K has the flow of the part of H over the time divided by this factor. */
+/** A + e or -B: the flow of a part of K for a time is that of the part of H for the time divided by this. */
 export function rateOf(part, solver) {
   const energy = partEnergy(part, solver);
   return part === NEGATIVE ? -energy : energy + solver.level;

@@ -5,8 +5,8 @@ import { twoNormals, words } from "./philox.mjs";
 // ---- Noise at sites ----
 
 /**
- * The increments of all sites in a part of the next step: a function of seed, member, step, part and site
- * only. A step of -h has them in reverse order, so that it inverts a step of h.
+ * Compute the increments of the noise at all sites, in a part of the next step. They are a function of seed,
+ * member, step, part and site only. A step of -h has them in reverse order, so that it inverts a step of h.
  */
 export function drawAtSites(solver, part) {
   const { seed, member, step0, steps, h, sites } = solver;
@@ -26,9 +26,7 @@ export function drawAtSites(solver, part) {
   }
 }
 
-/**
- * Throw StepError unless the number of steps made before fits its field in the counter of the random numbers.
- */
+/** Throw StepError unless step0 fits its field of 48 bits in the counter of the random numbers. */
 export function expectFewSteps({ step0 }) {
   if (step0 >= 2 ** 48) throw new StepError("BAD_ARGUMENT", 0, `step0 is ${step0}`);
 }

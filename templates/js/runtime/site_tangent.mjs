@@ -7,8 +7,8 @@ import { usual } from "./sweeps.mjs";
 // ---- Tangent vectors of the series ----
 
 /**
- * Carry a tangent vector v through a stage, in place: solve dy = S dy + side, and add its increment; returns
- * false on failure.
+ * Multiply a tangent vector v by the derivative of a stage, in place: solve dy = S dy + side, where S is the
+ * derivative of a sweep, and add the increment that dy gives. Returns false on failure.
  */
 export function carry(coef, x, y, v, sites) {
   const sizes = usual(y);

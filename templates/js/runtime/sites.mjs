@@ -12,7 +12,7 @@ import { weigh } from "./bodies.mjs";
 
 // ---- The sites ----
 
-/** The sum of values, compensated after A. Neumaier. */
+/** The sum of values, by the compensated summation of A. Neumaier. */
 export function sumOf(values) {
   let sum = 0, rest = 0;
   for (const value of values) {
@@ -25,7 +25,7 @@ export function sumOf(values) {
 
 /** The sites of a lattice: their parameters, and tables of the neighbours that kernels read. */
 export class Sites {
-  /** Initialise from the options of a solver, with the sizes; throws StepError for values not allowed. */
+  /** Initialise from the options of a solver. Throws StepError for values that are not admissible. */
   constructor(sizes, options) {
     const fits = (n, axis) => Number.isInteger(n) && n >= LEAST[axis] && n % PERIODS[axis] === 0;
     if (sizes.length !== AXES.length || !sizes.every(fits)) {
@@ -40,9 +40,7 @@ export class Sites {
     this.params = this.#admitted(options.params ?? {});
     weigh(this);
     const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
-    /**
-     * The neighbours of each site, and 1 or 0 for terms of H that exist there or not, for each kind of term.
-     */
+    /** The neighbour of each site, for each offset of NEAR. Below: 1 or 0 where terms of H exist or not. */
     this.near = NEAR.map((offset) => every(Int32Array, (i) => this.#beside(i, offset)));
     this.present = BOUNDS.map((bounds) => every(Float64Array, (i) => this.#holds(i, bounds)));
     // #if COLOURS
@@ -65,7 +63,7 @@ export class Sites {
       return at < near || at >= this.seams[axis] - near;
     }));
     const listed = (wanted) => Int32Array.from(beside.flatMap((own, i) => (wanted(own, i) ? [i] : [])));
-    /** The sites on seams and near them; all others, and those of each colour. */
+    /** For each colour: the sites on seams and near them, and the other sites. */
     this.beside = listed((own) => own);
     this.inside = this.coloured.map((_, colour) => listed((own, i) => !own && colours[i] === colour));
     this.inside.all = listed((own) => !own);
@@ -76,7 +74,7 @@ export class Sites {
     this.sums = new Float64Array(GATHERED * this.count);
     // #endif
     // #if NOISE
-    /** The increments of the noise in a part of a step, source by source. */
+    /** The increments of the noise at all sites in a part of a step, one source after the other. */
     this.dw = new Float64Array(SOURCES.length * this.count);
     // #endif
     // #if SPLIT
@@ -88,17 +86,17 @@ export class Sites {
     flows.push(null); // the time advances in place of a last flow
     // #endif
     const kinds = [flows.slice(0, 1), flows.slice(1, -1), flows.slice(-1), flows.slice(1, -1).reverse()];
-    /** The flows of a step: a part of H, a row of coefficients, a colour. */
+    /** The flows of a step, each as [part of H, row of coefficients, colour]. */
     this.flows = SCHEDULE.flatMap(([kind, row]) => kinds[kind].map(([part, colour]) => [part, row, colour]));
     // #else
-    /** The flows of a step: a part of H, a row of coefficients. */
+    /** The flows of a step, each as [part of H, row of coefficients]. */
     this.flows = SCHEDULE;
     // #endif
     // #endif
   }
 
   /**
-   * All parameters: the given ones, and defaults. Throws StepError unless they are known and finite, and
+   * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, and
    * positive where required.
    */
   #admitted(overrides) {
@@ -106,7 +104,7 @@ export class Sites {
     if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
     const params = Object.create(null);
     for (const [name, value] of Object.entries({ ...DEFAULT_PARAMETERS, ...overrides })) {
-      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: one number
+      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: not an array
       // #if GRAPH
       if (AT_BONDS.includes(name)) length = this.bondCount;
       // #endif
@@ -152,7 +150,7 @@ export class Sites {
     return place;
   }
 
-  /** The site at an offset; beyond open ends any site, since kernels multiply it by 0. */
+  /** The site at an offset from a site; beyond open ends any site, since kernels multiply its values by 0. */
   #beside(site, offset) {
     return this.#place(site).reduce((sum, from, axis) => {
       const size = this.sizes[axis];
@@ -167,7 +165,10 @@ export class Sites {
   #colours;
   #begins = new Map();
 
-  /** 1 where the site at an offset has a colour and lies on exactly the given seams, else 0. */
+  /**
+   * A number for each site: 1 where the site at an offset has a colour and lies on exactly the seams whose
+   * bits are set in window, else 0. WANTED[number] is the pair of colour and offset.
+   */
   begins(number, window) {
     const key = `${number} ${window}`;
     const [colour, offset] = WANTED[number];
@@ -182,7 +183,7 @@ export class Sites {
   }
 
   // #endif
-  /** 1 where all sites from offset low to offset high exist, along each open axis, else 0. */
+  /** 1 if all sites from offset low to offset high exist, along each open axis, else 0. */
   #holds(site, bounds) {
     const place = this.#place(site);
     const inside = ([low, high], axis) => place[axis] + low >= 0 && place[axis] + high < this.sizes[axis];
@@ -190,7 +191,9 @@ export class Sites {
   }
   // #if GRAPH
 
-  /** The bonds, each from a site a to a site b. */
+  /**
+   * Initialise the bonds, each from a site a to a site b, with a colouring of the sites if flows need one.
+   */
   #connect(bonds) {
     const known = bonds.length % 2 === 0 && Array.from(bonds).every((end, k) => {
       return Number.isInteger(end) && end >= 0 && end < this.count && end !== bonds[k ^ 1];
@@ -214,8 +217,9 @@ export class Sites {
   }
 
   /**
-   * The bonds of all sites that are their end a, or b, or either: the site itself, the site at the other end,
-   * the number of the bond. `chosen` restricts them to bonds whose site, here or there, has a colour.
+   * Lists over bonds with end a or b, or over both ends ("") of all bonds: the site here at that end, the
+   * site there at the other end, and the number of the bond. With chosen = "here" or "there", only bonds
+   * whose site here or there has the colour.
    */
   bonds(end, chosen, colour) {
     const key = `${end} ${chosen} ${chosen && colour}`;

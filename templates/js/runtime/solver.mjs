@@ -30,7 +30,7 @@ const number = new Float64Array(1);
 
 /**
  * All parameters: the given ones, else defaults. Throws StepError unless they are known, finite, positive
- * where required, and give finite coefficients for a negligibly small step.
+ * where required, and the coefficients of a very small step are finite.
  */
 function admitted(overrides) {
   const params = { ...DEFAULT_PARAMETERS, ...overrides };
@@ -109,7 +109,7 @@ export class Solver {
     return this.integrate(h, 1);
   }
 
-  /** Make one step between correctors. Throws StepError; then the state is unchanged. */
+  /** Make one step without correctors. Throws StepError; then the state is unchanged. */
   #stepOfRun(h) {
     // #endif
     this.#setStep(h);
@@ -157,8 +157,8 @@ export class Solver {
 
   // #if CORRECTED
   /**
-   * End a run. Throws StepError if the corrector fails; then, or without a step, the state is that before the
-   * run.
+   * Apply the corrector at the end of several steps. If no step was made, or if the corrector fails, restore
+   * the state before the steps; throws StepError if the corrector fails.
    */
   #endRun(before) {
     const status = this.steps > before.steps ? makeStage(this, 0, END) : "";
@@ -171,12 +171,12 @@ export class Solver {
 
   // #endif
   /**
-   * Return an independent solver with the same state. Predictors may start anew.
+   * Return an independent solver with the same state.
    *
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where a system has none
+    const { x: x0, params, gauge, seed, member, step0 } = this; // some may be undefined
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -185,8 +185,8 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time, attitude and random numbers are unchanged. Throws
-   * StepError for values that are not admissible; then nothing changes.
+   * Between steps: change parameters; all else is unchanged. Throws StepError for values that are not
+   * admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
    * @returns {this}
@@ -224,7 +224,7 @@ export class Solver {
 
   // #members observed
   // #members noise_fields
-  /** The vector field dx/dt at a state and a time. */
+  /** The vector field dx/dt, at x and its time or at given ones. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorFieldAt(this.params, t, x, out);

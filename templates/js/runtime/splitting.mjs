@@ -7,12 +7,10 @@ import { DIM, FLOWS, SCHEDULE } from "./model.mjs";
 
 const at = new Float64Array(DIM);
 const displacement = new Float64Array(DIM);
-/** Increments; with a monitor also the physical time of a flow, NaN outside the domain of a logarithm. */
+/** Results of a flow, the increments of the coordinates first. */
 const change = new Float64Array(DIM + 2);
 
-/**
- * Make the flows of one step, or those of a corrector; returns a status. If it fails, the state is unchanged.
- */
+/** Make flows, by default those of one step; returns a status. If it fails, the state is unchanged. */
 export function makeStage(solver, _, flows = SCHEDULE) {
   const { x, carry } = solver;
   const [rows] = solver.coef;

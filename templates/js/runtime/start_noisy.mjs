@@ -1,4 +1,4 @@
-/** Set y to x: solutions of steps with noise cannot be predicted. */
+/** Set y to x, without a prediction: solutions of steps with noise cannot be predicted. */
 export function startFrom(history, x, y) {
   y.set(x);
 }

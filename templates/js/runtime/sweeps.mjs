@@ -8,7 +8,7 @@ import { carry } from "./site_tangent.mjs";
 
 // ---- The step of the series: stages, each with an equation on the whole lattice ----
 
-/** The largest magnitude among some values. */
+/** The largest magnitude among values from index from to index to - 1; NaN if one is NaN. */
 function most(values, from, to) {
   let largest = 0;
   for (let k = from; k < to; k++) {
@@ -18,7 +18,7 @@ function most(values, from, to) {
   return largest;
 }
 
-/** The sizes of the fields of y, none much smaller than the largest. */
+/** The largest magnitude of each field of y, plus LEAST_SIZE times that of all fields. */
 export function usual(y) {
   const count = y.length / DIM;
   const overall = most(y, 0, y.length);
@@ -26,7 +26,7 @@ export function usual(y) {
   return Float64Array.from({ length: DIM }, (_, k) => largest(k) + LEAST_SIZE * overall + 1e-300);
 }
 
-/** Size of a change of y, field by field. */
+/** The largest change of a field of y relative to the size of the field. */
 export function sizeOf(change, y) {
   const count = y.length / DIM;
   return usual(y).reduce((largest, unitOfField, k) => {
@@ -35,13 +35,13 @@ export function sizeOf(change, y) {
   }, 0);
 }
 
-/** Whether further sweeps would change y by less than rounding, or changes no longer shrink. */
+/** Whether further sweeps would change y by less than rounding, or changes are small and no longer shrink. */
 export function solved(change, before, first) {
   if (change * change <= (before - change) * SETTLED) return true;
   return change >= before && change <= ROUNDING && !first;
 }
 
-/** Solution y of a stage by fixed-point sweeps from a prediction; null on failure. */
+/** The solution y of a stage by fixed-point sweeps from a prediction; null on failure. */
 function bySweeps(coef, x, prediction, sites) {
   let y = prediction;
   let before = 0;
@@ -58,7 +58,7 @@ function bySweeps(coef, x, prediction, sites) {
   return null;
 }
 
-/** Update a list of backward differences with a value; returns the order whose prediction was best. */
+/** Update backward differences with a new value; returns the number of them that predict best. */
 function remember(differences, value) {
   let order = 1;
   let least = Infinity;
@@ -92,7 +92,7 @@ export function makeStep(solver) {
       for (let k = 0; k < prediction.length; k++) prediction[k] += difference[k];
     }
     let y = past.stiff ? null : bySweeps(coef, x, prediction, sites);
-    if (y === null) { // Newton's method from here on
+    if (y === null) { // Newton's method in this stage and all later ones
       past.stiff = true;
       y = byNewton(coef, x, prediction, sites);
     }

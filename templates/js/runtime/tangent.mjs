@@ -4,7 +4,7 @@ import { differentiateStage } from "./tangent_newton.mjs";
 
 // ---- The tangent map of a step ----
 
-/** The matrix 1. */
+/** The identity matrix, row by row. */
 export function identity() {
   return Float64Array.from({ length: DIM * DIM }, (_, k) => (k % (DIM + 1) === 0 ? 1 : 0));
 }
@@ -21,7 +21,7 @@ export function multiplied(a, b) {
 }
 
 /**
- * The derivative of the step that a solver has just made: the product of the derivatives of its stages.
+ * The derivative of the step that a solver has just made, row by row: the product of those of its stages.
  *
  * @param {Solver} solver
  * @param {{x: Float64Array, carry: Float64Array}} at the state before the step; advanced to its end

@@ -2,7 +2,7 @@ import { DIM, explicit, explicitTangent } from "./model.mjs";
 
 // ---- The derivative of an explicit stage ----
 
-/** 1 + the Jacobian of the increment; change receives the increment. */
+/** The derivative of a stage, 1 + the Jacobian of the increment, and the increment as change. */
 export function differentiateStage(solver, stage, at) {
   const change = new Float64Array(DIM);
   const derivative = new Float64Array(DIM * DIM);

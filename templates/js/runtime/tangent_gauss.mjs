@@ -9,8 +9,8 @@ import { stageChange, stageChangeJacobian, stageSlopeJacobian } from "./model.mj
 const WIDE = DIM + UNKNOWNS;
 
 /**
- * Derivatives of the stage increments by coordinate j: fixed-point sweeps of linear equations; null if they
- * do not converge.
+ * The derivatives of the stage increments by coordinate j. They solve linear equations, by fixed-point
+ * sweeps; null if these do not converge.
  */
 function variedAlong(solver, slopes, j) {
   const [z, increments] = [stages(), stages()];
@@ -36,7 +36,7 @@ function variedAlong(solver, slopes, j) {
   return null;
 }
 
-/** Derivative and change of the step that the solver has made from a state. */
+/** The derivative and the increment of the step that the solver has made from the state at. */
 export function differentiateStage(solver, stage, at) {
   const twin = { ...at, t: at.t, coef: solver.coef, h: solver.h, evaluations: 0 };
   const start = startOf(twin);

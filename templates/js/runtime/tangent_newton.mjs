@@ -7,8 +7,8 @@ import { solvedForAll, tangentSolved } from "./tangent_solve.mjs";
 // ---- The derivative of an implicit stage ----
 
 /**
- * alpha = x gives Dy = jacobian^-1, and the stage has the derivative 1 + incrementJacobian Dy. y is solved to
- * rounding level, starting from the stored value.
+ * The derivative of a stage, 1 + incrementJacobian Dy with Dy = jacobian^-1 from alpha(y) = x, and its
+ * increment as change. The solution y is refined to rounding level, starting from the stored one.
  */
 export function differentiateStage(solver, stage, at) {
   const y = solver.history[stage].last();

@@ -8,9 +8,7 @@ import { solvedForAll, tangentSolved } from "./tangent_solve.mjs";
 
 // ---- The derivative of a stage along paths ----
 
-/**
- * Whether the path and its variation satisfy their equation at a point m, where they have the given slope.
- */
+/** Whether the slopes of a path and of its variation at a point m are those of their equations. */
 function tangentHolds(coef, p, f, m, slope) {
   const field = new Float64Array(2 * DIM);
   const scale = [0, 0];
@@ -22,10 +20,10 @@ function tangentHolds(coef, p, f, m, slope) {
 }
 
 /**
- * Path dm/dt = pi(m) p with its variation, 0 <= t <= 1, by Taylor series: change is the end minus the start,
- * mean the mean minus the start.
+ * Compute the path dm/dt = pi(m) p, 0 <= t <= 1, with its variation, by Taylor series: change is the end
+ * minus the start, mean the mean minus the start.
  *
- * @returns {boolean} false if TERMS do not suffice
+ * @returns {boolean} false if TERMS terms do not suffice
  */
 function varyPiece(coef, p, start, change, mean) {
   const series = Array.from({ length: TANGENT_SERIES }, () => new Float64Array(TERMS + 1));
@@ -59,8 +57,8 @@ function varyPiece(coef, p, start, change, mean) {
 }
 
 /**
- * End and mean of the whole path from x with covector p, minus x, with their variations under a variation of
- * x (the first DIM seeds) or of p (the others): the state, then its variation.
+ * The end (change) and the mean of the whole path from x with covector p, minus x; each followed by its
+ * variation under a variation of x[seed], or of p[seed - DIM] if seed >= DIM.
  *
  * @returns {{change: Float64Array, mean: Float64Array} | null} null if the path cannot be followed
  */
@@ -83,8 +81,9 @@ function varyPath(coef, x, p, seed) {
 }
 
 /**
- * p = grad S_h(mean) gives (1 - H mean_p) Dp = H mean_x with H the Hessian of S_h, and the stage has the
- * derivative end_x + end_p Dp. p is solved to rounding level, starting from the stored mean.
+ * The derivative of a stage, end_x + end_p Dp, and its increment as change. p = grad S_h(mean) gives (1 - H
+ * mean_p) Dp = H mean_x, where H is the Hessian of S_h. p is refined to rounding level, starting from the
+ * stored mean.
  */
 export function differentiateStage(solver, stage, at) {
   const coef = solver.coef[stage];

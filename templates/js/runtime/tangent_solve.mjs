@@ -2,13 +2,13 @@ import { solve } from "./linear.mjs";
 import { TANGENT_NEARLY_SOLVED, TANGENT_SHRINKING, TANGENT_SOLVED } from "./tangent_policy.mjs";
 import { DIM } from "./model.mjs";
 
-/** Whether a solve has reached rounding level, by its last two corrections. */
+/** Whether Newton's method has reached rounding level, by the sizes of its last two corrections. */
 export function tangentSolved(size, previous) {
   return size <= TANGENT_SOLVED || (size < TANGENT_NEARLY_SOLVED && size > TANGENT_SHRINKING * previous);
 }
 
 /**
- * The solution of matrix · solution = sides for all columns of sides.
+ * The solution of matrix · solution = sides, for all columns of sides; all matrices are stored row by row.
  *
  * @returns {Float64Array | null} null if the matrix is singular
  */

@@ -1,4 +1,4 @@
-/** Coefficient k >= 1 of the series of f(a); d is the series of f'(a): f(a)' = f'(a) a'. */
+/** Coefficient k >= 1 of the series of f(a), from f(a)' = f'(a) a'; d is the series of f'(a). */
 export function taylorChain(a, d, k) {
   let sum = 0;
   for (let j = 1; j <= k; j++) sum += j * a[j] * d[k - j];

@@ -1,17 +1,17 @@
 import { finite } from "./errors.mjs";
 import { energy, vectorField } from "./model.mjs";
 
-/** The Hamiltonian at x and the time t. */
+/** Compute the Hamiltonian at x and the time t. */
 export function energyAt(params, t, x, out) {
   energy(params, t, x, out);
 }
 
-/** The vector field dx/dt at x and the time t. */
+/** Compute the vector field dx/dt at x and the time t. */
 export function vectorFieldAt(params, t, x, out) {
   vectorField(params, t, x, out);
 }
 
-/** Take the time of the initial state from the options of a solver, 0 by default. */
+/** Set the time of the initial state from the options of a solver, 0 by default. */
 export function takeTime(solver, options) {
   [solver.t] = finite([options.t0 ?? 0], 1, "t0");
 }
