@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: a8a5974d9304b14c5f86c1bd0bb8be9bcce662b254eefa7b17589bb85f062abf
+ * body-sha256: e2306933a2ae695e4691c9673a924e713fc3558a5e03a1c31e71643de73df77c
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -847,8 +847,7 @@ static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
 }
 
 /* ---- The solver ---- */
-/* For each Casimir C the multiple c that minimises |grad H - c grad C| at the initial state; zero where it is
-   not finite. */
+/* For each Casimir C the c that minimises |grad H - c grad C| at the initial state; 0 if not finite. */
 static void quaternion_top_choose_gauge(const quaternion_top_params *params,
     const double x[quaternion_top_DIM], double gauge[quaternion_top_GAUGES])
 {

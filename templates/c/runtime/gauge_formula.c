@@ -6,8 +6,7 @@
 
 #include "model.h"
 
-/* For each Casimir C the multiple c that minimises |grad H - c grad C| at the initial state; zero where it is not
-   finite. */
+/* For each Casimir C the c that minimises |grad H - c grad C| at the initial state; 0 if not finite. */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {
     double out[1 + 2 * PHI_GAUGES];
