@@ -142,23 +142,21 @@ class Collocation:
         change = change + jax.lax.stop_gradient(compensation)
         following = x + change
         rounding_error = jax.lax.stop_gradient(change - (following - x))
-        return following, rounding_error, jax.lax.stop_gradient(self._from_the_end(end, moves, parameters))
+        return following, rounding_error, jax.lax.stop_gradient(self._from_the_end(x, end, moves, parameters))
 
     def _scale(self, x: Any) -> Any:
-        """Return the scales of the unknowns (unknowns, 1): |x| for coordinates, and 1 for other unknowns."""
+        """Return the scales of the unknowns (unknowns, 1): |x| for coordinates and functionals, 1 for the others."""
         size = jnp.sqrt(jnp.sum(x**2))
         size = jnp.where(size > 0, size, 1)
-        coordinate_count = len(self.points.moved)
-        ones = jnp.ones(len(self.points.unknowns) - coordinate_count, x.dtype)
-        return jnp.concatenate([jnp.broadcast_to(size, (coordinate_count,)), ones])[:, None]
+        ones = jnp.ones(len(self.points.unknowns) - self.points.plain, x.dtype)
+        return jnp.concatenate([jnp.broadcast_to(size, (self.points.plain,)), ones])[:, None]
 
-    def _from_the_end(self, end: Any, moves: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return the increments of a step in the frame of its end; ``end`` has the unknowns there."""
+    def _from_the_end(self, x: Any, end: Any, moves: Any, parameters: Mapping[str, Any]) -> Any:
+        """Return the increments of a step from ``x`` in the frame of its end; ``end`` has the unknowns there."""
         if self._traced_value is None:
             return moves
         symbols, roots = self._traced_value
-        values = {**parameters, **dict(zip(symbols, moves, strict=True))}
-        values |= dict(zip(self.points.unknowns, end, strict=True))
+        values = self._values(x, end, parameters) | dict(zip(symbols, moves, strict=True))
         return _stacked(_Traced(values).values(roots), self.stages, moves.dtype)
 
 
