@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: ef0d8587f68dced3731747673888ab0e032f650e1b82738e1e038c6263a6f12f
+ * body-sha256: 273abb033dba05e6b92e781485b497deca682c26aea02500a4604079fdc951d7
  */
 #include "duffing.h"
 #include <float.h>
@@ -260,8 +260,9 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 
 #define duffing_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
 
-#define duffing_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
-#define duffing_SHRINKING 0.25     /* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+#define duffing_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
+/* ratio of successive corrections below NEARLY_SOLVED that shows rounding */
+#define duffing_SHRINKING 0.25
 
 /* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
 static double duffing_size(const double y[duffing_DIM], const double delta[duffing_DIM])

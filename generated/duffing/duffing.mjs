@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9b90df6a5ce99bd2ee1d34f3b336bdf8e7ffc384367b48032c64ca2f4ce4a814
+ * body-sha256: e5db3dd397ffe634826cd445ff201082d5e7fac1742377d51359b7abc33a3f8a
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -179,9 +179,9 @@ const PROBE_STEP = 1e-100;
 /** Smaller components of y count as this fraction of the largest */
 const FLOOR = 1e-6;
 
-/** A correction below this is rounding ... */
+/** A correction below this may be rounding */
 const NEARLY_SOLVED = 1e-8;
-/** Ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+/** Ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 const SHRINKING = 0.25;
 
 /** Accepted length of steps, relative to state and motion */

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: be38fb8a20b480b854587b34b5d14f87665f5df939e7be266c9501574f326f15
+# body-sha256: da8242a2fa29a3c2a682ae5e51d4eb95af772a1b9ab5e8bf5d1e37b96a820f6c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -236,8 +236,8 @@ def _solved(stage, x, carry, prediction):
 
 
 FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
-NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
-SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
+NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
+SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 
 
 def _size(y, delta):

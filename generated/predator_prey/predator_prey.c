@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: d74196dd541be1c142cf9c98ecdadc35c0148265b4c297cf1cc7ed613d183639
+ * body-sha256: 5c676f41b768bf1c2f5d2171106ca20b1dbbaa015196f952b0b5f81143ad61b4
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -234,8 +234,8 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 
 #define predator_prey_FLOOR 0.0 /* smaller components of y count as this fraction of the largest */
 
-#define predator_prey_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
-/* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+#define predator_prey_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
+/* ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 #define predator_prey_SHRINKING 0.25
 
 /* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 6e84a1b3aafe2f91c421d7184a0aba423cac85f23275a129cf832ce906a5e252
+# body-sha256: db2499c16d0478cceb19000fa52625d827bdbb397b8fd3fcd0aa83012bd16a2f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -230,8 +230,8 @@ def _solved(stage, x, carry, prediction):
 
 
 FLOOR = 0.0  # smaller components of y count as this fraction of the largest
-NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
-SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
+NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
+SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 
 
 def _size(y, delta):

@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members: implicit
  *   steps; Ensembles
- * body-sha256: 4f9d7b2fcb07ad47717bdf292bc74e8ad6052059edb04b5c4f5b05f82e3a1e5a
+ * body-sha256: aea8971fe9d9bf00362595adbccdde30b33b0be98865b919ef3a1e14c1c7fcb4
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -472,10 +472,11 @@ static double rigid_body_missed(const double *value, double (*weight)[8])
     return most;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... rigid_body_AHEAD -
-   1, to the history of a component, by least squares with Tikhonov regularisation (modified Gram-Schmidt).
-   Columns are added eight at a time, until the residuals are negligible. Returns the number of past values
-   used, or 0 if the recurrences do not predict the last values, which were left out of the fit. */
+/* Fit the recurrences value[m + l] = sum of weight[k][component][l] * value[m - 1 - k], l = 0 ...
+   rigid_body_AHEAD - 1, to the history of a component, by least squares with Tikhonov regularisation
+   (modified Gram-Schmidt). Columns are added eight at a time, until the residuals are negligible. Returns the
+   number of past values used, or 0 if the recurrences do not predict the last values, which were left out of
+   the fit. */
 static int rigid_body_train(rigid_body_history *history, int component)
 {
     enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, ROWS = rigid_body_ROWS };
@@ -659,8 +660,8 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 
 #define rigid_body_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
 
-#define rigid_body_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
-/* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+#define rigid_body_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
+/* ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 #define rigid_body_SHRINKING 0.25
 
 /* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
@@ -1315,8 +1316,8 @@ static void rigid_body_leave(const rigid_body_lanes size, const rigid_body_lanes
     }
 }
 
-/* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, results are
-   infinite. */
+/* Linearise a stage around the points y. The matrices are I + O(h): a pivot below
+   1/rigid_body_LARGEST_RECIPROCAL is a failure, and makes the results of its lane infinite. */
 static void rigid_body_linearise_stage(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
     rigid_body_lanes jacobian[rigid_body_DIM * rigid_body_DIM], reciprocal[rigid_body_DIM];
@@ -1547,10 +1548,10 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
 }
 
 enum {
-    /* give up recurrences when a failure is followed by more single steps */
+    /* steps that repay a fit for blocks; first wait without recurrences */
     rigid_body_REPAY_BLOCKS = 4 * rigid_body_REPAY,
     rigid_body_MOST_SINGLE_STEPS = 1000, /* most single steps after a failed block */
-    /* after this number of failures, recurrences are replaced */
+    /* no recurrences after a failed block and more single steps than this */
     rigid_body_TOO_MANY = 5 * rigid_body_LANES
 };
 #define rigid_body_LATEST 0.125 /* weight of the latest step in the running mean of evaluations */

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a20dc8e1654d3167ff5dcb4a27aeb2e9a2f42bfc6f21f748cf9fdf451219fbf9
+ * body-sha256: ff7c0b993739fdcbf2b5d4e6456081aa10f9b60396140f5b6aaa202908677ff7
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -458,9 +458,9 @@ const PROBE_STEP = 1e-100;
 /** Smaller components of y count as this fraction of the largest */
 const FLOOR = 1e-6;
 
-/** A correction below this is rounding ... */
+/** A correction below this may be rounding */
 const NEARLY_SOLVED = 1e-8;
-/** Ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+/** Ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 const SHRINKING = 0.25;
 
 /** Accepted length of steps, relative to state and motion */

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 179816debac000e7da02385f5ec90b6da61355ff1b285ff6d607e9b2e002e261
+# body-sha256: 01348acc14fbabbec794fd574b6b014475d2a6557ced8da60ac6e56c40528f2f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -482,8 +482,8 @@ def _solved(stage, x, carry, prediction):
 
 
 FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
-NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
-SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
+NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
+SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 
 
 def _size(y, delta):

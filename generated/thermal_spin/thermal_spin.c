@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 14db0244f7fa5fd9956e92af0c50787ed2f131e57f9ad02d8acf82283e08d8fb
+ * body-sha256: ab9a11f150b72eb9761143edc426ee206b06b949ac7459f24b0f4f0b372a9c23
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -291,8 +291,8 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 
 #define thermal_spin_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
 
-#define thermal_spin_NEARLY_SOLVED 1e-8 /* a correction below this is rounding ... */
-/* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+#define thermal_spin_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
+/* ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 #define thermal_spin_SHRINKING 0.25
 
 /* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */

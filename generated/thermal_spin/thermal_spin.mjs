@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 25f9a103e735fb56d8cfbfdc38152003f5b095ce4303b2c91b2f26725eb86528
+ * body-sha256: 409df8462149f6e6d377d056168c81824c6d06cc3bd32daec25370164cf287b8
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -276,9 +276,9 @@ const PROBE_STEP = 1e-100;
 /** Smaller components of y count as this fraction of the largest */
 const FLOOR = 1e-6;
 
-/** A correction below this is rounding ... */
+/** A correction below this may be rounding */
 const NEARLY_SOLVED = 1e-8;
-/** Ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+/** Ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 const SHRINKING = 0.25;
 
 /** Accepted length of steps, relative to state and motion */

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e629c8ca6d6042607f419bb932a62b13fec4f47fc3f5bb735368b9cea9a5dec5
+# body-sha256: 597a6650368769168843f18b7f33b844fc6c82fee0f41313729c9270aa57f2e5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -326,8 +326,8 @@ def _solved(stage, x, carry, prediction):
 
 
 FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
-NEARLY_SOLVED = 1e-8  # a correction below this is rounding ...
-SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
+NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
+SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 
 
 def _size(y, delta):

@@ -101,7 +101,7 @@ def _expansion(spec: Spec, cell: Cell, choice: str) -> Expansion:
 
 
 def _run(spec: Spec, expansion: Expansion, run: Run) -> Run | None:
-    """Return a run with the sizes of the expansion; None if its arrays have other sizes."""
+    """Return a run of the lattice as one of the expanded spec; None if it cannot start at these sizes."""
     from phigen.lattice.expansion import run_of
     from phigen.lattice.states import start_of
 

@@ -429,10 +429,10 @@ def _compared_rows(experiment: Experiment, h: float) -> _Rows:
 def compared(
     compilation: Compilation, solver: Solver, experiment: Experiment, method: str, console: Console, end: float
 ) -> tuple[Watch, Trajectory]:
-    """Integrate the experiment by a classical method; return its errors, and a trajectory for figures.
+    """Integrate the experiment by a classical method; return the errors of the method, and a trajectory for figures.
 
-    The method makes the same number of steps, and partial steps to times within them. If the run has a monitor, the
-    steps of the method are equal in t and end at ``end``.
+    The method makes as many steps as the solver, and partial steps where a requested time lies inside a step. If the
+    run has a monitor, the steps of the method are equal in t and end at ``end``.
     """
     from phigen.study import classical
     from phigen.study.methods import extended, field_of

@@ -140,7 +140,7 @@ def _array(path: Path, shape: tuple[int, ...]) -> Floats:
     array = np.asarray(array, dtype=np.float64)
     if not np.isfinite(array).all():
         index = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
-        raise ValueError(f"not all values are finite, the first at {list(index)}")
+        raise ValueError(f"the value at {list(index)} is not finite")
     return array
 
 

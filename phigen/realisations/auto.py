@@ -41,8 +41,8 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
     """Return a bi-realisation of a linear or affine π.
 
-    Candidates, in order: the exponential in closed form, block by block, the Cayley transform, the exponential along
-    paths.
+    Candidates, in order: the exponential in closed form; a bi-realisation for each block of π; the Cayley transform;
+    the exponential along paths.
     """
     candidate = exponential.closed_form(system)
     if candidate is not None:

@@ -80,11 +80,11 @@ class LatticeSession(Protocol):
         ...
 
     def time(self) -> float:
-        """Return the physical time since the start, for steps equal in τ."""
+        """Return the physical time since the start. With a monitor, whose steps are equal in a rescaled time τ."""
         ...
 
     def hold(self, level: float) -> None:
-        """Set the energy level e, which is −H of the state by default, for steps equal in τ."""
+        """Set the energy level e of the monitor, which is −H of the state by default."""
         ...
 
     def advance(self, h: float, steps: int) -> None:

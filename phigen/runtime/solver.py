@@ -163,11 +163,11 @@ class Solver(Named[Backend, Interface]):
     ) -> Trajectory:
         """Integrate a run of the spec, the first by default, and return what `integrate` returns.
 
-        Arguments replace the settings of the spec: the initial state ``x0`` (DIM,), the ``step``, the number of
-        ``steps`` or the time ``until`` the end, the ``stride`` or the time ``every`` between rows, or the times ``at``
-        which they are, the ``seed`` of the noise, parameters, and coordinates by name, which replace initial values. A
-        run with ``stop`` ends at the first zero of that expression. Raises `ValueError` if
-        there is no run of that name; `runs` lists the names.
+        Arguments replace settings of the spec. ``x0`` (DIM,) is the initial state, ``step`` the step size. The run ends
+        after ``steps`` steps or at the time ``until``; a run with ``stop`` ends at the first zero of that expression.
+        Rows are stored every ``stride`` steps, at intervals of ``every``, or at the times ``at``. ``seed`` is that of
+        the noise. Parameters, and initial values of coordinates, are given by name. Raises `ValueError` if there is no
+        run of that name; `runs` lists the names.
         """
         spec, settings = self.spec, runs.Settings(step, steps, until, stride, every, at=at)
         base = runs.run_named(spec, name)

@@ -58,7 +58,7 @@ class Collected:
 def collect(
     tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], times: Sequence[str] = ()
 ) -> tuple[Collected, list[Terms]]:
-    """Return elements of a tower as collected polynomials, and the ring that differentiates them.
+    """Return the ring of collected polynomials, which differentiates them, and elements of a tower in this ring.
 
     Coefficients that depend on ``times`` become polynomials in time-dependent variables, with coefficients that depend
     on parameters only.

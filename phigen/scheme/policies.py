@@ -58,8 +58,8 @@ class MeasurePolicy(Policy):
 class NewtonPolicy(Policy):
     """Newton's method for the point of an implicit step; its tolerance is in `InnerSolve`."""
 
-    nearly_solved: float = number(1e-8, "a correction below this is rounding ...")
-    shrinking: float = number(0.25, "ratio of successive residuals below NEARLY_SOLVED that shows rounding")
+    nearly_solved: float = number(1e-8, "a correction below this may be rounding")
+    shrinking: float = number(0.25, "ratio of successive corrections below NEARLY_SOLVED that shows rounding")
 
 
 @dataclass(frozen=True)

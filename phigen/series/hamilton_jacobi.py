@@ -242,7 +242,7 @@ class _Recursion:
         growth = log(self._sizes[latest] / self._sizes[previous]) / log(latest / previous)
         size = self._sizes[latest] * (terms / latest) ** growth
         if size > MOST_SLOPES:
-            raise OverflowError(f"the gradient of S_{terms} would have about {size:.0f} terms")
+            raise OverflowError(f"a gradient of S_{terms} with about {size:.0f} terms")
 
     def _next(self, running: progress.Stage) -> Any:
         i, vanishes = len(self._found), self._symmetric and len(self._found) % 2 == 1
@@ -253,7 +253,7 @@ class _Recursion:
         inputs = dict(zip(self._momenta, slopes, strict=True)) | beginning(self.ring, self._times, i)
         self._taylor.advance(inputs, running)
         if i and isinstance(self._found[-1], Sized) and len(self._found[-1]) > limits.SERIES_TERMS:
-            raise OverflowError(f"S_{i} has {len(self._found[-1])} terms")
+            raise OverflowError(f"{len(self._found[-1])} terms of S_{i}")
         if vanishes:
             return self._zero
         coefficient = self._taylor.coefficients(self._target)[i]

@@ -100,7 +100,7 @@ class _ModifiedRecursion:
         target = self.kept[r - 1] if r <= len(self.kept) else self.tower.zero
         correction = target - self._at_one(integral)
         if len(correction) > MOST_TERMS:
-            raise OverflowError(f"H_{r - 1} has {len(correction)} terms")
+            raise OverflowError(f"{len(correction)} terms of H_{r - 1}")
         self._keep(correction, integral + self.tower.variable(FRACTION) * correction)
 
     def _keep(self, correction: Poly, s: Poly) -> None:

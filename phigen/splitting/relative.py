@@ -2,7 +2,7 @@
 
 Bodies 0, …, N have masses m_i, positions q_i and momenta p_i; k_ij is the strength of the attraction −k_ij/|q_i − q_j|,
 M_i = m_0 + … + m_i, and M is the total mass. A is the sum of w_i|P_i|²/2 − K_i/|Q_i| over i ≥ 1 and of |p_0 + … +
-p_N|²/2M, the motion of the centre of mass.
+p_N|²/2M, the motion of the centre of mass. B = H − A.
 
 - *Jacobi*: Q_i = q_i − (m_0 q_0 + … + m_{i−1} q_{i−1})/M_{i−1} and P_i = p_i − (m_i/M_i)(p_0 + … + p_i), with
   w_i = M_i/(m_i M_{i−1}) and K_i = Σ_{j<i} k_ij. The kinetic energy is that of the Q_i and of the centre of mass.

@@ -246,9 +246,9 @@ class Tower(Arithmetic[Poly]):
         return self._generator(name, args)
 
     def _entire(self, name: str, s: Poly) -> Poly:
-        """Return a function of `ENTIRE`, in terms of cosroot, sinroot, exp and 1/s.
+        """Return a function of `ENTIRE` of s, in terms of cosroot, sinroot, exp and 1/s.
 
-        cosroot and sinroot are always added together.
+        A generator for cosroot(s) always comes with one for sinroot(s).
         """
         if s.is_constant() and s == 0:
             return self.constant(ENTIRE[name].coefficient(0))

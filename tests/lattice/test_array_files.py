@@ -132,7 +132,7 @@ def _with_content(path: Path, content: bytes) -> None:
         (lambda path: np.save(path, NUMBERS.astype(str)), "not real numbers"),
         (lambda path: np.save(path, NUMBERS.T), "4×2 values, not 2×4"),
         (lambda path: np.save(path, np.array(1.0)), "1 values, not 2×4"),
-        (lambda path: np.save(path, NUMBERS / np.array([1, 1, 0, 1])), "are finite, the first at [0, 2]"),
+        (lambda path: np.save(path, NUMBERS / np.array([1, 1, 0, 1])), "the value at [0, 2] is not finite"),
         (lambda path: np.save(path, np.array([None] * 8).reshape(2, 4)), "not real numbers"),
         (lambda path: np.savez(path.open("wb"), a=NUMBERS), "magic string"),
         (lambda path: _with_content(path, path.read_bytes()[:-8] if path.exists() else b""), "cannot read"),

@@ -19,7 +19,7 @@ _REDUCED = 64
 _KINDS = {"sum": 0, "mean": 0, "product": 1, "max": 2, "min": 3}
 
 
-#: Most work items in a group of generated code, unless a macro defines another number.
+#: Size of a work group in generated code, in CUDA the largest size of a block, unless NAME_GROUP is defined as another.
 _GROUP = 128
 
 

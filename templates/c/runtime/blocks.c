@@ -171,9 +171,9 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 }
 
 enum {
-    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* give up recurrences when a failure is followed by more single steps */
+    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* steps that repay a fit for blocks; first wait without recurrences */
     PHI_MOST_SINGLE_STEPS = 1000,     /* most single steps after a failed block */
-    PHI_TOO_MANY = 5 * PHI_LANES      /* after this number of failures, recurrences are replaced */
+    PHI_TOO_MANY = 5 * PHI_LANES      /* no recurrences after a failed block and more single steps than this */
 };
 #define PHI_LATEST 0.125 /* weight of the latest step in the running mean of evaluations */
 

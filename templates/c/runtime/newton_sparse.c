@@ -4,8 +4,8 @@
 #include <string.h>
 #include "newton_lanes.c"
 
-/* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, results are
-   infinite. */
+/* Linearise a stage around the points y. The matrices are I + O(h): a pivot below 1/PHI_LARGEST_RECIPROCAL is a failure,
+   and makes the results of its lane infinite. */
 static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 {
     phi_lanes matrix[PHI_DIM * PHI_DIM], bad = { 0.0 };

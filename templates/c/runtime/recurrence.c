@@ -55,7 +55,7 @@ static double phi_missed(const double *value, double (*weight)[8])
     return most;
 }
 
-/* Fit the recurrences value[m + l] = sum of weight[k][..][l] * value[m - 1 - k], l = 0 ... PHI_AHEAD - 1, to the
+/* Fit the recurrences value[m + l] = sum of weight[k][component][l] * value[m - 1 - k], l = 0 ... PHI_AHEAD - 1, to the
    history of a component, by least squares with Tikhonov regularisation (modified Gram-Schmidt). Columns are added
    eight at a time, until the residuals are negligible. Returns the number of past values used, or 0 if the recurrences
    do not predict the last values, which were left out of the fit. */
