@@ -72,19 +72,26 @@ class Method:
 
 @dataclass(frozen=True)
 class Built:
-    """A phigen solver: its library, the seconds that phigen and the C compiler took, its header lines."""
+    """A phigen solver: its library, the seconds that phigen and the C compiler took, its header lines.
+
+    ``exact`` says whether a step is the exact flow of H.
+    """
 
     library: ctypes.CDLL
     generating: float
     compiling: float
     summary: str
+    exact: bool
 
 
 @cached
 def build_phigen(text: str) -> Built:
     """Raises `PhigenError`s: what phigen refuses is reported, not hidden."""
     start = time.perf_counter()
-    source = emit(compile_proved(specs.loads(text, "bench.yaml")).program, "c", "", single_file=True)["bench.c"]
+    program = compile_proved(specs.loads(text, "bench.yaml")).program
+    schedule = program.step.flow_schedule
+    exact = schedule is not None and len(schedule.flows) == 1
+    source = emit(program, "c", "", single_file=True)["bench.c"]
     middle = time.perf_counter()
     if (lines := source.count("\n")) > LINES:
         raise LimitError([Diagnostic(f"{lines:,} lines of C are too many to compile here")])
@@ -95,7 +102,7 @@ def build_phigen(text: str) -> Built:
     )
     library = cache.load({"main.c": main, "bench.h": source, **texts("common.h", "run_phigen.h")})
     summary = "; ".join(line[2:].strip() for line in source.splitlines()[3:8] if ":" in line)
-    return Built(library, middle - start, time.perf_counter() - middle, summary)
+    return Built(library, middle - start, time.perf_counter() - middle, summary, exact)
 
 
 def phigen_method(problem: Problem, order: int, method: str) -> Method:

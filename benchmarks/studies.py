@@ -55,7 +55,9 @@ def methods_of(problem: Problem, effort: Effort) -> tuple[list[Method], list[str
     """phigen's solvers and the peers; what could not be built is a note."""
     notes: list[str] = []
     ours: list[Method] = []
-    for method in problem.methods:
+    exact = [m for m in problem.methods if m == "splitting" and _is_exact(problem)]
+    notes += [f"phigen, {m}: left out, since its step is the exact flow of H: see Exact flows" for m in exact]
+    for method in (m for m in problem.methods if m not in exact):
         orders = problem.orders_of(method)
         for order in orders[1:3] if effort.quick else orders:
             try:
@@ -69,6 +71,14 @@ def methods_of(problem: Problem, effort: Effort) -> tuple[list[Method], list[str
         peers += more
         notes += missing
     return [*ours, *peers], notes
+
+
+def _is_exact(problem: Problem) -> bool:
+    """Whether a splitting of a problem is the exact flow of H, whose cost no accuracy bounds from below."""
+    try:
+        return build_phigen(problem.spec(2, "splitting")).exact
+    except PhigenError:
+        return False
 
 
 def work_precision(problem: Problem, effort: Effort, say: Callable[[str], None]) -> list[Study]:

@@ -24,6 +24,7 @@ from benchmarks.solvers import (
     phigen_method,
     reference,
 )
+from benchmarks.studies import QUICK, methods_of
 
 BODY, PENDULUM = PROBLEMS[0], PROBLEMS[-1]
 STEPPED = [m for m in c_peers(BODY) if m.step_based]
@@ -74,6 +75,15 @@ def test_a_tiny_case_runs_through_to_its_table():
     text = tables.work_precision(Study("P1", BODY.title, 100.0, [c.result for c in cells], cells, []))
     assert "best peer / phigen" in text
     assert build_phigen(BODY.spec(4)).generating > 0
+
+
+def test_exact_flows_are_known_and_left_out():
+    top = next(p for p in PROBLEMS if p.name == "P3")
+    assert build_phigen(BODY.spec(2, "splitting")).exact
+    assert not build_phigen(top.spec(2, "splitting")).exact
+    methods, notes = methods_of(replace(BODY, methods=("splitting",)), QUICK)
+    assert not any(m.family == "phigen" for m in methods)
+    assert "phigen, splitting: left out, since its step is the exact flow of H: see Exact flows" in notes
 
 
 def test_kernels_of_lattices_by_hand_make_the_steps_of_the_generated_ones():
