@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: ab9a11f150b72eb9761143edc426ee206b06b949ac7459f24b0f4f0b372a9c23
+ * body-sha256: 80f90b2e5a92202169eae9ebfda72dac1d41458aabec715f5f037916f6122fda
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -366,8 +366,7 @@ static double thermal_spin_bits(uint32_t high, uint32_t low)
     return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
 }
 
-/* Compute two independent standard normal variates (Box and Muller) of magnitude at most
-   thermal_spin_BOUND. */
+/* Compute two independent standard normal variates (Box and Muller), at most thermal_spin_BOUND. */
 static void thermal_spin_two_normals(uint64_t seed, uint32_t c[4], double normals[2])
 {
     thermal_spin_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
