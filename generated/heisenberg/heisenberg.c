@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 39f0a2f84cb00aa553e68c5b18d9f40078341a260929373b50adff7c11213fd9
+ * body-sha256: cc0761d2202d7303e9c9ba890d422b2fc09fe6cf4b8da62d445c1c1334db9372
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -433,9 +433,18 @@ static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const do
     size_t first, size_t end)
 {
     switch (part) {
-    case 1: (far ? heisenberg_rows1_far : heisenberg_rows1_near)(s, coef, first, end); break;
-    case 2: (far ? heisenberg_rows2_far : heisenberg_rows2_near)(s, coef, first, end); break;
-    default: (far ? heisenberg_rows3_far : heisenberg_rows3_near)(s, coef, first, end); break;
+    case 1:
+        if (far) heisenberg_rows1_far(s, coef, first, end);
+        else heisenberg_rows1_near(s, coef, first, end);
+        break;
+    case 2:
+        if (far) heisenberg_rows2_far(s, coef, first, end);
+        else heisenberg_rows2_near(s, coef, first, end);
+        break;
+    default:
+        if (far) heisenberg_rows3_far(s, coef, first, end);
+        else heisenberg_rows3_near(s, coef, first, end);
+        break;
     }
 }
 

@@ -245,14 +245,6 @@ class _StatementPrinter:
         return f" = {self.spell(value)}"
 
     def _if(self, s: ir.If) -> Iterator[str]:
-        match s:
-            # A flag selects which of two functions is called. Written as a conditional, compilers would inline both
-            # functions into their caller, and fewer calls inside them: 1.5 to 5 % more instructions in a Heisenberg
-            # lattice.
-            case ir.If(ir.Name(), (ir.Call(one, arguments),), (ir.Call(other, same),)) if arguments == same:
-                selected = f"{self.spell(s.condition)} ? {self.name}_{one} : {self.name}_{other}"
-                yield f"({selected})({', '.join(map(self.spell, arguments))});"
-                return
         then, otherwise = [*self.lines(s.then)], [*self.lines(s.otherwise)]
         head = f"if ({self.spell(s.condition)})"
         if len(then) == 1 and len(otherwise) <= 1:
