@@ -38,6 +38,7 @@ def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = M
         [c for c in choices if c.lower() == word.lower()]
         or [c for c in choices if c.startswith(f"{word}_")]
         or _numbered(word, choices)
+        or sorted((c for c in choices if len(c) > 2 and word.startswith(c)), key=len, reverse=True)  # cosine: cos
         or difflib.get_close_matches(word, choices, n=1)
     )
     return close[0] if close else ""

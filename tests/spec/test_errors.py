@@ -14,10 +14,11 @@ def test_errors_are_reported_as_written(title: str, spec: str, expected: str) ->
     assert errors_of(spec if title.endswith("(bare)") else complete(spec)) == expected
 
 
-def test_functions_of_other_languages_are_recognised():
-    text = "phigen: 1\nname: a\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: ln(q)\n"
-    with pytest.raises(SpecError, match="did you mean 'log'"):
-        loads(text)
+@pytest.mark.parametrize(("name", "meant"), [("ln", "log"), ("cosine", "cos"), ("tangent", "tan")])
+def test_functions_by_other_names_are_recognised(name, meant):
+    text = "phigen: 1\nname: a\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+    with pytest.raises(SpecError, match=f"did you mean '{meant}'"):
+        loads(f"{text}hamiltonian: {name}(q)\n")
 
 
 @pytest.mark.parametrize(("value", "hinted"), [("atan2(q, 1)", True), ('"atan2(q, 1"', False)])
