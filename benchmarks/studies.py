@@ -55,9 +55,10 @@ def methods_of(problem: Problem, effort: Effort) -> tuple[list[Method], list[str
     """phigen's solvers and the peers; what could not be built is a note."""
     notes: list[str] = []
     ours: list[Method] = []
-    exact = [m for m in problem.methods if m == "splitting" and _is_exact(problem)]
-    notes += [f"phigen, {m}: left out, since its step is the exact flow of H: see Exact flows" for m in exact]
-    for method in (m for m in problem.methods if m not in exact):
+    for method in problem.methods:
+        if method == "splitting" and _is_exact(problem):
+            notes.append("phigen, splitting: left out, since its step is the exact flow of H: see Exact flows")
+            continue
         orders = problem.orders_of(method)
         for order in orders[1:3] if effort.quick else orders:
             try:
