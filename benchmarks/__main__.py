@@ -89,7 +89,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--output", type=Path, default=Path("benchmark-results"), help="folder for tables and data")
     parser.add_argument("--prepare", action="store_true", help="compile the solvers of work and steps, no more")
     parser.add_argument("--publish", action="store_true", help="put the tables of the folder into the docs, no more")
-    parser.add_argument("--write-docs", action="store_true", help="put the tables into docs/benchmarks.md")
+    parser.add_argument("--write-docs", action="store_true", help="put the tables into the pages of docs/")
     return parser.parse_args()
 
 

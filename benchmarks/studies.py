@@ -57,7 +57,7 @@ def methods_of(problem: Problem, effort: Effort) -> tuple[list[Method], list[str
     ours: list[Method] = []
     for method in problem.methods:
         if method == "splitting" and _is_exact(problem):
-            notes.append("phigen, splitting: left out, since its step is the exact flow of H: see Exact flows")
+            notes.append("phigen, splitting: left out, since its step is the exact flow of H")
             continue
         orders = problem.orders_of(method)
         for order in orders[1:3] if effort.quick else orders:

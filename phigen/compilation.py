@@ -385,7 +385,7 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def exact(self) -> bool:
-        """Whether the step preserves the Poisson structure to round-off."""
+        """Whether the structure of the step is exact to round-off; see `_Compiled.exact`."""
         return self.gauss.exact
 
     @property

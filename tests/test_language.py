@@ -2,6 +2,7 @@
 
 import ast
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -101,3 +102,22 @@ def test_no_comment_of_generated_code_repeats_a_word() -> None:
         if pair[1] not in REPEATED
     }
     assert repeated == set()
+
+
+def _interrupted_paragraphs(page: str) -> list[str]:
+    """The lines inside paragraphs of a page that Markdown reads as items of a list, such as ``+ b = c``."""
+    text = re.sub(r"```.*?```", "", page, flags=re.DOTALL)
+    lines = text.splitlines()
+    item, paragraph = re.compile(r"\s*(?:\d+\.|[-*+]) "), re.compile(r"[^\s#|*+-].*[^:.]$")
+    return [b for a, b in pairwise(lines) if item.match(b) and paragraph.match(a) and not item.match(a)]
+
+
+def test_no_line_of_a_paragraph_begins_like_an_item_of_a_list() -> None:
+    assert _interrupted_paragraphs("The sum is a\n+ b here.\n\n1. A step\n2. Another\n\nThese:\n- one\n") == [
+        "+ b here."
+    ]
+    pages = [*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")]
+    assert len(pages) > 20
+    assert {
+        f"{p.name}: {line}" for p in pages for line in _interrupted_paragraphs(p.read_text(encoding="utf-8"))
+    } == set()

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e5db3dd397ffe634826cd445ff201082d5e7fac1742377d51359b7abc33a3f8a
+ * body-sha256: 91960d9923a41801d197d92c530df5211da15ee3666d6cd40c78d70833587d4f
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -386,7 +386,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; all else is unchanged. Throws StepError for values that are not
+   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
    * admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
@@ -440,7 +440,7 @@ export class Solver {
 
   /**
    * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
-   * h, parameters and t0 may be arrays with a number for each state. Throws StepError if an array has another
+   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
    * length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states

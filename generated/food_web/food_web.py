@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a415a51b5bba6bed83b04582472aaf09109967cc3e5684d9b4a906c8e31bc526
+# body-sha256: 2936f6f96adf3d241fbbbaca50c957c96dbd24ca84b3915fe67ed40e7b5a0f69
 import numpy as np
 
 VERSION = "0.1.0"
@@ -30,8 +30,8 @@ OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES the multiple of h²
-# in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty, the
+# multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
 TIMES = (0.0792036964311957, 0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498, 0.2193769557534996, 0.1096884778767498, 0.434336666566456, 0.3246481886897062, -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 8), (1, 9), (2, 10), (3, 11), (0, 12), (1, 13), (2, 14), (3, 15), (0, 16), (1, 17), (2, 18), (3, 19), (0, 20), (1, 21), (2, 22), (3, 23), (0, 24))

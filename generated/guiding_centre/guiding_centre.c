@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: f0b2917216447b6177f1a2214481147c846684890008a4ebde6f50f72ec89362
+ * body-sha256: 9549df8ede83f9762c065355e6011600d93cbc46b9fbd9ca0a7a4b8cee78ba92
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -459,7 +459,8 @@ enum {
 #define guiding_centre_DIFFERENCE 1e-7
 #define guiding_centre_SOLVED 4e-16        /* a residual below this, relative to p, is rounding */
 #define guiding_centre_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
-#define guiding_centre_SHRINKING 0.25      /* ... if it exceeds this fraction of the one before */
+/* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+#define guiding_centre_SHRINKING 0.25
 /* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define guiding_centre_CONTRACTING 0.05
 

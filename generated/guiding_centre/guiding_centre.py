@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 300658cb90d7de5d08f28ae4103ce810f69b37cf1091851d422551e844a726ce
+# body-sha256: 265de4474df13fd5eb494a6c5b57c4c9368ea6a782dbe9fcad764ab3b19dac05
 import numpy as np
 
 VERSION = "0.1.0"
@@ -182,7 +182,7 @@ ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, relative to the path a
 DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the root of rounding
 SOLVED = 4e-16  # a residual below this, relative to p, is rounding
 NEARLY_SOLVED = 1e-12  # a residual below this may be rounding: see SHRINKING
-SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
+SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
 CONTRACTING = 0.05  # largest reduction factor of the residual by an iteration with a useful Jacobian
 
 

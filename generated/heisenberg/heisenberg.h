@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 03561fe1cb6ea1020dc2dcd11dcb3effe61d04e5684f24261002bff24f88c5d3
+ * body-sha256: cc00d6b09298354dc79630ba85a164be1824d6d08a435569d3bef21de2b9d562
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -75,8 +75,9 @@ void heisenberg_state(const heisenberg_solver *s, double *x);
 heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x);
 heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 
-/* Between steps: replace the parameters, as heisenberg_init takes them; state, time and random numbers are
-   unchanged. Returns heisenberg_BAD_ARGUMENT where heisenberg_init would, and then changes nothing. */
+/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its
+   arrays means defaults. Returns heisenberg_BAD_ARGUMENT for parameters that heisenberg_init refuses, and
+   then changes nothing. */
 heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params);
 
 /* Save and restore a run with the same bits: heisenberg_saved writes far and arrays x[field][site], and

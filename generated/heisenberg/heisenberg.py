@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 4c9c632652bb0d85d3890445d0692294d458e33ae3ec35e93d091e6eab22a47f
+# body-sha256: 3c3dcd6bdd8b42d757f01290594c12f4be2b76bffbfd66868ddfa345a1ee3b50
 import numpy as np
 
 VERSION = "0.1.0"
@@ -30,8 +30,8 @@ OPEN = (False, False, False,)
 LEAST = (2, 2, 2,)
 PERIODS = (1, 1, 1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES the multiple of h²
-# in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty, the
+# multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
 TIMES = (0.5, 0.5, 1.0, 0.5, 0.5,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (1, 3), (0, 4))

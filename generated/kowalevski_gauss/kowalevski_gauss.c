@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 383aa8a389a44dd24d39250545f93e00832e24f1f02225c9d7a420d648a0b543
+ * body-sha256: d987a349afebd033dad87316b5e3767165c25695686c9d1c78ba689904be9f49
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -24,8 +24,7 @@
 /* ---- The model ---- */
 const kowalevski_gauss_params kowalevski_gauss_default_params = { 0 };
 
-/* unknowns that are offsets of coordinates; others are those of group elements */
-enum { kowalevski_gauss_PLAIN = 4 };
+enum { kowalevski_gauss_PLAIN = 4 }; /* first unknowns, with the scale of x: coordinates, time, functionals */
 /* numbers that define the start of a step: coordinates, and the time if H depends on it */
 enum { kowalevski_gauss_POINT = 6 };
 enum { kowalevski_gauss_MAX_SWEEPS = 100 }; /* largest number of sweeps over the stages of a step */
@@ -439,8 +438,8 @@ static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowal
     return 1.0 / square;
 }
 
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, |F| or
-   1 for group elements. */
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates and
+   functionals, and the size of group elements. */
 static inline double kowalevski_gauss_change_of(double scale, double element_scale, int count,
     kowalevski_gauss_lanes *before, kowalevski_gauss_lanes *after)
 {

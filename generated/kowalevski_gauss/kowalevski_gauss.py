@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: b2cc86edb113ab3e3d3d5fd383ee2caf2435dfe697c1a31358935ca888dc6bf1
+# body-sha256: 965b87cf02978f9644d1ad9309cdb1dd08891d14fd2fe95ef9d60fdc9df031bd
 import numpy as np
 
 VERSION = "0.1.0"
@@ -218,7 +218,7 @@ MIXING = np.array([
     [1.005482808253216, 0.9912514332308027, 1.012225914113298, 0.9830238267636289, 1.0247213458032003, 0.9599572962220551, 1.0818949631055814, 0.5],
 ])
 
-# Unknowns that are offsets of coordinates, or the time; the others are those of group elements, of size 1.
+# Number of the first unknowns, with the scale of the state: coordinates, time, functionals. The others are of size 1.
 PLAIN = 4
 
 

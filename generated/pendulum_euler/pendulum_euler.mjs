@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 811c96a987356369a189ac08c558e6b277d984bb703ce987d3bb3c2b25db48e2
+ * body-sha256: fadc6160c0ee38c7677eb6173b641b44d0b2465be255775c3d8888d490178735
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -266,7 +266,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; all else is unchanged. Throws StepError for values that are not
+   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
    * admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
@@ -319,7 +319,7 @@ export class Solver {
 
   /**
    * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
-   * h, parameters and t0 may be arrays with a number for each state. Throws StepError if an array has another
+   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
    * length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 36cc351b09808d9f98ded8094b4adb1a8389dc67928b8c88ae423ddaecc082fd
+ * body-sha256: f2d1e355791e823993800963d2735e9bfcca02aa9f1fa26b7e636885c3cd3590
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -92,9 +92,9 @@ void point_vortices_state(const point_vortices_solver *s, double *x);
 point_vortices_status point_vortices_set_state(point_vortices_solver *s, const double *x);
 point_vortices_status point_vortices_kick(point_vortices_solver *s, const double *change);
 
-/* Between steps: replace the parameters, as point_vortices_init takes them; state, time and random numbers
-   are unchanged. Returns point_vortices_BAD_ARGUMENT where point_vortices_init would, and then changes
-   nothing. */
+/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its
+   arrays means defaults. Returns point_vortices_BAD_ARGUMENT for parameters that point_vortices_init refuses,
+   and then changes nothing. */
 point_vortices_status point_vortices_set_parameters(point_vortices_solver *s,
     const point_vortices_params *params);
 

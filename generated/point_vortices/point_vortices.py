@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 616cae7625dbe2f1b4d5ac0c98292f87313ad38533efdef8d8a6fc6d5316d653
+# body-sha256: f2ca4c893a0ee15fab7ecd9603cf4aab8712080902033bc09d1046dcdeed9e5b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -32,8 +32,8 @@ OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES the multiple of h²
-# in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty, the
+# multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
 TIMES = (0.4144907717943757, 0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: e2306933a2ae695e4691c9673a924e713fc3558a5e03a1c31e71643de73df77c
+ * body-sha256: 376dc816b804dde560d117153d4f43564872a61c2acd775c4d0202234b8aaf52
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -692,7 +692,8 @@ enum {
 #define quaternion_top_DIFFERENCE 1e-7
 #define quaternion_top_SOLVED 4e-16        /* a residual below this, relative to p, is rounding */
 #define quaternion_top_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
-#define quaternion_top_SHRINKING 0.25      /* ... if it exceeds this fraction of the one before */
+/* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
+#define quaternion_top_SHRINKING 0.25
 /* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define quaternion_top_CONTRACTING 0.05
 

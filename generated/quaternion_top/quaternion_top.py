@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d20fcd6d86eb781f31b566f001e8a9500f525a82dded34593a27566dba6bc0b0
+# body-sha256: 04b61c32b9e15357622f4a06e75095789f3c5f5e4871fac6d24e682165e0bee1
 import numpy as np
 
 VERSION = "0.1.0"
@@ -449,7 +449,7 @@ ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, relative to the path a
 DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the root of rounding
 SOLVED = 4e-16  # a residual below this, relative to p, is rounding
 NEARLY_SOLVED = 1e-12  # a residual below this may be rounding: see SHRINKING
-SHRINKING = 0.25  # ... if it exceeds this fraction of the one before
+SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
 CONTRACTING = 0.05  # largest reduction factor of the residual by an iteration with a useful Jacobian
 
 

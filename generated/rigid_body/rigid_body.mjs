@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ff7c0b993739fdcbf2b5d4e6456081aa10f9b60396140f5b6aaa202908677ff7
+ * body-sha256: 212db4c1c51e61626211be35c2cbafe1bd31e140113ade413783d695f3cc002e
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -686,7 +686,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; all else is unchanged. Throws StepError for values that are not
+   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
    * admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
@@ -741,7 +741,7 @@ export class Solver {
   /**
    * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
    * Each state has its own gauge unless options.gauge is given.
-   * h, parameters and t0 may be arrays with a number for each state. Throws StepError if an array has another
+   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
    * length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 80f90b2e5a92202169eae9ebfda72dac1d41458aabec715f5f037916f6122fda
+ * body-sha256: 8faf9efa40b3aa52af8395eb4d19bd65e77c434063b0df245fad388fcac16e12
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -366,7 +366,7 @@ static double thermal_spin_bits(uint32_t high, uint32_t low)
     return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
 }
 
-/* Compute two independent standard normal variates (Box and Muller), at most thermal_spin_BOUND. */
+/* Two independent standard normal variates (Box and Muller), truncated at thermal_spin_BOUND. */
 static void thermal_spin_two_normals(uint64_t seed, uint32_t c[4], double normals[2])
 {
     thermal_spin_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));

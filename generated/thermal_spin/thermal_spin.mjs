@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 409df8462149f6e6d377d056168c81824c6d06cc3bd32daec25370164cf287b8
+ * body-sha256: a762a69b7ca3ccb2a5d51f91bfcf64d4eeec2c5818bf6602f4008243724d3d99
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -494,7 +494,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; all else is unchanged. Throws StepError for values that are not
+   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
    * admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
@@ -548,7 +548,7 @@ export class Solver {
 
   /**
    * Make count steps from each of many initial states. If a step fails, the last state is the one before it.
-   * h, parameters and t0 may be arrays with a number for each state. Throws StepError if an array has another
+   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
    * length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8a00fc3a551f422e1f4bc08e9bf92413c97a1cee97b253e9a185e4c5530c5ad0
+ * body-sha256: 65a5c09337cf1bdd1e8c8c01e3e5857f2078c70416aa2ddf86d5718667058b34
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -318,10 +318,10 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time and random numbers are unchanged. Throws StepError for
-   * values that are not admissible; then nothing changes.
+   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
+   * admissible; then nothing changes.
    *
-   * @param {object} changes parameters by name; those at sites and at bonds are arrays, or one number for all
+   * @param {object} changes parameters by name: numbers, or arrays for those that differ from place to place
    * @returns {this}
    */
   setParameters(changes) {
@@ -408,8 +408,9 @@ class Sites {
     this.count = sizes.reduce((product, n) => product * n, 1);
     this.params = this.#admitted(options.params ?? {});
     const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
-    /** The neighbour of each site, for each offset of NEAR. Below: 1 or 0 where terms of H exist or not. */
+    /** The neighbour of each site, for each offset of NEAR. */
     this.near = NEAR.map((offset) => every(Int32Array, (i) => this.#beside(i, offset)));
+    /** For each kind of term of H: 1 at sites where it exists, else 0. */
     this.present = BOUNDS.map((bounds) => every(Float64Array, (i) => this.#holds(i, bounds)));
     /** The flows of a step, each as [part of H, row of coefficients]. */
     this.flows = SCHEDULE;
@@ -435,7 +436,7 @@ class Sites {
     return Object.freeze(params);
   }
 
-  /** The same sites with changed parameters; throws StepError for values not allowed. */
+  /** The same sites with changed parameters; throws StepError for values that are not admissible. */
   changed(changes) {
     const params = { ...this.params, ...changes };
     return new Sites(this.sizes, { params });

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: ce480d5225c68c0362e1bdf6d6a711b57f0e7db4654ff77f71dde8473e2de094
+# body-sha256: cae5bb68ec26c90196dec1ff8221a3a51e0d12197728b2510509c9d47c5bec5d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -28,8 +28,8 @@ OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES the multiple of h²
-# in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty, the
+# multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
 TIMES = (0.08298440641740498, 0.2452989571842711, 0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083, -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711, 0.08298440641740498,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12))

@@ -84,7 +84,7 @@ class PathPolicy(Policy):
     )
     solved: float = number(4e-16, "a residual below this, relative to p, is rounding")
     nearly_solved: float = number(1e-12, "a residual below this may be rounding: see SHRINKING")
-    shrinking: float = number(0.25, "... if it exceeds this fraction of the one before")
+    shrinking: float = number(0.25, "ratio of successive residuals below NEARLY_SOLVED that shows rounding")
     contracting: float = number(0.05, "largest reduction factor of the residual by an iteration with a useful Jacobian")
 
 

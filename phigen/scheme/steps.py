@@ -384,7 +384,8 @@ class Gauss(_Staged):
     unknowns Z are offsets, 0 at the start of the step. ``slope`` is f; its input x is the point, with the time as the
     last entry if f depends on the time. ``change`` is D. ``frame`` transforms the L_j of a step to the frame of the
     next step, if that differs. The first ``plain`` unknowns have the scale of the state; the others, of group elements,
-    have the scale 1. ``lifted`` makes the same step in frames that move along, its ``lift``.
+    have the scale 1. ``lifted`` is the same step in frames that move along, None if there is
+    none; its ``lift`` describes the frames.
     """
 
     slope: Kernel

@@ -148,7 +148,7 @@ _LISTED = (
         },
         inline=True,
     ),
-    Function(  # 1/a for a > 0, else 0: the value of its product with 0
+    Function(  # 1/a for a > 0, else 0: used where its factor vanishes for a ≤ 0
         "inv0",
         own=True,
         slopes=lambda call, f, a: (-(f**2),),

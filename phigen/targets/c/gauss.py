@@ -53,7 +53,7 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
 def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
     """Return the sizes of a Gauss step other than the number of stages: name, value and comment."""
     return [
-        ("PLAIN", step.plain, "unknowns that are offsets of coordinates; others are those of group elements"),
+        ("PLAIN", step.plain, "first unknowns, with the scale of x: coordinates, time, functionals"),
         (
             "POINT",
             program.dimension + bool(program.time) + (step.lift.size if step.lift else 0),

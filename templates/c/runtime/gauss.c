@@ -94,8 +94,8 @@ static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
     return 1.0 / square;
 }
 
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, |F| or 1 for group
-   elements. */
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates and functionals,
+   and the size of group elements. */
 static inline double phi_change_of(double scale, double element_scale, int count, phi_lanes *before, phi_lanes *after)
 {
     phi_lanes sum = { 0.0 };
@@ -137,7 +137,7 @@ static int phi_best_predictor(phi_history *past, double scale, double element_sc
 }
 
 #else
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates, 1 for group elements;
+/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates and functionals, 1 for group elements;
    at x = 0 the increments take the place of x. */
 static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lanes *after)
 {

@@ -16,7 +16,7 @@ typedef struct {
     int kicked;    /* whether the state was changed since the last step */
     double h;      /* size of the last step */
 #if PHI_LIFTED
-    int lifted;    /* whether frame is that of the state */
+    int lifted;    /* whether frame has been computed; after a kick it is that of the former state */
     double frame[PHI_LIFT], frame_carry[PHI_LIFT]; /* frames of group elements, and their compensation terms */
 #endif
 #if PHI_STAGED

@@ -81,12 +81,12 @@ phi_status phi_set_state(phi_solver *s, const double *x);
 phi_status phi_kick(phi_solver *s, const double *change);
 
 #if PHI_BODIES || PHI_MONITOR
-/* Between steps: replace the parameters, as phi_init takes them; state, time and random numbers are unchanged. Returns
-   PHI_BAD_ARGUMENT where phi_init would. If this is because of the state or of masses, the parameters are replaced
-   nevertheless: replace them again before the next step. */
+/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its arrays means
+   defaults. Returns PHI_BAD_ARGUMENT for parameters that phi_init refuses. If this is because of the state or of masses,
+   the parameters are replaced nevertheless: replace them again before the next step. */
 #else
-/* Between steps: replace the parameters, as phi_init takes them; state, time and random numbers are unchanged. Returns
-   PHI_BAD_ARGUMENT where phi_init would, and then changes nothing. */
+/* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its arrays means
+   defaults. Returns PHI_BAD_ARGUMENT for parameters that phi_init refuses, and then changes nothing. */
 #endif
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 

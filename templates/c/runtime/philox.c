@@ -25,7 +25,7 @@ static void phi_philox(uint32_t counter[4], uint32_t key0, uint32_t key1)
 /* A number from 0 up to, but not including, 2^53, from 53 bits of two words. */
 static double phi_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0 + (double)(low >> 6); }
 
-/* Compute two independent standard normal variates (Box and Muller), at most PHI_BOUND. */
+/* Two independent standard normal variates (Box and Muller), truncated at PHI_BOUND. */
 static void phi_two_normals(uint64_t seed, uint32_t c[4], double normals[2])
 {
     phi_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));

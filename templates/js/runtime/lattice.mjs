@@ -160,10 +160,10 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; state, time and random numbers are unchanged. Throws StepError for
-   * values that are not admissible; then nothing changes.
+   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
+   * admissible; then nothing changes.
    *
-   * @param {object} changes parameters by name; those at sites and at bonds are arrays, or one number for all
+   * @param {object} changes parameters by name: numbers, or arrays for those that differ from place to place
    * @returns {this}
    */
   setParameters(changes) {

@@ -9,7 +9,7 @@ export class Ensemble {
    * #if GAUGE
    * Each state has its own gauge unless options.gauge is given.
    * #endif
-   * h, parameters and t0 may be arrays with a number for each state. Throws StepError if an array has another
+   * h and parameters may be arrays with a number for each state. Throws StepError if an array has another
    * length.
    *
    * @param {Iterable<ArrayLike<number>>} members initial states

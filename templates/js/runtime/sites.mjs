@@ -40,8 +40,9 @@ export class Sites {
     this.params = this.#admitted(options.params ?? {});
     weigh(this);
     const every = (Kind, value) => Kind.from({ length: this.count }, (_, i) => value(i));
-    /** The neighbour of each site, for each offset of NEAR. Below: 1 or 0 where terms of H exist or not. */
+    /** The neighbour of each site, for each offset of NEAR. */
     this.near = NEAR.map((offset) => every(Int32Array, (i) => this.#beside(i, offset)));
+    /** For each kind of term of H: 1 at sites where it exists, else 0. */
     this.present = BOUNDS.map((bounds) => every(Float64Array, (i) => this.#holds(i, bounds)));
     // #if COLOURS
     const colours = every(Array, (i) => {
@@ -63,7 +64,7 @@ export class Sites {
       return at < near || at >= this.seams[axis] - near;
     }));
     const listed = (wanted) => Int32Array.from(beside.flatMap((own, i) => (wanted(own, i) ? [i] : [])));
-    /** For each colour: the sites on seams and near them, and the other sites. */
+    /** The sites on seams and near them; of the other sites, a list for each colour, and all of them. */
     this.beside = listed((own) => own);
     this.inside = this.coloured.map((_, colour) => listed((own, i) => !own && colours[i] === colour));
     this.inside.all = listed((own) => !own);
@@ -129,7 +130,7 @@ export class Sites {
     return Object.freeze(params);
   }
 
-  /** The same sites with changed parameters; throws StepError for values not allowed. */
+  /** The same sites with changed parameters; throws StepError for values that are not admissible. */
   changed(changes) {
     const params = { ...this.params, ...changes };
     // #if GRAPH

@@ -185,7 +185,7 @@ export class Solver {
   }
 
   /**
-   * Between steps: change parameters; all else is unchanged. Throws StepError for values that are not
+   * Between steps: change parameters; the state and the time remain. Throws StepError for values that are not
    * admissible; then nothing changes.
    *
    * @param {Partial<Parameters>} changes
