@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 91960d9923a41801d197d92c530df5211da15ee3666d6cd40c78d70833587d4f
+ * body-sha256: c6d9b849ae779d486e7f1584f4d04ec5775ae267b73bda71dc0c2493d64a73eb
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -173,25 +173,25 @@ function vectorField(params, t, x, out) {
   out[1] = q + params.A * Math.cos(params.omega * t) - q * (q * q);
 }
 
-/** A step size for which coefficients are finite */
+/** A step size for which coefficients are finite. */
 const PROBE_STEP = 1e-100;
 
-/** Smaller components of y count as this fraction of the largest */
+/** Smaller components of y count as this fraction of the largest. */
 const FLOOR = 1e-6;
 
-/** A correction below this may be rounding */
+/** A correction below this may be rounding. */
 const NEARLY_SOLVED = 1e-8;
-/** Ratio of successive corrections below NEARLY_SOLVED that shows rounding */
+/** Ratio of successive corrections below NEARLY_SOLVED that shows rounding. */
 const SHRINKING = 0.25;
 
-/** Accepted length of steps, relative to state and motion */
+/** Accepted length of steps, relative to state and motion. */
 const PLAUSIBLE = 1.5;
-/** Largest relative change of energy in longer steps */
+/** Largest relative change of energy in longer steps. */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** Largest distance from the last value, relative to it */
+/** Largest distance from the last value, relative to it. */
 const REACH = 4.0;
-/** Number of stored differences; higher ones would amplify rounding errors */
+/** Number of stored differences; higher ones would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 // ---- Errors ----

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fadc6160c0ee38c7677eb6173b641b44d0b2465be255775c3d8888d490178735
+ * body-sha256: 0e6fde65623fc24526a52d381ebc65990bbfd343176a6a0644d4140b1428c5c9
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -77,7 +77,7 @@ function vectorField(params, x, out) {
   out[1] = -(params.g * Math.sin(q));
 }
 
-/** A step size for which coefficients are finite */
+/** A step size for which coefficients are finite. */
 const PROBE_STEP = 1e-100;
 
 // ---- Errors ----

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 212db4c1c51e61626211be35c2cbafe1bd31e140113ade413783d695f3cc002e
+ * body-sha256: 05012269a77516ad9f88af52177f2f7e653026312102f6d417a57d6f6262993f
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -452,44 +452,44 @@ function vectorField(params, x, out) {
   out[2] = x1 * t2 - x2 * t3;
 }
 
-/** A step size for which coefficients are finite */
+/** A step size for which coefficients are finite. */
 const PROBE_STEP = 1e-100;
 
-/** Smaller components of y count as this fraction of the largest */
+/** Smaller components of y count as this fraction of the largest. */
 const FLOOR = 1e-6;
 
-/** A correction below this may be rounding */
+/** A correction below this may be rounding. */
 const NEARLY_SOLVED = 1e-8;
-/** Ratio of successive corrections below NEARLY_SOLVED that shows rounding */
+/** Ratio of successive corrections below NEARLY_SOLVED that shows rounding. */
 const SHRINKING = 0.25;
 
-/** Accepted length of steps, relative to state and motion */
+/** Accepted length of steps, relative to state and motion. */
 const PLAUSIBLE = 1.5;
-/** Largest relative change of energy in longer steps */
+/** Largest relative change of energy in longer steps. */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** Largest distance from the last value, relative to it */
+/** Largest distance from the last value, relative to it. */
 const REACH = 4.0;
-/** Number of stored differences; higher ones would amplify rounding errors */
+/** Number of stored differences; higher ones would amplify rounding errors. */
 const DIFFERENCES = 9;
 
-/** Number of states along a short piece of the trajectory */
+/** Number of states along a short piece of the trajectory. */
 const SAMPLES = 32;
-/** S_3 is cubic in H, so the square of the error is of degree six in each multiple */
+/** S_3 is cubic in H, so the square of the error is of degree six in each multiple. */
 const DEGREE = 6;
-/** Most rounds over all multiples */
+/** Most rounds over all multiples. */
 const SWEEPS = 4;
-/** Number of grids on a line, each finer than the one before by the factor mesh */
+/** Number of grids on a line, each finer than the one before by the factor mesh. */
 const GRIDS = 3;
-/** Points of the first grid on either side */
+/** Points of the first grid on either side. */
 const FIRST_REACH = 24;
-/** Points of the other grids on either side */
+/** Points of the other grids on either side. */
 const REACH_OF_GRID = 8;
-/** Mesh of the first grid, in units of the width of the search */
+/** Mesh of the first grid, in units of the width of the search. */
 const MESH = 0.125;
-/** Distance between successive states, relative to the first */
+/** Distance between successive states, relative to the first. */
 const SAMPLE_LENGTH = 0.25;
-/** Errors that differ less than this, relative to all on a line, are equal: rounding must not decide */
+/** Errors that differ less than this, relative to all on a line, are equal: rounding must not decide. */
 const CLOSE_CALL = 1e-12;
 
 // ---- Errors ----

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a762a69b7ca3ccb2a5d51f91bfcf64d4eeec2c5818bf6602f4008243724d3d99
+ * body-sha256: a2315cff01d44c340963e722ca1e5b291648c56f897612d45996d536eaf543eb
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -270,25 +270,25 @@ function vectorField(params, x, out) {
   out[2] = y * t4 + x_ * t3;
 }
 
-/** A step size for which coefficients are finite */
+/** A step size for which coefficients are finite. */
 const PROBE_STEP = 1e-100;
 
-/** Smaller components of y count as this fraction of the largest */
+/** Smaller components of y count as this fraction of the largest. */
 const FLOOR = 1e-6;
 
-/** A correction below this may be rounding */
+/** A correction below this may be rounding. */
 const NEARLY_SOLVED = 1e-8;
-/** Ratio of successive corrections below NEARLY_SOLVED that shows rounding */
+/** Ratio of successive corrections below NEARLY_SOLVED that shows rounding. */
 const SHRINKING = 0.25;
 
-/** Accepted length of steps, relative to state and motion */
+/** Accepted length of steps, relative to state and motion. */
 const PLAUSIBLE = 1.5;
-/** Largest relative change of energy in longer steps */
+/** Largest relative change of energy in longer steps. */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** Largest distance from the last value, relative to it */
+/** Largest distance from the last value, relative to it. */
 const REACH = 4.0;
-/** Number of stored differences; higher ones would amplify rounding errors */
+/** Number of stored differences; higher ones would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 // ---- Errors ----

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 65a5c09337cf1bdd1e8c8c01e3e5857f2078c70416aa2ddf86d5718667058b34
+ * body-sha256: ab235e33a696ea6bb1179f35a8f22158c0feb947f09e0ced2a268568bdde7bfe
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -138,7 +138,7 @@ function vectorField(params, x, sites, out) {
   }
 }
 
-/** A step size for which coefficients are finite */
+/** A step size for which coefficients are finite. */
 const PROBE_STEP = 1e-100;
 
 // ---- Errors ----

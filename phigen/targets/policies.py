@@ -63,7 +63,9 @@ def _aligned(lines: list[tuple[str, str]]) -> list[str]:
 
 
 def _js(constants: list[tuple[PolicyConstant, str]]) -> str:
-    return "\n".join(f"/** {c.about[:1].upper()}{c.about[1:]} */\nconst {c.name} = {value};" for c, value in constants)
+    sentences = [f"{c.about[:1].upper()}{c.about[1:].rstrip(';.')}." for c, _ in constants]
+    lines = zip(sentences, constants, strict=True)
+    return "\n".join(f"/** {sentence} */\nconst {c.name} = {value};" for sentence, (c, value) in lines)
 
 
 def _python(constants: list[tuple[PolicyConstant, str]]) -> str:
