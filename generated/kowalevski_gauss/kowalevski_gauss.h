@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 54ee7ca7d0caf3e653ec4b792b0161d80574aa69a9aaa7c7deda4c8ec4e09581
+ * body-sha256: 30fbf91f4941e9e1bf35d225a8a55600a216f3e7fcc8197a805e9c6a171a236b
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -35,7 +35,7 @@ typedef enum { kowalevski_gauss_OK = 0, kowalevski_gauss_NO_CONVERGENCE, kowalev
 const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* the meaning of a status */
 
 /* Results of the last steps, by which the next one predicts the starting values of its iteration. They affect
-   the speed only. */
+   the speed only, except for a frame, which belongs to the state. */
 typedef struct {
     int count;     /* steps in increments */
     int latest;    /* index of the last step in increments */

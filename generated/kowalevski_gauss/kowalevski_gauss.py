@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 965b87cf02978f9644d1ad9309cdb1dd08891d14fd2fe95ef9d60fdc9df031bd
+# body-sha256: 1b17a13032dea405764e6f08a53c90ca6ae93903b9f48b2f91ba8bdd4de19a91
 import numpy as np
 
 VERSION = "0.1.0"
@@ -234,10 +234,11 @@ def _slopes(stage, point, z):
 
 
 def _change_of(x, change, increments):
-    """Return the largest change at any stage, (members,); that of coordinates is relative to |x|."""
-    size = np.sqrt(np.sum(x**2, axis=-1))[:, np.newaxis]
-    size = np.where(size > 0, size, np.sqrt(np.sum(increments[:PLAIN] ** 2, axis=0)) + np.finfo(float).tiny)
-    plain, rest = np.sum(change[:PLAIN] ** 2, axis=0) / size**2, np.sum(change[PLAIN:] ** 2, axis=0)
+    """Return the largest change at any stage, (members,); that of the plain unknowns is relative to |x|, or to
+    their increments at x = 0."""
+    square = np.sum(x**2, axis=-1)[:, np.newaxis] + np.finfo(float).tiny
+    square = np.where(square > np.finfo(float).tiny, square, square + np.sum(increments[:PLAIN] ** 2, axis=0))
+    plain, rest = np.sum(change[:PLAIN] ** 2, axis=0) / square, np.sum(change[PLAIN:] ** 2, axis=0)
     return np.sqrt(np.max(plain + rest, axis=-1))
 
 

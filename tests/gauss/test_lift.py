@@ -164,3 +164,14 @@ def test_certificates_refuse_moving_frames():
     compilation = CASES["rigid_body"][0]()
     with pytest.raises(SpecError, match="the form of Gauss steps that profile fast has"):
         _expect_covered(compilation.program, compilation.spec)
+
+
+def test_parameters_that_move_the_leaf_bring_new_frames():
+    text = "coordinates: [x, y, z]\nparameters: {a: 2}\npoisson: {brackets: {x: {y: -z - a, z: y}, y: {z: -x}}}\n"
+    compilation = compile_text(f"{text}hamiltonian: x**2/2 + sin(y)*z/3 + z**2/5\nscheme: gauss\n", 16)
+    assert has_frames(compilation)
+    states = []
+    for target in ("c", "numpy"):
+        session = solver(compilation, target).session(start_of(compilation)).step(0.3, 5)
+        states.append(session.set_parameters(a=1.9).step(0.3, 5).x)
+    assert np.abs(np.subtract(*states)).max() <= 2e-14

@@ -57,6 +57,24 @@ def test_targets_are_equal_to_rounding(name, order):
         )
 
 
+@pytest.mark.parametrize("size", [0.0, 1e-170, 1e-160])
+def test_steps_begin_at_the_origin_and_close_to_it(size):
+    """Squares of such states underflow, and changes are relative to them; a force leads away."""
+    pendulum = FORCED.replace("time: t\n", "").replace("g*q*sin(2*t)", "g*q/1000")
+    spin = (
+        "coordinates: [x, y, z]\npoisson: {lie_algebra: {name: so(3)}}\nhamiltonian: x + y**2/2 + z**2\nscheme: gauss\n"
+    )
+    for text, n in ((pendulum, 2), (spin, 3)):
+        compilation = compile_text(text, 6)
+        states = ends(compilation, [size, *[0.0] * (n - 1)], 0.1)
+        for state in states.values():
+            assert state == pytest.approx(states["c"], rel=1e-12, abs=1e-17)
+        assert np.abs(states["c"][:2]).max() > 1e-4 or n == 3
+        members = np.array([[size, *[0.0] * (n - 1)], [0.3] * n])
+        together = solver(compilation, "numpy").ensemble(members, 0.1, STEPS)
+        np.testing.assert_allclose(together[0], states["numpy"], rtol=1e-12, atol=1e-17)
+
+
 def test_time_and_forces_enter_at_the_stages():
     """A pendulum with friction, driven: all targets are equal, and right to the order of the method."""
     compilation = compile_text(FORCED, 8)

@@ -1,7 +1,7 @@
 #ifndef PHI_FILE_HISTORY_GAUSS_H
 #define PHI_FILE_HISTORY_GAUSS_H
 /* Results of the last steps, by which the next one predicts the starting values of its iteration. They affect the speed
-   only. */
+   only, except for a frame, which belongs to the state. */
 typedef struct {
     int count;     /* steps in increments */
 #if PHI_STAGED

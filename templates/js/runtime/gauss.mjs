@@ -104,12 +104,14 @@ function slopes(solver, stage, start, z, increments) {
   }
 }
 
-/** The largest change of an increment at any stage; for coordinates relative to |x|. */
+/** The least normal number: smaller squares count as 0. */
+const LEAST_SQUARE = 2 ** -1022;
+
+/** The largest change of an increment at any stage; of plain unknowns relative to |x|, at 0 to increments. */
 function changeOf(start, before, after) {
-  let norm = 0;
+  let norm = LEAST_SQUARE;
   for (let i = 0; i < DIM; i++) norm += start[i] * start[i];
-  if (norm === 0) {
-    norm = Number.MIN_VALUE;
+  if (norm === LEAST_SQUARE) {
     for (const increment of after) for (let k = 0; k < PLAIN; k++) norm += increment[k] * increment[k];
   }
   let largest = 0;
