@@ -397,16 +397,15 @@ def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:
     if spec.solver.compensated and (plan.is_implicit or spec.extras.adjoint):
         message = "solver: compensated is only offered for lattices with scheme splitting and without adjoint"
         raise SpecError([Diagnostic(message, spec.locations.get(("solver",)))])
-    if plan.is_implicit:
-        _expect_no_settings_of_the_solve(spec)
+    _expect_no_settings_of_the_solve(spec)
     program = clock.timed("program", lambda: build_sweeps(cell, plan, spec))
     expect_coloured(spec, cell, plan.colouring.periods(cell.boundary))
     return CompiledLattice(spec=spec, order=plan.order, program=program, seconds=clock.seconds, cell=cell, sweeps=plan)
 
 
 def _expect_no_settings_of_the_solve(spec: Spec) -> None:
-    """Raise `SpecError` for settings of the inner solve that implicit steps of lattices do not have."""
-    message = "not for lattices, whose equations are solved to round-off by sweeps, then by Newton's method"
+    """Raise `SpecError` for settings of the inner solve, which lattices do not have."""
+    message = "not for lattices, whose steps are exact flows, or are solved to round-off"
     diagnostics = [
         spec.diagnostic(("solver", key), f"solver: {key} is {message}", f"remove {key}")
         for key in ("tolerance", "max_iterations")

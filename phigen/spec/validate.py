@@ -205,8 +205,9 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
         if key in raw and raw[key] is not None and raw[key] not in harmless:
             message = f"{key} belongs to scheme: series; {how}"
             problems.add(message, reader.locations[key,], f"remove {key}, or the scheme")
-    for key in ("tolerance", "max_iterations"):
-        if raw["scheme"] == "splitting" and ("solver", key) in reader.locations:
+    solver = raw.get("solver") or {}
+    for key in ("tolerance", "max_iterations") if raw["scheme"] == "splitting" and not raw.get("lattice") else ():
+        if getattr(solver.get(key), "text", solver.get(key)) not in (None, "auto"):
             message = f"solver: {key} belongs to steps that solve equations; {how}"
             problems.add(message, reader.locations["solver", key], f"remove {key}, or the scheme")
 

@@ -68,24 +68,27 @@ def test_an_option_changes_the_step_or_is_refused(scheme, option):
         assert method(compilation.program) != method(unchanged.program)
 
 
+@pytest.mark.parametrize("scheme", ["series", "splitting", "auto"])
 @pytest.mark.parametrize("setting", ["max_iterations: 7", "tolerance: 1e-8"])
-def test_implicit_lattices_refuse_settings_of_the_inner_solve(setting):
-    refusal = attempted(f"{CHAIN}solver: {{{setting}}}\n", "series")
+def test_lattices_refuse_settings_of_the_inner_solve(setting, scheme):
+    refusal = attempted(f"{CHAIN}solver: {{{setting}}}\n", scheme)
     assert f"solver: {setting.partition(':')[0]} is not for lattices" in str(refusal)
     assert "<string>:7:" in str(refusal)
 
 
 @pytest.mark.parametrize("setting", ["max_iterations: 7", "tolerance: 1e-8"])
-@pytest.mark.parametrize("text", [CHAIN, BODY.replace(" + x1**3/9", "")])
-def test_splittings_refuse_settings_of_the_inner_solve(text, setting):
+def test_splittings_refuse_settings_of_the_inner_solve(setting):
+    text = BODY.replace(" + x1**3/9", "")
     refusal = attempted(f"{text}solver: {{{setting}}}\n", "splitting")
     assert f"solver: {setting.partition(':')[0]} belongs to steps that solve equations" in str(refusal)
     assert f"hint: remove {setting.partition(':')[0]}, or the scheme" in str(refusal)
     compile_text(f"{text}scheme: splitting\n")
 
 
-def test_implicit_lattices_may_name_the_usual_tolerance():
-    assert compile_text(f"{CHAIN}solver: {{tolerance: auto}}\nscheme: series\n").program.step.equation
+def test_the_usual_tolerance_may_be_named():
+    usual = "solver: {tolerance: auto}\n"
+    assert compile_text(f"{CHAIN}{usual}scheme: series\n").program.step.equation
+    assert compile_text(f"{BODY.replace(' + x1**3/9', '')}{usual}scheme: splitting\n").program.step.kind.flows
 
 
 @pytest.mark.parametrize("scheme", NAMED)
