@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 4c5e710c32865d636ae2c995717cea8b8aba1f2884406a834237407f9b85f2a5
+ * body-sha256: 649aa075b0ff659034d04f0be863b9665b7ec48903e17d05e50e755f0ae7cedb
  */
 #include "food_web.h"
 #include <limits.h>
@@ -54,7 +54,7 @@ static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.079203696431195
 static const unsigned char food_web_flow_parts[food_web_ROWS_OF_FLOWS] = { 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3,
     0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 0 };
 
-/* Whether all parameters are finite, and positive where required. */
+/* Whether all parameters are finite and within their bounds. */
 static int food_web_allowed(const food_web_params *params, size_t sites, size_t bonds)
 {
     for (size_t k = 0; params->A != NULL && k < bonds; ++k)

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: cc0761d2202d7303e9c9ba890d422b2fc09fe6cf4b8da62d445c1c1334db9372
+ * body-sha256: 4bd91d13e097ab668af764371318b8b73228d8f8e6ace65880cda25bed85e27d
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -49,7 +49,7 @@ static const unsigned char heisenberg_flow_parts[heisenberg_ROWS_OF_FLOWS] = { 1
 /* For each part of H: planes read before and after a site, fields read there, fields changed. */
 static const heisenberg_stage heisenberg_stages_of[] = { { 1, 1, 1, 6 }, { 1, 1, 2, 5 }, { 1, 1, 4, 3 } };
 
-/* Whether all parameters are finite, and positive where required. */
+/* Whether all parameters are finite and within their bounds. */
 static int heisenberg_allowed(const heisenberg_params *params, size_t sites)
 {
     for (size_t k = 0; params->B != NULL && k < sites; ++k)
@@ -900,6 +900,7 @@ heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenbe
     heisenberg_put_parameters(s, params);
     s->prepared = 0; /* so that the next step starts as with a new step size */
     s->open = 0;
+    s->far = 0;
     return heisenberg_OK;
 }
 

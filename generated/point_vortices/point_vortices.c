@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: b1ff8e24021318162571158b379f78c490414f2ea729b574efd747b67007e42f
+ * body-sha256: cfd35b0704850aff2010bcc4799475611c3f7102e491300058e737daaaf121d4
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -38,7 +38,7 @@ static const size_t point_vortices_least[point_vortices_AXES] = { 1 };
 static const double point_vortices_times[point_vortices_ROWS_OF_FLOWS] = { 0.4144907717943757,
     0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
 
-/* Whether all parameters are finite, and positive where required. */
+/* Whether all parameters are finite and within their bounds. */
 static int point_vortices_allowed(const point_vortices_params *params, size_t sites)
 {
     if (params->G == NULL) return 0;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: a3436870207bbfabc85adbf6ec8120f3565e6edbd98f1cb157602a4c558943b8
+ * body-sha256: 4699aab1d9db80b524db8ca534cc11a3db7e4fd911f98ff0a594661f6e3a6dd9
  */
 #include "toda.h"
 #include <math.h>
@@ -41,7 +41,7 @@ static const double toda_times[toda_ROWS_OF_FLOWS] = { 0.08298440641740498, 0.24
 /* The part of H of each flow. */
 static const unsigned char toda_flow_parts[toda_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 1 };
 
-/* Whether all parameters are finite, and positive where required. */
+/* Whether all parameters are finite and within their bounds. */
 static int toda_allowed(const toda_params *params, size_t sites)
 {
     (void)params, (void)sites;

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ab235e33a696ea6bb1179f35a8f22158c0feb947f09e0ced2a268568bdde7bfe
+ * body-sha256: 542f42a393e1c000bde863e0260fb6cabc412480d02bf9b61b633f9000af34d1
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -325,9 +325,15 @@ export class Solver {
    * @returns {this}
    */
   setParameters(changes) {
-    const sites = this.sites.changed(changes);
-    expectSteps(sites.params);
-    this.sites = sites;
+    const before = this.params;
+    this.sites.setParameters(changes);
+    const changed = { ...this, params: this.params };
+    try {
+      expectSteps(this.params);
+    } catch (error) {
+      this.sites.setParameters(before);
+      throw error;
+    }
     this.h = NaN; // so that the next step computes the coefficients
     return this;
   }
@@ -436,10 +442,15 @@ class Sites {
     return Object.freeze(params);
   }
 
-  /** The same sites with changed parameters; throws StepError for values that are not admissible. */
-  changed(changes) {
-    const params = { ...this.params, ...changes };
-    return new Sites(this.sizes, { params });
+  /** Change parameters; throws StepError for values that are not admissible, and then changes nothing. */
+  setParameters(changes) {
+    const { params } = this;
+    this.params = this.#admitted({ ...params, ...changes });
+    try {
+    } catch (error) {
+      this.params = params;
+      throw error;
+    }
   }
 
   /** Position of each site along each axis. */

@@ -44,7 +44,7 @@ def are_allowed(parameters: Sequence[Parameter], members: Mapping[str, str], *, 
         body.append(ir.Loop("search", search, "k", ir.Constant(0), ir.fixed(p.at), condition=is_array))
     value = ir.joined("and", *conditions) if conditions else ir.Constant(1)
     names = ("params", "sites", *["bonds"] * graph)
-    doc = "Whether all parameters are finite, and positive where required"
+    doc = "Whether all parameters are finite and within their bounds"
     function = typed_function("allowed", doc, names, (*body, ir.Return(value)), _TYPES)
     return replace(function, returns=ir.Type.FLAG)
 

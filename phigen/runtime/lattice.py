@@ -1056,7 +1056,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             state = {} if start is None else dict(zip(self.coordinates, start, strict=True))
             if beyond_range := self.interface.single and arguments.beyond_single({**state, **values, "the step h": h}):
                 return ParameterError(f"{name}: {beyond_range}", **{**facts, "step": 0})
-            numbers = ", ".join(f"{n} = {v!r}" for n, v in values.items() if np.ndim(v) == 0)
+            numbers = ", ".join(f"{n} = {float(v)!r}" for n, v in values.items() if np.ndim(v) == 0)
             reason = "a coefficient computed from parameters alone is not finite"
             reason += ", or the part B of H is not negative where it starts" * self.interface.monitored
             return ParameterError(f"{name}: no step can be made with {numbers}: {reason}", **{**facts, "step": 0})

@@ -125,7 +125,7 @@ class LatticeCourse:
         if self.solver.interface.monitored:
             level, time = changed.saved()["passed"][:1], sites.saved()["passed"][1:]
             changed.resume(clock.h, 0, {"passed": np.concatenate([level, time])})
-        self.at = replace(self.at, values=values, level=None)
+        self.at = replace(self.at, values=values)
         self._sites, self._clock, self._before, self._anchor = changed, clock, steps, {}
 
     def saved(self) -> dict[str, Any]:

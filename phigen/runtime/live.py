@@ -69,12 +69,19 @@ class LiveSession:
         """
         changes = arguments.together(parameters, by_keyword)
         values = self.solver.values({**self.parameters, **changes}, {})
+        begin = Clock(self.t, self._clock.h, self.steps)
         try:
             self._session.set_parameters(values)
         except BackendError as error:
             raise self.solver.failure(error, math.nan, None, values) from error
-        self.parameters = values
+        self._go_on(values, begin)
         return self
+
+    def _go_on(self, values: dict[str, Any], begin: Clock) -> None:
+        """Take over parameters; without a monitor, steps count the time anew, from ``begin`` on."""
+        self.parameters = values
+        if not self.solver.interface.monitored:
+            self._clock = begin
 
     def step(self, h: float, steps: int = 1) -> Self:
         """Make steps of size ``h`` (in τ with a monitor), and return the session.
@@ -192,8 +199,9 @@ class LiveLattice(LiveSession):
         if "bonds" in changes:
             raise TypeError("the bonds of a session are fixed: start another session at x, with t0")
         values = self.solver.values({**self.parameters, **changes}, {}, self._put.shape[1:])
+        begin = Clock(self.t, self._clock.h, self.steps)
         cast("LatticeCourse", self._session).set_parameters(values)
-        self.parameters = values
+        self._go_on(values, begin)
         return self
 
     @property

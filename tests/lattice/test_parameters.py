@@ -48,6 +48,7 @@ SPECS = {
     "graph": (SPIN_GRAPH, 4),
     "langevin": (forcing.compiled("langevin").spec.source, 4),
     "stiff": (javascript.STIFF.replace("200*", "K*").replace("scheme", "parameters: {K: 200}\nscheme"), 12),
+    "compensated": (RING.replace("name: ring", "name: summed\nsolver: {compensated: true}"), 5),
     "monitor": (monitored.BODIES, 3),
     "relative": (relative.text("jacobi", "xy").replace("bound: true, ", ""), 4),
     "heliocentric": (relative.text("democratic_heliocentric", "xy").replace("bound: true, ", ""), 4),
@@ -209,3 +210,69 @@ def test_javascript_goes_on_as_a_solver_that_starts_with_the_new_parameters(name
     """
     answer = asked(tmp_path / f"{program.name}.mjs", body)
     assert answer == [True, True, *["BAD_ARGUMENT"] * 3, True, 7]
+
+
+#: Large angles at the start need full-range functions for some steps; the state after it does not.
+SINES = """\
+phigen: 1
+name: sines
+lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+parameters: {b: 0.7, a: 0.3}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + b*cos(q) + a*sin(q[i+1] - q)
+"""
+FAR = """\
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "sines.h"
+
+enum { SITES = 400, VALUES = 2 * SITES };
+static double large[VALUES], small[VALUES], x[VALUES], y[VALUES];
+
+int main(void)
+{
+    const size_t sizes[] = { SITES };
+    sines_params params = sines_default_params;
+    void *work = malloc(sines_work_size(sizes)), *other = malloc(sines_work_size(sizes));
+    for (int i = 0; i < VALUES; ++i) {
+        large[i] = i < SITES ? 1e4 + i : 0.1;
+        small[i] = 0.6 * (i * 131 % 397) / 397.0 - 0.3;
+    }
+    sines_solver s, fresh;
+    if (work == NULL || other == NULL || sines_init(&s, &params, sizes, large, work)) return 1;
+    if (sines_integrate(&s, 0.05, 2) || s.far == 0) return 2;
+    if (sines_set_state(&s, small)) return 3;
+    params.b = 0.9;
+    if (sines_set_parameters(&s, &params) || sines_init(&fresh, &params, sizes, small, other)) return 4;
+    if (sines_integrate(&s, 0.05, 10) || sines_integrate(&fresh, 0.05, 10)) return 5;
+    sines_state(&s, x);
+    sines_state(&fresh, y);
+    printf("%d", memcmp(x, y, sizeof x) == 0);
+    return 0;
+}
+"""
+
+
+def test_c_begins_with_functions_for_small_arguments_again(tmp_path: Path) -> None:
+    program = compile_spec(phigen.spec.loads(SINES)).program
+    write(tmp_path, {**emit(program, "c", ""), "main.c": FAR})
+    run([tool("gcc"), "-std=c99", *WARNINGS, "-O1", "main.c", "sines.c", "-lm", "-o", "a"], tmp_path)
+    assert run(["./a"], tmp_path) == "1"
+
+
+def test_javascript_keeps_the_level_of_parameters_that_it_refuses(tmp_path: Path) -> None:
+    write(tmp_path, emit(compilation("monitor").program, "js", ""))
+    options = json.dumps({"sizes": [3], "params": values_of("monitor", 1), "x0": start_of("monitor").ravel().tolist()})
+    body = f"""
+        const [s, twin] = [1, 2].map(() => new module.Solver({options}).integrate(0.02, 3))
+        const refused = [1e200, -1].map((m) => {{
+          try {{ s.setParameters({{ m }}) }} catch (error) {{ return error.status }}
+        }})
+        const same = ["level", "t", "tCarry"].every((name) => s[name] === twin[name])
+        s.integrate(0.02, 3), twin.integrate(0.02, 3)
+        return [...refused, same, s.x.every((v, i) => v === twin.x[i])]
+    """
+    answer = asked(tmp_path / "bodies.mjs", body)
+    assert answer == ["BAD_ARGUMENT", "BAD_ARGUMENT", True, True]

@@ -99,6 +99,16 @@ def test_after_a_change_of_parameters_a_session_goes_on_as_one_that_starts_there
     assert np.abs(unchanged.x - session.x).max() > 1e-6
 
 
+def test_copies_before_and_after_a_change_of_parameters_have_their_own() -> None:
+    solver, x, _ = prepared("xxz", "c")
+    session, name = solver.session(x).step(0.05, 2), next(iter(solver.interface.parameters))
+    before = session.copy()
+    after = session.set_parameters({name: 2.5}).copy()
+    unchanged = solver.session(x).step(0.05, 4)
+    assert before.step(0.05, 2).x.tobytes() == unchanged.x.tobytes()
+    assert after.step(0.05, 2).x.tobytes() == session.step(0.05, 2).x.tobytes() != unchanged.x.tobytes()
+
+
 @pytest.mark.parametrize("target", ["numpy", "c"])
 def test_parameters_of_steps_in_tau_change_the_level_and_not_the_time(target: str) -> None:
     solver = phigen.compile(phigen.spec.loads(monitored.BODIES), target=target)

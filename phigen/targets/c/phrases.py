@@ -526,7 +526,7 @@ MATRIX = Choice(
 JOINED = Choice(
     "Steps of flows are joined: what is behind the last flow of a step may stay open.",
     ("SERIES",),
-    {"NOT_OPEN(s)": ("", "s->open = 0;")},
+    {"NOT_OPEN(s)": ("", "s->open = 0;"), "NOT_FAR(s)": ("", "s->far = 0;")},
 )
 
 MOMENTA = Choice(

@@ -15,6 +15,8 @@ phi_status phi_set_parameters(phi_solver *s, const phi_params *params)
     phi_put_at_bonds(s, params);
     s->prepared = 0; /* so that the next step starts as with a new step size */
     PHI_NOT_OPEN(s)
+    PHI_NOT_FAR(s)
+    phi_clear_carry(s);
 #if PHI_BODIES
     if (!phi_weigh(s)) return PHI_BAD_ARGUMENT;
 #endif

@@ -167,14 +167,18 @@ export class Solver {
    * @returns {this}
    */
   setParameters(changes) {
-    const sites = this.sites.changed(changes);
-    expectSteps(sites.params);
-    beginLevel({ ...this, sites, params: sites.params });
-    this.sites = sites;
+    const before = this.params;
+    this.sites.setParameters(changes);
+    const changed = { ...this, params: this.params };
+    try {
+      expectSteps(this.params);
+      beginLevel(changed);
+    } catch (error) {
+      this.sites.setParameters(before);
+      throw error;
+    }
     // #if MONITOR
-    const { tCarry } = this;
-    beginLevel(this);
-    this.tCarry = tCarry;
+    this.level = changed.level;
     // #endif
     this.h = NaN; // so that the next step computes the coefficients
     return this;

@@ -130,15 +130,17 @@ export class Sites {
     return Object.freeze(params);
   }
 
-  /** The same sites with changed parameters; throws StepError for values that are not admissible. */
-  changed(changes) {
-    const params = { ...this.params, ...changes };
-    // #if GRAPH
-    const bonds = Array.from(this.ends.a).flatMap((a, k) => [a, this.ends.b[k]]);
-    return new Sites(this.sizes, { params, bonds });
-    // #else
-    return new Sites(this.sizes, { params });
-    // #endif
+  /** Change parameters; throws StepError for values that are not admissible, and then changes nothing. */
+  setParameters(changes) {
+    const { params } = this;
+    this.params = this.#admitted({ ...params, ...changes });
+    try {
+      weigh(this);
+    } catch (error) {
+      this.params = params;
+      weigh(this);
+      throw error;
+    }
   }
 
   /** Position of each site along each axis. */
