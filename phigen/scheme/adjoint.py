@@ -1,11 +1,15 @@
-"""The transpose of a step: kernels that propagate cotangents backwards, by reverse accumulation on the kernels of the
-step.
+"""The transpose of a step: kernels that compute the cotangents of its inputs from those of its results, by reverse
+accumulation.
 
-The cotangent of x' determines the cotangents of x and of the coefficients of the step. The latter are summed over the
-steps of a run, and ``prepare`` is transposed once. *newton*: let a(y) + y = x, x' = x + d(y), J = 1 + a' and M = d',
-with J and M of ``linearise``. If λ is the cotangent of x' and μ = J⁻ᵀ Mᵀ λ, the cotangent of x is λ + μ, and that of a
-coefficient is the derivative of λ·d − μ·a with respect to it. *explicit* and flows: one reverse sweep. *path*:
-`adjoint_path`. *gauss*: `gauss_adjoint`.
+The cotangent of the new state x' determines the cotangents of the old state x and of the coefficients of the step. The
+cotangents of the coefficients are summed over the steps of a run. At the end of the run the transpose of ``prepare``,
+which computes the coefficients from the parameters, is applied once.
+
+Each kind of step has its formulas. *newton*: the step solves y + a(y) = x for y, and x' = x + d(y). Let J = 1 + a' and
+M = d' be the matrices that the kernel ``linearise`` computes. If λ is the cotangent of x' and μ = J⁻ᵀ Mᵀ λ, the
+cotangent of x is λ + μ. The cotangent of a coefficient is the derivative of λ·d − μ·a with respect to this coefficient.
+*explicit* steps and flows: one reverse sweep over their formulas. *path*: see `adjoint_path`. *gauss*: see
+`gauss_adjoint`.
 """
 
 from __future__ import annotations
@@ -44,8 +48,9 @@ def pulled_back(
 ) -> Kernel:
     """Return the kernel of the derivatives of Σ cotangent · value with respect to some inputs of a kernel.
 
-    The sum runs over the values in ``seeds``. A seed ``bar`` adds an input ``bar``: the cotangents of its values. An
-    array x in ``variables`` yields the output ``x_bar``.
+    ``seeds`` maps the name of each new input to the values whose cotangents this input holds; the sum runs over all
+    these values. ``variables`` maps the name of an input array to its symbols; for an array ``x`` the new kernel has
+    the output ``x_bar``, the cotangents of its symbols. ``purpose`` is the comment in the generated code.
     """
     value = total(
         symbol(Symbol(seed, i)) * e for seed, values in seeds.items() for i, e in enumerate(values) if not e.is_zero
@@ -60,7 +65,8 @@ def pulled_back(
 
 
 def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression]) -> list[Expression]:
-    """Return the slopes with cos(a) written as 1 - versin(a), if the values contain versin(a)."""
+    """Return the derivatives ``slopes`` with cos(a) written as 1 − versin(a) wherever the ``values`` already contain
+    versin(a)."""
     versine_arguments = {e.args[0] for e in topological(values) if e.op == "versin"}
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
@@ -72,7 +78,11 @@ def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression])
 
 
 def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the cotangents of coefficients, from λ (``increment_bar``) and −μ (``displacement_bar``)."""
+    """Return the kernel of the cotangents of the coefficients of a Newton step, at its point y.
+
+    Its inputs are λ, the cotangent of x' (``increment_bar``), and −μ with μ = J⁻ᵀ Mᵀ λ (``displacement_bar``); see the
+    formulas of this module.
+    """
     displacement, increment, *_ = linearise.outputs
     kernel = replace(linearise, inputs={**linearise.inputs, TABLE: coefficients.table})
     return pulled_back(
@@ -85,7 +95,10 @@ def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
 
 
 def explicit_adjoint(explicit: Kernel, coefficients: Coefficients, name: str = "explicit_adjoint") -> Kernel:
-    """Return the kernel of the cotangents of state and coefficients, from that of the increment of a step or a flow."""
+    """Return the kernel of the cotangents of the state and of the coefficients, for an explicit step or a flow.
+
+    The kernel reads the cotangent of the increment of the state.
+    """
     kernel = replace(explicit, inputs={**explicit.inputs, TABLE: coefficients.table})
     return pulled_back(
         kernel,
@@ -99,14 +112,14 @@ def explicit_adjoint(explicit: Kernel, coefficients: Coefficients, name: str = "
 def gauss_adjoint(
     field: Kernel, change: Kernel, coordinates: Sequence[str], coefficients: Coefficients
 ) -> list[Kernel]:
-    """Return the transposes of the kernels of a Gauss step.
+    """Return three kernels that together transpose a Gauss step.
 
-    The stages are Z_i = Σ_j μ_ij L_j with L_j = w_j f(x, Z_j), and x' = x + D(x, Σ_j L_j). Let λ be the cotangent of x'
-    and ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of the unknowns and κ_i of the stage increments L_i satisfy ζ_i = w_i
-    (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j. Fixed-point sweeps solve these equations, as for the stages.
+    The step has the stages Z_i = Σ_j μ_ij L_j with the stage increments L_j = w_j f(x, Z_j), and x' = x + D(x, Σ_j
+    L_j). Let λ be the cotangent of x', and ε = (∂D/∂z)ᵀ λ. The cotangents ζ_i of Z_i and κ_i of L_i satisfy ζ_i = w_i
+    (∂f/∂z)ᵀ κ_i and κ_i = ε + Σ_j μ_ji ζ_j. Fixed-point sweeps solve these equations.
 
-    The first kernel is for a sweep. The second returns the contribution of a stage to the cotangents of the start of
-    the step and of the coefficients. The third is the transpose of D.
+    The first kernel computes ζ_i from κ_i, and is called in every sweep. The second kernel computes the contribution of
+    one stage to the cotangents of x and of the coefficients. The third kernel is the transpose of D.
     """
     seeds = {"move_bar": field.outputs[0].values}
     start = {"x": tuple(coordinates), TABLE: coefficients.table}
@@ -133,8 +146,11 @@ def completed(
     refresh: Kernel | None,
     path: PathAdjoint | None = None,
 ) -> Adjoint:
-    """Return the transpose of a step. The table of coefficients must be full; ``prepare`` and ``refresh`` are built
-    before."""
+    """Return the transpose of a step from the transposed kernels ``steps`` of the step itself.
+
+    The transposes of ``prepare`` and ``refresh`` are added. These two kernels must be built before, with the full table
+    of coefficients.
+    """
     differentiated = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):
         differentiated["gauge"] = (LEVEL,)
@@ -151,7 +167,11 @@ def completed(
 
 
 def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]]) -> Kernel:
-    """Return the transpose of ``prepare``; cotangents of the arguments of matrix exponentials are a further input."""
+    """Return the transpose of ``prepare``, the kernel that computes the coefficients from the parameters.
+
+    If the coefficients contain matrix exponentials, the cotangents of the matrices that are exponentiated are a further
+    input.
+    """
     table_values = list(prepare.outputs[0].values)
     exponents = [e for start, n in prepare.exponentials for e in table_values[start : start + n * n]]
     values = table_values[: len(table_values) - len(exponents)]
@@ -170,13 +190,13 @@ def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]
 
 
 def _constant_coefficients(coefficients: Coefficients, differentiated: Mapping[str, Sequence[str]]) -> list[bool]:
-    """Return for each coefficient whether it depends on no differentiated input."""
+    """Return, for each coefficient, whether it is independent of all inputs that are differentiated."""
     names = {s for symbols in differentiated.values() for s in symbols}
     return [names.isdisjoint(symbols_of(e)) for e in coefficients.written_out(coefficients.everything)]
 
 
 def _without(kernel: Kernel, constant: Sequence[bool]) -> Kernel:
-    """Return the kernel with zeros as the cotangents of constant coefficients."""
+    """Return a transposed kernel that outputs 0 as the cotangent of each coefficient that is marked as ``constant``."""
     outputs = [
         replace(o, values=tuple(ZERO if is_constant else e for e, is_constant in zip(o.values, constant, strict=True)))
         if o.name == f"{TABLE}_bar"
@@ -187,7 +207,10 @@ def _without(kernel: Kernel, constant: Sequence[bool]) -> Kernel:
 
 
 def level_adjoint(system: System) -> Kernel:
-    """Return the gradient of H with respect to state and parameters, on which the energy level e = −H(x₀) depends."""
+    """Return the kernel of the gradient of H with respect to state and parameters, for the transpose of e = −H(x₀).
+
+    e is the energy level that a monitored system adds to H.
+    """
     variables = [*system.coordinates, *system.parameter_names]
     slopes = gradient(system.hamiltonian, variables)
     n = system.dimension
@@ -200,12 +223,13 @@ def level_adjoint(system: System) -> Kernel:
 
 
 def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, slopes: PathSlopes) -> PathAdjoint:
-    """Return the path integrated backwards with its cotangents, and the transpose of its slope along the coefficients.
+    """Return the transpose of a step along a path ṁ = π(m)p: the recurrences of the path with its cotangents, run
+    backwards, and the transpose of ∇S_h with respect to the coefficients.
 
-    Let λ be the cotangent of x' = m(1), and ν the cotangent of y = ∫ m dt. Backwards along the path, ȧ = ∂(π(m)p)/∂mᵀ a
-    + ν with the initial value a = λ. The cotangents are: of x, the final value of a; of p, ∫ π(m)ᵀ a dt; of a
-    coefficient c, ∫ ∂(a·π(m)p)/∂c dt. With p = ∇S_h(y), ν = Hess S_hᵀ ω for the cotangent ω of p, which results in a
-    linear equation for ω.
+    Let λ be the cotangent of the new state x' = m(1), and ν the cotangent of the mean y = ∫ m dt. In reversed time
+    along the path, ȧ = ∂(π(m)p)/∂mᵀ a + ν, with the initial value a = λ. The cotangent of x is the final value of a;
+    that of p is ∫ π(m)ᵀ a dt; that of a coefficient c is ∫ ∂(a·π(m)p)/∂c dt. Since p = ∇S_h(y), ν = Hess S_hᵀ ω, where
+    ω is the cotangent of p. This results in a linear equation for ω.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]

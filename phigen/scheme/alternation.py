@@ -1,11 +1,12 @@
-"""Splitting methods of any number of parts: compositions of χ_h = φ_m ∘ … ∘ φ_1 and its adjoint χ*_h = φ_1 ∘ … ∘ φ_m.
+"""Splitting methods for any number of parts of H: they alternate χ_h = φ_m ∘ … ∘ φ_1 and its adjoint χ*_h = φ_1 ∘ … ∘
+φ_m, where φ_k is the flow of part k over the time h.
 
-Φ_h = χ_{α_2s h} ∘ χ*_{α_2s−1 h} ∘ … ∘ χ_{α_2 h} ∘ χ*_{α_1 h} with α_i = α_{2s+1−i} is a symmetric Poisson map if the
-φ_k are exact flows. If the coefficients a_1 = α_1, b_1 = α_1 + α_2, a_2 = α_2 + α_3, … have some order for two parts,
-the α have the same order for any number of parts: R. I. McLachlan, On the numerical integration of ordinary
-differential equations by symmetric composition methods, SIAM J. Sci. Comput. 16 (1995). Where χ and χ* meet, two
-flows of one part are merged. Strang's splitting is α = (½, ½), and a symmetric composition of it has α = (γ_1/2,
-γ_1/2, γ_2/2, γ_2/2, …).
+A step is Φ_h = χ_{α_2s h} ∘ χ*_{α_2s−1 h} ∘ … ∘ χ_{α_2 h} ∘ χ*_{α_1 h} with α_i = α_{2s+1−i}. It is a symmetric Poisson
+map if the φ_k are exact flows. A splitting method for two parts has the coefficients a_1 = α_1, b_1 = α_1 + α_2, a_2 =
+α_2 + α_3, …; if it has some order, the α give the same order for any number of parts: R. I. McLachlan, On the numerical
+integration of ordinary differential equations by symmetric composition methods, SIAM J. Sci. Comput. 16 (1995). Where χ
+and χ* meet, two successive flows of one part are merged. Strang's splitting is α = (½, ½). A symmetric composition of
+Strang's splitting has α = (γ_1/2, γ_1/2, γ_2/2, γ_2/2, …).
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from fractions import Fraction
 
 from phigen.scheme.composition import COMPOSITIONS, Composition
 
-# S. Blanes, P. C. Moan, Practical symplectic partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl.
-# Math. 142 (2002): the methods S_6 of order 4 and S_10 of order 6; the last a and b follow from Σa = Σb = 1.
+# Coefficients of the methods S_6 of order 4 and S_10 of order 6, by S. Blanes, P. C. Moan, Practical symplectic
+# partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142 (2002): the first half of a_1, …
+# and that of b_1, … The middle values follow from Σa = Σb = 1.
 _S6 = ("0.0792036964311957 0.353172906049774 -0.0420650803577195", "0.209515106613362 -0.143851773179818")
 _S10 = (
     "0.0502627644003922 0.413514300428344 0.0450798897943977 -0.188054853819569 0.541960678450780",
@@ -27,7 +29,7 @@ _S10 = (
 
 @dataclass(frozen=True)
 class Alternation:
-    """A splitting method, given by its name, its order, and the fractions α_1, …, α_2s."""
+    """A splitting method for any number of parts: its name, its order, and the fractions α_1, …, α_2s of the step."""
 
     name: str
     order: int
@@ -35,7 +37,7 @@ class Alternation:
 
     @property
     def stages(self) -> int:
-        """The number s of pairs of χ* and χ."""
+        """The number s of stages; each stage is χ* followed by χ, with the fractions α_2k−1 and α_2k of the step."""
         return len(self.fractions) // 2
 
 
@@ -59,7 +61,7 @@ def _composed(composition: Composition) -> Alternation:
 
 STRANG = Alternation("strang", 2, (Fraction(1, 2),) * 2)
 
-#: All methods, the recommended one of each order first.
+#: All splitting methods for any number of parts. The first one of each order is recommended.
 ALTERNATIONS = (
     STRANG,
     _partitioned("blanes-moan", 4, _S6),
@@ -69,29 +71,32 @@ ALTERNATIONS = (
 
 
 def find(name: str, order: int) -> Alternation | None:
-    """Return the method of this name and order, or None.
+    """Return the splitting method with this name and order, or None.
 
-    ``auto`` is the recommended method of the order, ``none`` Strang's splitting.
+    ``auto`` stands for the recommended method of the order, and ``none`` for Strang's splitting.
     """
     names = {"auto": [a.name for a in ALTERNATIONS], "none": [STRANG.name]}.get(name, [name])
     return next((a for a in ALTERNATIONS if a.order == order and a.name in names), None)
 
 
 def orders(name: str) -> list[int]:
-    """Return the orders of the methods of this name."""
+    """Return the orders for which there is a splitting method with this name."""
     return sorted({a.order for a in ALTERNATIONS if find(name, a.order)})
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """The flows of one step: part 0 for ``times[0]``, then ``stages`` repetitions of the ``pattern``.
+    """The order and the durations of the flows of one step, in units of the step size.
 
-    The pattern lists pairs: a part, and the row of ``times`` with the duration of its flow, counted from the first row
-    of the stage. Kicks with modified potential have ``multiples`` by row, in units of h²; other flows have 0. If H
-    depends on the time, ``moments`` has for each row the fraction of the step at which H is evaluated.
+    A step begins with the flow of part 0 over ``times[0]``. Then ``stages`` repetitions of the ``pattern`` follow. The
+    pattern lists pairs of a part and a row: the flow of this part runs for the time in this row of ``times``. The rows
+    of the pattern count from the first row of the stage.
 
-    A run starts with the flows ``begin`` and ends with the flows ``end`` (a corrector); their rows follow those of the
-    step.
+    A kick with modified potential has its coefficient, in units of h², in its row of ``multiples``; other flows have 0
+    there. If H depends on the time, ``moments`` has, for each row, the fraction of the step at which H is evaluated.
+
+    If the method has a corrector, a run starts with the flows ``begin`` and ends with the flows ``end``; the rows of
+    these flows follow the rows of the step.
     """
 
     times: tuple[float, ...]
@@ -116,16 +121,17 @@ class Schedule:
 
     @property
     def flows_of_run(self) -> list[tuple[int, int]]:
-        """All flows of a run of one step in order, with those of the corrector."""
+        """All flows of a run that consists of a single step, including the flows of the corrector, in order."""
         return [*self.begin, *self.flows, *self.end]
 
 
 def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
-    """Return the schedule with the fractions of the step at which its flows are evaluated; the flow ``carrier``
-    advances the time.
+    """Return the schedule for an H that depends on the time, with the time at which each flow evaluates H.
 
-    The carrier is the first or last of ``parts`` flows: the conjugate e of the time, in H + e, belongs to it. A carrier
-    equal to ``parts`` is the flow of e alone, which is left out. All other parts are evaluated at a fixed time.
+    The times are fractions of the step. The time advances with one flow, the part with the number ``carrier``: the
+    first or the last of the ``parts`` flows. The conjugate e of the time, in H + e, belongs to this part. If
+    ``carrier`` equals ``parts``, the time advances in a flow of e alone, which has no row in the result. During all
+    other flows the time is fixed.
     """
     clock, moments = Fraction(0), dict[int, Fraction]()
     for part, row in schedule.flows:
@@ -139,7 +145,8 @@ def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
 
 
 def schedule(method: Alternation, parts: int) -> Schedule:
-    """Return the flows of a step of a method. A single part has one flow, which is exact."""
+    """Return the flows of a step of a method, for a number of ``parts`` of H. A single part has one flow, which is
+    exact."""
     if parts == 1:
         return Schedule((1.0,), 0, ())
     alpha = [*method.fractions, Fraction(0)]

@@ -1,4 +1,4 @@
-"""Assembly of a program: discretisation, staging and kernels from a system, its bi-realisation and an order."""
+"""Assembly of a program whose step has a generating function, from a system, its bi-realisation and an order."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ from phigen.symbolic.symbols import STEP
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
-#: Largest dimension in which paths are solved in SIMD lanes. In dimensions five and six the cost of derivatives
-#: outweighs the gain: blocks were measured to take 0.6 to 1.9 times as long as single steps.
+#: Largest dimension in which several steps along paths are solved together in SIMD lanes. In dimensions five and six
+#: these steps took 0.6 to 1.9 times as long as single steps, because of the cost of the derivatives.
 MAX_PATH_LANE_DIMENSION = 4
 
 
@@ -61,7 +61,8 @@ def build_program(
     *,
     group: Group | None = None,
 ) -> Program:
-    """Return the solver of a system as a program. Raises `LimitError` if a kernel is too large."""
+    """Return the program of a solver whose step has a generating function. Raises `LimitError` if a kernel is too
+    large."""
     extras, solver = spec.extras, spec.solver
     expect_no_adjoint(system, extras.adjoint)
     gauge, attitude = gauged.gauge, None
@@ -72,7 +73,7 @@ def build_program(
         attitude = stage_attitude(system, group, realisation, scheme.generating, gauge)
     lanes = solver.lanes and extras.offers("lanes", spec.profile)
     elapsed = elapsed_kernel(system, scheme.generating)
-    gauged_system = replace(system, forces=gauged.system.forces)  # with a monitor, the step size is in τ
+    gauged_system = replace(system, forces=gauged.system.forces)  # with a monitor g, the forces are those times g
     step = _step(gauged_system, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
     attitude = scheme.generating.coefficients.settled(attitude)
     level = level_adjoint(system) if gauge.monitor and extras.adjoint else None
@@ -130,7 +131,7 @@ def _step(
     if realisation.path:
         return _path(system, generating, gauge, inner, extras, lanes=lanes)
     coefficients = generating.coefficients
-    # A monitored step needs y: its physical time is a function of y.
+    # A monitored step is never explicit: its physical time is a function of y, the solution of the implicit equation.
     increment = None if gauge.monitor else explicit_kernel(system, realisation, generating, coefficients)
     if increment is None:
         linearise = linearise_kernel(system, realisation, generating, coefficients)
@@ -180,7 +181,7 @@ def _path(
 
 
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
-    """Return the kernel that computes all coefficients. It must be built last, when the table is full."""
+    """Return the kernel that computes all coefficients. It must be built last, when their table is full."""
     return Kernel(
         "prepare",
         "everything that depends on parameters and step size only",
@@ -192,7 +193,7 @@ def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel
 def _facts(
     system: System, realisation: BiRealisation, scheme: Discretisation, gauge: Gauge, step: Step, order: Order
 ) -> Iterator[str]:
-    """Yield the lines of the header of generated files; some may be empty."""
+    """Yield the lines on the method for the header of generated files; some may be empty."""
     generating = scheme.generating
     series = "S_1" if scheme.terms == 1 else f"S_1 ... S_{scheme.terms}"
     terms = f", {generating.terms} terms" if generating.terms else ""

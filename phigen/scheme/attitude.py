@@ -1,5 +1,5 @@
-"""Kernels of attitudes: the group element of each stage from the covector p = ∇S_h(y), and the rotation by the
-gauge."""
+"""Kernels of the attitude of a body: the group element by which a step rotates the body, computed from the covector p =
+∇S_h(y) or from the flows of a splitting, and the rotation by the Casimirs that the gauge subtracts from H."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: Description of the last entry of a covector of a matrix algebra.
+#: Text for generated code: the last entry of an output with the components of P, a bound for the squared size of the
+#: matrix P.
 SIZE_OF_COVECTOR = "a bound for the square of its size"
 
-#: Bi-realisations with a known group element: the exponential or the Cayley transform.
+#: Kinds of bi-realisations whose steps are the action of a known group element: exp(p) or the Cayley transform of p.
 KINDS = ("exponential", "karasev", "cayley")
 
 
 def expect_element(system: System, realisation: BiRealisation) -> None:
-    """Raise `SpecError` for a bi-realisation without a known group element."""
+    """Raise `SpecError` if phigen does not know the group element of the steps of this bi-realisation."""
     if realisation.kind not in KINDS or not realisation.exact:
         message = f"reconstruct: the bi-realisation {realisation.kind} has no group element that phigen knows"
         raise refused(system, message, "exponential and cayley have one")
@@ -43,7 +44,8 @@ def expect_element(system: System, realisation: BiRealisation) -> None:
 def stage_attitude(
     system: System, group: Group, realisation: BiRealisation, generating: GeneratingFunction, gauge: Gauge
 ) -> Attitude:
-    """Return the attitude of an implicit step. Its coefficients are added to the table of ``generating``."""
+    """Return the attitude of an implicit step. The coefficients of its kernels are added to the table of
+    ``generating``."""
     coefficients, cayley = generating.coefficients, realisation.kind == "cayley"
     p, slope = list(generating.turning), "grad S_h(y), without the forces," if generating.free else "p = grad S_h(y)"
     values = coefficients.hoist(_element_less_one(group, p, cayley))
@@ -64,8 +66,10 @@ def stage_attitude(
 def gauss_attitude(
     system: System, group: Group, points: StageMap, coefficients: Coefficients, gauge: Gauge
 ) -> Attitude:
-    """Return the attitude of a Gauss step. Its coefficients are added to the table. Raises `SpecError` if it has
-    none."""
+    """Return the attitude of a Gauss step; the coefficients of its kernels are added to ``coefficients``.
+
+    Raises `SpecError` if phigen knows no group element of the step.
+    """
     series = "scheme: series or splitting"
     if not points.realisation.exact:
         raise refused(
@@ -87,16 +91,16 @@ def gauss_attitude(
 
 
 def _path_element_kernel(group: Group, system: System) -> Kernel:
-    """Return the kernel of the group element of a path, as a function of p."""
-    p = [symbol(c) for c in system.coordinates]  # the names of the inputs; the kernel does not depend on x
+    """Return the kernel of the group element of a step along a path, as a function of the covector p."""
+    p = [symbol(c) for c in system.coordinates]  # the inputs p_i get the names of the coordinates x_i
     inputs = {"p": system.coordinates}
     return Kernel("along", "the increment of p", inputs, (Output("turn", tuple(_element_less_one(group, p, False))),))
 
 
 def _element_less_one(group: Group, p: list[Expression], cayley: bool) -> list[Expression]:
-    """Return the group element of p, minus 1.
+    """Return the group element of the covector p, minus 1: its exponential, or its Cayley transform if ``cayley``.
 
-    For exponentials of matrices, return p and a bound for its squared norm.
+    The exponential of a matrix is computed later: then the result is p and a bound for its squared norm.
     """
     if not group.matrices:
         return [*element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=cayley)]
@@ -120,10 +124,11 @@ def flow_attitude(
     coefficients: Coefficients,
     time_of: Callable[[Flow], Expression] | None = None,
 ) -> Attitude:
-    """Return the attitude of a splitting. Its coefficients are added to the table. Raises the errors of `turnings`.
+    """Return the attitude of a splitting: for each flow, a kernel of its increments and of the group element after it.
 
-    ``increments`` are those of the sources of noise, then those of the ``flows``. With a monitor, ``time_of`` returns
-    the physical time of a flow.
+    ``increments`` has first the increments of the flows of the noise sources, then those of ``flows``. With a monitor,
+    ``time_of`` returns the physical time of a flow. The coefficients of the kernels are added to ``coefficients``.
+    Raises the errors of `turnings`.
     """
     flow_rotations = turnings(system, group, flows, put_back=uniform(system))
     noise_rotations = [turning_of(system, group, s.hamiltonian, s.name, put_back=False) for s in system.noise]
@@ -145,18 +150,25 @@ def flow_attitude(
 
 
 def _carrier(group: Group) -> tuple[Symbol, ...]:
-    """Return the symbols of the product of the group elements of the flows since the start of the step, minus 1."""
+    """Return the symbols of the entries of the group element, minus 1, of all flows since the start of the step."""
     return tuple(Symbol("element", i) for i in range(group.size))
 
 
 def _element_after_flow(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
-    """Return the product of the group elements, minus 1, after a further flow."""
+    """Return the group element of a step, minus 1, after one more flow.
+
+    It is the product of the element before this flow, which has symbols, and of the elements of the flow over ``time``.
+    """
     element_before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
     return joined(group, [element_before, joined(group, factors)]) if factors else element_before
 
 
 def uniform(system: System) -> bool:
-    """Whether the Casimirs rotate a body with constant velocity in the frame in which momenta are constant."""
+    """Whether Casimirs in H rotate the body at a constant angular velocity, seen in the frame in which the momentum is
+    constant.
+
+    This is so unless there are forces, a monitor, or an H that depends on the time.
+    """
     monitored = system.spec is not None and system.spec.monitor is not None
     return not (system.forces or system.time or monitored)
 
@@ -164,10 +176,11 @@ def uniform(system: System) -> bool:
 def rate_kernel(
     system: System, group: Group, gauge: Gauge, further_gradients: Sequence[Expression] = ()
 ) -> Kernel | None:
-    """Return the kernel of the gradient of the Casimirs that the gauge subtracts from H, plus ``further_gradients``.
+    """Return the kernel of the gradient of Σ λ_c C_c + Σ f: the Casimirs that the gauge subtracts from H, with their
+    multiples, and the functions f in ``further_gradients``.
 
-    None if both are empty. With a monitor or forces the gauge must subtract no Casimirs: the rotation would not be
-    uniform.
+    Returns None if there are no such terms. Raises `SpecError` if there are terms and also a monitor or forces, since
+    the rotation by the Casimirs is then not uniform.
     """
     subtracted = [e for e in further_gradients if not e.is_zero]
     subtracted += [symbol(s) * system.casimirs[c] for s, c in zip(gauge.multiples, gauge.free, strict=True)]

@@ -1,4 +1,5 @@
-"""Loops over the bonds of a site: one loop for both ends of bonds, if the ends differ in signs of parameters only."""
+"""Loops over the bonds of a site of a lattice: one loop serves both ends a and b of the bonds, if the formulas at the
+two ends differ only in the signs of parameters."""
 
 from __future__ import annotations
 
@@ -11,10 +12,11 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 
 
 def over_ends(gather: Gather) -> list[tuple[Ends, frozenset[str]]]:
-    """Return the loops over the bonds of a site, each with the parameters that have the opposite sign at the end b.
+    """Return the loops over the bonds of a site, each with the parameters whose sign is opposite at the end b.
 
-    Parameters at bonds may depend on the direction of a bond. If the contribution at the end b is proved to be that at
-    the end a with some signs reversed, one loop is sufficient for both ends.
+    Parameters of bonds may depend on the direction of a bond. If the contribution at the end b is proved to equal that
+    at the end a with some signs of parameters reversed, one loop is sufficient for both ends; otherwise each end has
+    its own loop.
     """
     apart = [(e, frozenset[str]()) for e in gather.ends]
     if len(apart) != 2 or gather.ends[0].chosen != gather.ends[1].chosen:

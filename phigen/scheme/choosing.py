@@ -1,9 +1,9 @@
-"""Choice of the composition of a splitting: by the order, the brackets of its parts, and the cost of its flows.
+"""Choice of the composition of a splitting: by the order, the brackets of the parts of H, and the cost of their flows.
 
-If {V, {V, {V, T}}} = 0 for one of two parts as V, the methods of `phigen.scheme.nystrom` apply; if V + κ{V, {V, T}} has
-a flow, also those with modified kicks. The cost of an accuracy is proportional to the cost of a step times
-error^{1/order}; of the applicable methods, the one with the least product is chosen. Other splittings get the
-recommended alternation.
+If H has two parts T and V with {V, {V, {V, T}}} = 0, the methods of `phigen.scheme.nystrom` apply. If also V + κ{V, {V,
+T}} has a flow, the methods with modified kicks apply too. The time that a method needs for a given accuracy is
+proportional to the cost of a step times error^{1/order}. Of the applicable methods, the one with the smallest product
+is chosen. All other splittings get the recommended method of `phigen.scheme.alternation`.
 """
 
 from __future__ import annotations
@@ -28,17 +28,19 @@ from phigen.splitting.statements import bracket
 from phigen.symbolic.expression import gradient, symbols_of
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Cost of a flow, in operations, for each coordinate that it updates, in addition to the cost of its formulas: mostly
-#: the latency of the flow before. Fitted to timings: of fourteen pairs of methods on seven systems, the faster one is
-#: chosen in twelve; in the other two, the chosen one takes at most 1.34 times as long.
+#: Cost of a flow, in operations, for each coordinate that it updates, in addition to the cost of its formulas. Most of
+#: it is the time for which the flow waits for the results of the flow before. The value was fitted to timings of
+#: fourteen pairs of methods on seven systems: in twelve pairs the faster method is chosen, and in the other two pairs
+#: the chosen method takes at most 1.34 times as long.
 FLOW_LATENCY = 12
 
 
 @dataclass(frozen=True)
 class ScheduledMethod:
-    """A method with the flows in the order of its steps, including modified kicks; ``why`` is the reason, for the user.
+    """A method, with the parts of H in the order in which its steps apply their flows, including modified kicks.
 
-    If H depends on the time, the time advances with the flow ``carrier``, or by itself if no flow has that number.
+    ``why`` is the reason of the choice, as text for the user. If H depends on the time, ``carrier`` is the number of
+    the part during whose flow the time advances; a number that no part has stands for a separate advance of the time.
     """
 
     order: Order
@@ -60,22 +62,22 @@ class ScheduledMethod:
 
 
 class Host(Protocol):
-    """The object whose parts are composed, a spec or a system; errors name places in its spec."""
+    """Protocol of the object whose Hamiltonian is split, a spec or a system: errors name places in its spec."""
 
     @property
     def locations(self) -> Mapping[tuple[Any, ...], Location]:
-        """The places of keys in the spec, by path."""
+        """The position in the spec file of each key, by the path of the key."""
         ...
 
 
 def plan(system: System, splitting: SplitHamiltonian, requested: int, composition: str) -> ScheduledMethod:
-    """Return the method of the ``requested`` order; odd orders round up.
+    """Return the splitting method for the ``requested`` order; an odd order is rounded up.
 
-    Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
+    Raises `SpecError` if the composition does not offer this order, or does not apply to the parts of H.
     """
     if splitting.small is not None and _unsuited(system, splitting, splitting.small):
         splitting = replace(splitting, small=None)
-    if system.forces:  # with forces no part can be a V
+    if system.forces:  # with forces, no part of H can be the V of a Nyström method
         choice = planned(system, splitting, requested, composition, lambda: ())
         return with_carrier(choice, system.time) if system.time else choice
     if not system.time:
@@ -86,18 +88,19 @@ def plan(system: System, splitting: SplitHamiltonian, requested: int, compositio
 
 
 def _unsuited(system: System, splitting: SplitHamiltonian, small: int) -> bool:
-    """Whether a method for near-integrable systems does not apply: there are forces, or A (not ``small``) depends on
-    the time.
+    """Whether methods for near-integrable systems H = A + εB do not apply; ``small`` is the index of the part εB.
 
-    The conjugate of the time must belong to A.
+    They do not apply if forces add further flows, or if A depends on the time, since the conjugate of the time belongs
+    to A.
     """
     return len(splitting.flows) != 2 or (bool(system.time) and is_dated(splitting.flows[1 - small], system.time))
 
 
 def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
-    """Return the parts that can be a V with T + e in place of T.
+    """Return the parts of an H that depends on the time, each of which can be the V of a Nyström method.
 
-    T must not depend on the time, and V must commute with ∂V/∂t.
+    With the conjugate e of the time, T + e takes the place of T. So T must not depend on the time, and V must commute
+    with ∂V/∂t.
     """
     kicks_found = []
     for kick in kicks(system.frozen, splitting):
@@ -109,16 +112,16 @@ def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
 
 
 def with_carrier(choice: ScheduledMethod, time: str) -> ScheduledMethod:
-    """Return the choice with its ``carrier``, the flow that advances the time: the first or last, independent of the
-    time.
+    """Return the method with its ``carrier``: the number of the part during whose flow the time advances.
 
-    If no such flow exists, the time advances by itself, in place of a last part.
+    This part is the first or the last one, and must not depend on the time. If every part depends on the time, the time
+    advances in a separate flow after the last part.
     """
     flows = choice.splitting.flows
     if isinstance(choice.method, Nystrom):
         return replace(choice, carrier=1 - (choice.splitting.kick or 0))
     if isinstance(choice.method, NearIntegrable):
-        return replace(choice, carrier=0)  # e belongs to A, which does not depend on the time
+        return replace(choice, carrier=0)  # the time advances with part 0, A, which does not depend on it
     if not is_dated(flows[-1], time):
         return replace(choice, carrier=len(flows) - 1)
     undated = [flow for flow in flows if not is_dated(flow, time)]
@@ -136,7 +139,11 @@ def is_dated(flow: Flow, time: str) -> bool:
 def planned(
     system: Host, splitting: SplitHamiltonian, requested: int, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> ScheduledMethod:
-    """Return the method as `plan` does; ``kicks_of`` returns the parts that can be the V of a Nyström method."""
+    """Return the splitting method for the ``requested`` order, as `plan` does, for a spec or a system.
+
+    ``kicks_of`` returns the parts that can be the V of a Nyström method; it is called only if a Nyström method is
+    considered.
+    """
     even_order = requested + requested % 2
     note = "" if even_order == requested else f"order {requested} was asked for; a symmetric method has even order"
     order = Order(even_order, 0, note)
@@ -162,9 +169,10 @@ def planned(
 
 
 def _near_integrable(splitting: SplitHamiltonian, order: Order, method: NearIntegrable) -> ScheduledMethod:
-    """Return the choice of a method for H = A + εB, in which the flow of A comes first.
+    """Return the method for H = A + εB with its parts in order: A first or, with a corrector, B first.
 
-    Correctors begin and end with a flow of A. Between correctors, a step is a flow of B and one of A.
+    A method with a corrector begins and ends a run with flows of A; in between, each step is a flow of B and a flow of
+    A.
     """
     assert splitting.small is not None
     large_flow, small_flow = splitting.flows[1 - splitting.small], splitting.flows[splitting.small]
@@ -176,8 +184,10 @@ def _near_integrable(splitting: SplitHamiltonian, order: Order, method: NearInte
 
 
 def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMethod:
-    """Return the choice with the flow of B + κ{B, {B, A}}, if the method uses it. Raises `SpecError` if there is no
-    such flow."""
+    """Return the method with the flow of B + κ{B, {B, A}} in place of that of B, if the method requires it.
+
+    Raises `SpecError` if there is no such flow.
+    """
     method = choice.method
     if not isinstance(method, Corrected) or not method.multiple:
         return choice
@@ -191,7 +201,7 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
 
 
 def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) -> SpecError:
-    """Return the error for a near-integrable method on a splitting without a small part."""
+    """Return the error for a composition for near-integrable systems, if no part of H is known to be small."""
     count = len(splitting.flows)
     situation = "none is known to be small" if count == 2 else f"here {'is one' if count == 1 else f'are {count}'}"
     message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {situation}"
@@ -200,22 +210,22 @@ def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) 
 
 
 def chosen(splitting: SplitHamiltonian, order: Order, method: Nystrom, kick: Kick) -> ScheduledMethod:
-    """Return the choice of a method of Nyström type."""
+    """Return the Nyström method with T and V in the order of its step, and the reason of the choice as text."""
     return ScheduledMethod(order, method, _arranged(splitting, method, kick), _why(method))
 
 
 def orders(composition: str) -> list[int]:
-    """Return the orders of the methods called ``composition``."""
+    """Return the orders of the splitting methods called ``composition``."""
     if composition in near_integrable.NAMES:
         return near_integrable.orders(composition)
     return nystrom.orders(composition) if composition in nystrom.NAMES else alternation.orders(composition)
 
 
 def arranged(splitting: SplitHamiltonian) -> SplitHamiltonian:
-    """Return the parts in the order in which an alternation is cheapest: the most expensive part last.
+    """Return the parts in the order in which a step of an alternation is cheapest, with the most expensive part last.
 
-    The last part has one flow in each stage, the first part one in each stage and one more in the step. All other parts
-    have two in each stage.
+    The flow of the last part occurs once in each stage. The flow of the first part occurs once in each stage and once
+    more in the step. The flows of all other parts occur twice in each stage.
     """
     by_cost = sorted(splitting.flows, key=lambda flow: cost(flow.increment))
     return SplitHamiltonian((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))
@@ -230,10 +240,7 @@ def _applicable(kicks_of: Callable[[], Sequence[Kick]], order: int, name: str) -
 
 
 def _price(splitting: SplitHamiltonian, method: Nystrom, kick: Kick) -> float:
-    """Return the cost of a step times error^{1/order}.
-
-    This is proportional to the computing time for a given accuracy.
-    """
+    """Return the cost of a step times error^{1/order}, which is proportional to the time for a given accuracy."""
     first, last = (_cost(flow) for flow in _arranged(splitting, method, kick).flows)
     step = (method.stages + 1) * first + method.stages * last
     return step * math.pow(method.error, 1 / method.order)
@@ -244,14 +251,14 @@ def _cost(flow: Flow) -> int:
 
 
 def _arranged(splitting: SplitHamiltonian, method: Nystrom, kick: Kick) -> SplitHamiltonian:
-    """Return T and V in the order of the method."""
+    """Return the parts T and V in the order in which a step of the Nyström method applies them."""
     drift, kick_flow = splitting.flows[1 - kick.part], splitting.flows[kick.part]
     kicking = kick.modified if method.multiples and kick.modified else kick_flow
     return SplitHamiltonian((kicking, drift), 0) if method.kicks_first else SplitHamiltonian((drift, kicking), 1)
 
 
 def _why(method: Nystrom) -> str:
-    """Return the condition under which a method applies, as text."""
+    """Return the condition on the parts H_1 and H_2 under which a Nyström method applies, as text for the user."""
     v, t = ("H_1", "H_2") if method.kicks_first else ("H_2", "H_1")
     modified = f" and {v} + κ{{{v}, {{{v}, {t}}}}} has a flow" if method.multiples else ""
     return f"{{{v}, {{{v}, {{{v}, {t}}}}}}} = 0{modified}"
@@ -272,7 +279,7 @@ def _no_order(system: Host, composition: str, offered_orders: Sequence[int], ord
 def _not_applicable(
     system: Host, splitting: SplitHamiltonian, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> SpecError:
-    """Return the error for a Nyström method on parts without a V."""
+    """Return the error for a Nyström method if H has no two parts T and V with {V, {V, {V, T}}} = 0."""
     count = len(splitting.flows)
     if count != 2:
         reason = f"H = T + V, of two parts; here there {'is one' if count == 1 else f'are {count}'}"

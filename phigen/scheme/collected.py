@@ -1,8 +1,8 @@
-"""Collected polynomials: monomials in state-dependent variables with state-independent coefficients.
+"""Collected polynomials: sums of monomials in variables that depend on the state, with coefficients that do not.
 
-The coefficients are expressions in parameters and step size. Differentiation multiplies them by integers or by
-coefficients of the generators' derivatives. So the coefficients of a gradient and a Hessian are those of the function
-itself, and ``prepare`` computes each of them once.
+The coefficients are expressions in parameters and step size. Differentiation only multiplies them by integers, or by
+the coefficients in the derivatives of function values such as sin(q). So a gradient and a Hessian are written with the
+coefficients of the function itself, and ``prepare`` computes each coefficient once.
 """
 
 from __future__ import annotations
@@ -21,18 +21,19 @@ Terms = Mapping[Monomial, Expression]
 
 @dataclass(frozen=True)
 class Collected:
-    """A ring of collected polynomials: its variables, and the derivative of each along each coordinate."""
+    """A ring of collected polynomials: its variables, which depend on the state, and their derivatives along the
+    coordinates."""
 
     variables: tuple[Expression, ...]
     slopes: tuple[tuple[Terms, ...], ...]  # slopes[v][j] = ∂variable_v / ∂x_j
 
     @cached_property
     def _moving(self) -> list[list[int]]:
-        """For each coordinate, the indices of the variables that depend on it."""
+        """For each coordinate, the indices of the variables that depend on this coordinate."""
         return [[v for v, row in enumerate(self.slopes) if row[j]] for j in range(len(self.slopes[0]))]
 
     def derivative(self, terms: Terms, j: int) -> Terms:
-        """Return the total derivative with respect to coordinate j."""
+        """Return the total derivative of a collected polynomial with respect to coordinate number j."""
         result: dict[Monomial, Expression] = {}
         moving = self._moving[j]
         for m, c in terms.items():
@@ -51,16 +52,18 @@ class Collected:
         return sum(wide[v] for m in terms for v in self._moving[j] if m[v]) * len(self.variables)
 
     def expression(self, terms: Terms, coefficients: Coefficients) -> Expression:
-        """Return the polynomial in nested Horner form, with its coefficients in the table."""
+        """Return a collected polynomial as an expression in nested Horner form; its coefficients are added to
+        ``coefficients``."""
         return horner({m: coefficients.slot(c) for m, c in terms.items()}, self.variables)
 
 
 def collect(
     tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], times: Sequence[str] = ()
 ) -> tuple[Collected, list[Terms]]:
-    """Return the ring of collected polynomials, which differentiates them, and elements of a tower in this ring.
+    """Return a ring of collected polynomials, and the ``elements`` of a tower as polynomials of this ring.
 
-    Coefficients that depend on ``times`` become polynomials in time-dependent variables, with coefficients that depend
+    A tower is a polynomial ring over the rationals with function values as variables. If ``times`` are symbols of the
+    time, the coefficients that depend on them are polynomials in time-dependent values, with coefficients that depend
     on parameters only.
     """
     state, dated = _state(tower, coordinates), _state(tower, times)
@@ -84,14 +87,16 @@ def collect(
 
 
 def cells(tower: Tower, elements: Sequence[Poly]) -> int:
-    """Return the number of exponents that `collect` would write for the elements and their derivatives."""
+    """Return the number of exponents that `collect` would write for some elements of a tower and their derivatives."""
     rules = sum(len(rule) for g in tower.generators for rule in g.derivative.values())
     return (sum(map(len, elements)) + rules) * len(tower.names)
 
 
 def exceeds(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], max_monomials: int) -> bool:
-    """Whether the collected elements have more than ``max_monomials`` monomials in total. Much faster than
-    `collect`."""
+    """Whether the collected elements have more than ``max_monomials`` monomials in total.
+
+    The test only counts monomials, and is much faster than `collect`.
+    """
     state, count = _state(tower, coordinates), 0
     if sum(map(len, elements)) <= max_monomials:
         return False
@@ -103,5 +108,5 @@ def exceeds(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], 
 
 
 def _state(tower: Tower, coordinates: Sequence[str]) -> list[int]:
-    """Return the variables of the ring that depend on the coordinates."""
+    """Return the indices of the variables of a tower that depend on the coordinates."""
     return [i for i in range(len(tower.names)) if tower.depends_on(tower.gens[i], coordinates)]

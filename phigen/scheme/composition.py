@@ -1,15 +1,16 @@
-"""Symmetric compositions: a step of high order from steps of a symmetric method of order 2.
+"""Symmetric compositions: a step of high order, composed of steps of a symmetric method of order 2.
 
-Φ_h = φ_{γ_s h} ∘ … ∘ φ_{γ_1 h} with γ_i = γ_{s+1−i}. A composition of Poisson maps is a Poisson map, and one of
-symmetric methods with symmetric coefficients is symmetric. The coefficients are those in E. Hairer, C. Lubich, G.
-Wanner, Geometric Numerical Integration, 2nd ed., section V.3.2, which names their authors.
+A step is Φ_h = φ_{γ_s h} ∘ … ∘ φ_{γ_1 h} with γ_i = γ_{s+1−i}, where φ_h is a step of the method of order 2. A
+composition of Poisson maps is a Poisson map. A composition of symmetric methods with symmetric coefficients γ is
+symmetric. The coefficients are those in E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed.,
+section V.3.2, which names their authors.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-# The first half of each composition; the middle coefficient follows from Σ γ_i = 1.
+# The first half of the fractions γ_i of each composition; the middle fraction follows from Σ γ_i = 1.
 _YOSHIDA_6 = (0.78451361047755726381949763, 0.23557321335935813368479318, -1.17767998417887100694641568)
 _KAHAN_LI_6 = (
     0.39216144400731413927925056,
@@ -37,8 +38,8 @@ _KAHAN_LI_8 = (
     0.29501172360931029887096624,
 )
 
-# M. Sofroniou, G. Spaletta, Derivation of symmetric composition constants for symmetric integrators, Optim. Methods
-# Softw. 20 (2005).
+# The first half of the fractions γ_i of a method of order 10, from M. Sofroniou, G. Spaletta, Derivation of symmetric
+# composition constants for symmetric integrators, Optim. Methods Softw. 20 (2005).
 _SOFRONIOU_SPALETTA_10 = (
     0.078795722521686419263907679337684,
     0.31309610341510852776481247192647,
@@ -73,7 +74,7 @@ def _symmetric(name: str, order: int, half: tuple[float, ...]) -> Composition:
     return Composition(name, order, (*half, 1.0 - 2.0 * sum(half), *reversed(half)))
 
 
-#: All compositions, the recommended one of each order first.
+#: All compositions. The first one of each order is recommended.
 COMPOSITIONS = (
     _symmetric("suzuki", 4, (1 / (4 - 4 ** (1 / 3)),) * 2),
     _symmetric("triple-jump", 4, (1 / (2 - 2 ** (1 / 3)),)),
@@ -86,10 +87,10 @@ COMPOSITIONS = (
 
 
 def find(name: str, order: int) -> Composition | None:
-    """Return the composition of this name (``auto``: the recommended one) and order, or None."""
+    """Return the composition with this name and order, or None; ``auto`` stands for the recommended composition."""
     return next((c for c in COMPOSITIONS if c.order == order and name in ("auto", c.name)), None)
 
 
 def orders(name: str) -> list[int]:
-    """Return the orders of the compositions of this name."""
+    """Return the orders for which there is a composition with this name."""
     return [c.order for c in COMPOSITIONS if name in ("auto", c.name)]

@@ -1,14 +1,17 @@
-"""Symplectic correctors for near-integrable systems, H = A + εB: steps of one flow of each part, conjugated by a map C.
+"""Symplectic correctors for near-integrable systems H = A + εB: a map C such that C φⁿ C⁻¹, with n simple steps φ, is
+more accurate than φⁿ.
 
-With φ = e^{hA/2} e^{hεB} e^{hA/2}, n steps are C φⁿ C⁻¹. To first order in ε, φ is the flow of A + ε f(z) B, where z =
-h ad_A and f(z) = (z/2)/sinh(z/2). C = e^{εhG} with an odd series G = g(z) B changes this to A + ε(f(z) − z g(z)) B. If
-z g(z) = f(z) − 1 up to z^{2k}, the error of order ε begins at εh^{2k+2}; the error ε²h² remains. C is a product of
-flows of A, B, A, B, A over the times c_i, −b_i, −2c_i, b_i, c_i, so that g(z) = Σ 2 b_i sinh(c_i z): for chosen c_i,
-the b_1, …, b_k solve a linear system. A product of exact flows is a Poisson map.
+A step is φ = e^{hA/2} e^{hεB} e^{hA/2}. To first order in ε, φ is the flow of A + ε f(z) B, where z = h ad_A and f(z) =
+(z/2)/sinh(z/2). The map C = e^{εhG}, with an odd series G = g(z) B, changes this to the flow of A + ε(f(z) − z g(z)) B.
+If z g(z) = f(z) − 1 up to z^{2k}, the error of first order in ε begins at εh^{2k+2}; the error ε²h² remains.
 
-The order in which C applies the flows of B adds an error ε²h³. A *balanced* C has each pair with half of b_i, followed
-by the pairs in the reverse order with −c_i and −b_i: the flows of B, at their times along A, are the same in reverse,
-so the logarithm of C is odd in ε. It is for steps without an error ε²h², with B − h²{B, {B, A}}/24 in place of B.
+C is a product of flows of A, B, A, B, A over the times c_i, −b_i, −2c_i, b_i, c_i, one such product for each i = 1, …,
+k. Then g(z) = Σ 2 b_i sinh(c_i z). For chosen c_i, the b_1, …, b_k solve a linear system. C is a Poisson map, as a
+product of exact flows.
+
+This C causes an error ε²h³, by the order in which it applies the flows of B. A *balanced* C avoids this error: it has
+each pair (c_i, b_i) with half of b_i, followed by the pairs (−c_i, −b_i/2) in reverse order, so the logarithm of C is
+odd in ε. The balanced C is used with steps that have B − h²{B, {B, A}}/24 in place of B, and hence no error ε²h².
 
 J. Wisdom, M. Holman, J. Touma, Symplectic correctors, Fields Institute Communications 10 (1996); J. Wisdom, Symplectic
 correctors for canonical heliocentric n-body maps, Astronomical Journal 131 (2006).
@@ -22,18 +25,20 @@ from math import factorial
 
 from phigen.scheme.alternation import Schedule
 
-#: Numbers of the parts of a step: B first, then A.
+#: Numbers of the parts of H = A + εB in the schedule of a step, which applies the flow of B first.
 B, A = 0, 1
 
-#: √(7/40): the spacing of the c_i in other programs; with it results can be compared.
+#: √(7/40): the times c_i of a corrector are multiples of this number. Other programs use it too, so results can be
+#: compared.
 SPACING = Fraction("0.418330013267037773994000")
 
 
 def corrector(order: int, *, balanced: bool = False) -> tuple[Fraction, ...]:
-    """Return the durations of the flows A, B, A, …, A at the end of a run: minus half a flow of A, then C.
+    """Return the durations, in steps, of the flows A, B, A, …, A at the end of a run: the corrector C after minus half
+    a flow of A.
 
-    The flows at the start of the run have the opposite sign and the reverse order. Order 1 has no C. A ``balanced`` C
-    has twice the flows, and no error ε²h³.
+    A run starts with the same flows in reverse order and with the opposite sign. At order 1 there is no C. A
+    ``balanced`` C has twice as many flows, and causes no error ε²h³.
     """
     times, pairs = [-Fraction(1, 2)], _pairs((order - 1) // 2)
     if balanced:
@@ -44,7 +49,10 @@ def corrector(order: int, *, balanced: bool = False) -> tuple[Fraction, ...]:
 
 
 def schedule(end: Sequence[Fraction]) -> Schedule:
-    """Return the schedule of a step, one flow of B and one of A, with the corrector before and after a run of steps."""
+    """Return the schedule of a method with a corrector: a step is one flow of B and one flow of A.
+
+    The flows with the durations ``end``, of the corrector, follow a run of steps; their inverse comes before the run.
+    """
     times = (Fraction(1), Fraction(1), *(-t for t in reversed(end)), *end)
     parts = [B if k % 2 else A for k in range(len(end))]
     first, last = (tuple(zip(parts, range(row, row + len(end)), strict=True)) for row in (2, 2 + len(end)))
@@ -52,7 +60,7 @@ def schedule(end: Sequence[Fraction]) -> Schedule:
 
 
 def _pairs(count: int) -> tuple[tuple[Fraction, Fraction], ...]:
-    """Return the pairs (c_i, b_i) for which g is correct up to z^{2·count − 1}."""
+    """Return the pairs (c_i, b_i) with which z g(z) = f(z) − 1 holds up to z^{2·count}, as in the module's formulas."""
     c = [i * SPACING for i in range(count, 0, -1)]
     f = _kernel_series(count + 1)
     rows = [[2 * x ** (2 * k + 1) / factorial(2 * k + 1) for x in c] for k in range(count)]
@@ -69,7 +77,7 @@ def _kernel_series(count: int) -> list[Fraction]:
 
 
 def _linear_solution(rows: list[list[Fraction]], right: list[Fraction]) -> list[Fraction]:
-    """Return the solution of linear equations, by elimination without pivoting."""
+    """Return the solution of linear equations with the right-hand side ``right``, by elimination without pivoting."""
     work = [[*row, value] for row, value in zip(rows, right, strict=True)]
     for k, pivot in enumerate(work):
         work[k] = [v / pivot[k] for v in pivot]

@@ -1,4 +1,5 @@
-"""Discretisation: the generating function of the full order, or a composition of steps of order 2."""
+"""Discretisation of a system: by the generating function of the requested order, or by a composition of steps of order
+2."""
 
 from __future__ import annotations
 
@@ -22,34 +23,39 @@ from phigen.spec.names import FLOW_COMPOSITIONS
 from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, symbol, total
 from phigen.symbolic.symbols import STEP
 
-#: Largest number of operations in one kernel.
+#: Largest number of operations in one kernel; larger programs are refused.
 MOST_OPERATIONS = limits.OPERATIONS
 
-#: Alternative to a lower order, in the hint of an error about size.
+#: Part of the hint in errors about the size of a program: an alternative to a lower order.
 _ALTERNATIVE = "for scheme: splitting, "
 
-#: Cost of gradient and Hessian below which the direct series is chosen without a comparison: its error is smaller.
+#: Cost of the gradient and the Hessian of S_h, in units of an addition, below which the direct series is chosen without
+#: computing a composition for comparison: the error of the direct series is smaller.
 MIN_COST_TO_COMPOSE = 2_000
 
-#: Largest accepted ratio of the costs of the direct series and of a composition. The direct series has a smaller error
-#: constant.
+#: Largest accepted ratio of the costs of the direct series and of a composition. Up to this ratio the direct series is
+#: chosen, since its error constant is smaller.
 MAX_DIRECT_COST_RATIO = 4
 
-#: Largest number of terms for which the graph form is tried; with more terms, only the collected form is tried.
+#: Largest number of terms S_1, S_2, … for which S_h is also tried as a graph of shared sub-expressions; with more
+#: terms, only collected polynomials are tried.
 MAX_GRAPH_TERMS = 5
 
 
 def formal_alpha(system: System, realisation: BiRealisation, terms: int) -> tuple[Expression, ...]:
-    """Return the map α for S_1 … S_terms; for paths, its series up to the degree that the terms need."""
+    """Return the map α, from which S_1, …, S_terms are computed.
+
+    For steps along paths, α is a series in p up to the degree that these terms need.
+    """
     return tuple(karasev.series(system, terms - 1)) if realisation.path and terms > 1 else realisation.alpha
 
 
 def hamilton_jacobi(
     system: System, realisation: BiRealisation, max_terms: int, static: Sequence[str] = ()
 ) -> HamiltonJacobi:
-    """Return the Hamilton–Jacobi series of a system; its tower also contains the step size and the ``static`` symbols.
+    """Return the Hamilton–Jacobi series of a system, in a ring that is large enough for the terms S_1, …, S_max_terms.
 
-    The tower is large enough for terms up to S_max_terms.
+    The ring also contains the step size and the ``static`` symbols, which are constant during a trajectory.
     """
     return HamiltonJacobi(
         system.hamiltonian,
@@ -65,9 +71,10 @@ def hamilton_jacobi(
 def generating_function(
     system: System, series: HamiltonJacobi, terms: int, monitor: Expression | None = None
 ) -> GeneratingFunction:
-    """Return ∇S_h and Hess S_h in the cheapest form. Raises `LimitError` if every form is too large.
+    """Return ∇S_h and Hess S_h in their cheapest form. Raises `LimitError` if every form is too large.
 
-    With a ``monitor`` the series is that of K, but with forces that of H.
+    With a ``monitor`` g, ``series`` is that of K = g(H + e); if there are also forces, p = τg(∇H + ζ) is returned
+    instead.
     """
     if monitor and system.forces:
         return forced_form(system, monitor, series.static)
@@ -92,7 +99,7 @@ def generating_function(
 
 
 def push(system: System) -> list[Expression]:
-    """Return the terms of p besides ∇S_h: hζ of the forces, and Σ ΔW_k σ_k∇g_k of the noise."""
+    """Return the terms of the covector p in addition to ∇S_h: hζ of the forces, and Σ ΔW_k σ_k∇g_k of the noise."""
     covector = system.forces.covector if system.forces else [ZERO] * system.dimension
     return [symbol(STEP) * z + e for z, e in zip(covector, _noise(system), strict=True)]
 
@@ -107,7 +114,11 @@ def _noise(system: System) -> list[Expression]:
 
 @dataclass(frozen=True)
 class Discretisation:
-    """The number of terms of the series in a stage, the stages of a step, and the generating function of a stage."""
+    """The generating function of a stage with its number of ``terms`` S_i, and the ``fractions`` of the step for its
+    stages.
+
+    ``note`` is a line about the composition for the header of generated files, empty without a composition.
+    """
 
     generating: GeneratingFunction
     terms: int
@@ -125,11 +136,12 @@ def discretise(
     *,
     affordable: bool = False,
 ) -> Discretisation:
-    """Return the direct series, or a composition of the method of order 2.
+    """Return the series of the requested order for the whole step, or a composition of steps of order 2.
 
-    A composition is chosen if the spec asks for one. With ``auto`` it is chosen only if the direct series is beyond the
-    budget, or costs more than `MAX_DIRECT_COST_RATIO` times the stages of the composition, since the direct series has
-    a much smaller error constant. ``affordable`` says that `expect_affordable` has already passed.
+    A composition is used if the spec asks for it. With ``auto`` it is used only if the direct series has too many
+    operations, or costs more than `MAX_DIRECT_COST_RATIO` times all stages of the composition. The direct series may
+    cost more because its error constant is much smaller. ``affordable`` says that `expect_affordable` has already
+    passed.
     """
     if system.noise:
         expect_noise(system, realisation, order, composition)
@@ -137,7 +149,7 @@ def discretise(
         return _forced(system, realisation, series, order, composition, monitor)
     if not affordable:
         expect_affordable(system, realisation)
-    series.reach(order.order)  # S_{k+1} = 0 raises the order of a symmetric method to k + 1; it is proved later
+    series.reach(order.order)  # a symmetric method has order k + 1 as S_{k+1} = 0; the proof needs this term
     if composition not in ("auto", "none"):
         return _composed(system, realisation, series, order, composition)
     can_compose = composition == "auto" and series.symmetric and find("auto", order.order) is not None
@@ -156,7 +168,12 @@ def discretise(
 
 
 def expect_noise(system: System, realisation: BiRealisation, order: Order, composition: str) -> None:
-    """Raise `SpecError` if the noise would be divided among stages, or if its integral would not be Stratonovich's."""
+    """Raise `SpecError` for noise with a composition, with an order above 2 and forces, or without a symmetric
+    bi-realisation.
+
+    The noise of a step cannot be divided among the stages of a composition, some of which go back in time. Without
+    symmetry its integral would not be that of Stratonovich.
+    """
     reason, hint = "", ""
     if not realisation.symmetric:
         reason = f"noise needs a symmetric bi-realisation; {realisation.kind} is not"
@@ -181,7 +198,8 @@ def _forced(
     composition: str,
     monitor: Expression | None,
 ) -> Discretisation:
-    """Return the discretisation with p = h(∇H + ζ), which has order 2 by symmetry; higher orders are compositions."""
+    """Return the discretisation with forces, p = h(∇H + ζ). It has order 2 by symmetry, and higher orders by
+    compositions."""
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
         reason = f"forces: a vector needs a bi-realisation in closed form; {realisation.kind} follows paths"
         place = system.locations.get(("forces", "vector"))
@@ -221,12 +239,13 @@ def _composed(
 
 
 def is_large(system: System) -> bool:
-    """Whether S_1 of a system of this dimension may be too large; then `expect_affordable` counts its terms."""
+    """Whether S_1 = H may need too many operations for a system of this dimension, so that `expect_affordable` must
+    count them."""
     return may_have(system.dimension, MOST_OPERATIONS)
 
 
 def expect_affordable(system: System, realisation: BiRealisation) -> None:
-    """Raise `LimitError` if S_1 = H is too large; no other term is computed before."""
+    """Raise `LimitError` if a step with S_1 = H alone needs too many operations; tested before S_2 is computed."""
     if not is_large(system):
         return
     index = {c: i for i, c in enumerate(system.coordinates)}
@@ -239,7 +258,7 @@ def expect_affordable(system: System, realisation: BiRealisation) -> None:
 def _afforded(
     system: System, realisation: BiRealisation, series: HamiltonJacobi, terms: int, monitor: Expression | None = None
 ) -> GeneratingFunction:
-    """Return the `generating_function`. Raises `LimitError` if the Newton step with it is too large."""
+    """Return the result of `generating_function`. Raises `LimitError` if the matrices of a step are too large."""
     generating = generating_function(system, series, terms, monitor)
     absent = {c for c, slope in zip(system.coordinates, generating.slope, strict=True) if slope.is_zero}
     hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in generating.hessian]
@@ -259,13 +278,13 @@ def _expect_few(
 
 
 def too_large(system: System, reason: str, alternative: str = _ALTERNATIVE) -> LimitError:
-    """Return the error for a program beyond the budget. The hint names a lower order and the ``alternative``."""
+    """Return the error for a program with too many operations. The hint names a lower order and the ``alternative``."""
     hint = f"ask for a lower order, {alternative}or for fewer terms in H"
     return LimitError([Diagnostic(reason, system.locations.get(("order",)), hint)])
 
 
 def expect_few(system: System, kernel: Kernel, other: str = _ALTERNATIVE) -> None:
-    """Raise `LimitError` for a kernel beyond the budget."""
+    """Raise `LimitError` if a kernel has too many operations; ``other`` is the alternative that the hint names."""
     operations = cost(kernel.roots)
     if operations > MOST_OPERATIONS:
         raise too_large(system, f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}", other)

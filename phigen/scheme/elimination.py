@@ -1,8 +1,8 @@
-"""Gaussian elimination without pivoting, unrolled, for matrices of a known pattern of zeros.
+"""Gaussian elimination without pivoting, as straight-line code, for matrices with a known pattern of zeros.
 
-The Newton matrix is I + O(h), so its pivots are near 1; the step checks them and falls back to elimination with
-pivoting. The pivots, all on the diagonal, are ordered by least degree (Markowitz), which preserves the sparsity of
-lattices and trees.
+The Newton matrix is I + O(h), so its pivots are near 1. The step checks them, and falls back to elimination with
+pivoting. The pivots are taken from the diagonal in the order of least degree (Markowitz), so that few zeros are lost;
+this matters for lattices and trees.
 """
 
 from __future__ import annotations
@@ -16,22 +16,23 @@ from phigen.scheme.lowering import COST
 from phigen.symbolic.expression import ZERO, Expression, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: pattern[i][j]: whether entry (i, j) may differ from zero. Diagonal entries always may.
+#: pattern[i][j] says whether entry (i, j) of a matrix may differ from zero. Diagonal entries always may.
 Pattern = Sequence[Sequence[bool]]
 
 
 def pivot_order(pattern: Pattern) -> list[int]:
-    """Return the pivots in order: each has the fewest entries in its row and column, the first one among equals."""
+    """Return the order of the diagonal pivots. The next pivot has the smallest product of row and column length in the
+    remaining matrix; among equals it has the smallest index."""
     return [k for k, _ in _pivots(pattern)]
 
 
 def operations(pattern: Pattern) -> int:
-    """Return the cost, as in `phigen.scheme.lowering`, of `factorise` and `Factors.solved`, without building them."""
+    """Return the cost of `factorise` and `Factors.solved`, in units of an addition, without building any expression."""
     return sum(price for _, price in _pivots(pattern))
 
 
 def _pivots(pattern: Pattern) -> Iterator[tuple[int, int]]:
-    """Yield the pivots in their order, with the cost of each."""
+    """Yield the index of each pivot in the order of elimination, with the cost of eliminating it."""
     n = len(pattern)
     rows = [{j for j in range(n) if pattern[i][j] and j != i} for i in range(n)]
     columns = [{i for i in range(n) if pattern[i][j] and j != i} for j in range(n)]
@@ -40,7 +41,7 @@ def _pivots(pattern: Pattern) -> Iterator[tuple[int, int]]:
         k = min(remaining, key=lambda k: (len(rows[k]) * len(columns[k]), k))
         remaining.remove(k)
         column_length, row_length = len(columns[k]), len(rows[k])
-        fill_in = sum(len(rows[k] - rows[i] - {i}) for i in columns[k])  # a new entry costs a product but no difference
+        fill_in = sum(len(rows[k] - rows[i] - {i}) for i in columns[k])  # an entry that was 0 needs no subtraction
         yield (
             k,
             COST["reciprocal"] + column_length * (1 + 2 * row_length) - fill_in + 2 * (column_length + row_length) + 1,
@@ -53,7 +54,11 @@ def _pivots(pattern: Pattern) -> Iterator[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Factors:
-    """A factorised matrix P L U Pᵀ: pivots in order, multipliers by (row, pivot), entries of U, reciprocal pivots."""
+    """Factors L and U of a matrix P L U Pᵀ with a permutation P.
+
+    ``order`` lists the pivots, ``lower`` the multipliers by (row, pivot), ``upper`` the entries of U above the
+    diagonal, and ``reciprocals`` the reciprocals of the pivots by row.
+    """
 
     order: tuple[int, ...]
     lower: dict[tuple[int, int], Expression]
@@ -66,14 +71,14 @@ class Factors:
         return (*self.reciprocals, *self.lower.values(), *self.upper.values())
 
     def named(self, kind: str) -> Factors:
-        """Return the factors with the `values` replaced by symbols of this kind."""
+        """Return the factors with each of the `values` replaced by a symbol of the kind ``kind``, numbered from 0."""
         names: Iterator[Expression] = (symbol(Symbol(kind, k)) for k in range(len(self.values)))
         reciprocals = tuple(next(names) for _ in self.reciprocals)
         lower = {place: next(names) for place in self.lower}
         return Factors(self.order, lower, {place: next(names) for place in self.upper}, reciprocals)
 
     def solved(self, side: Sequence[Expression]) -> list[Expression]:
-        """Return the solution for the right-hand side ``side``."""
+        """Return the solution of the linear equations with the right-hand side ``side``, as expressions."""
         b, x = list(side), [ZERO] * len(side)
         rows: list[list[tuple[int, Expression]]] = [[] for _ in side]
         for (k, j), e in self.upper.items():
@@ -85,7 +90,8 @@ class Factors:
         return x
 
     def solved_transposed(self, side: Sequence[Expression]) -> list[Expression]:
-        """Return the solution for the right-hand side ``side`` with the transposed matrix, P Uᵀ Lᵀ Pᵀ."""
+        """Return the solution of the equations with the transposed matrix P Uᵀ Lᵀ Pᵀ and the right-hand side ``side``,
+        as expressions."""
         z, columns = list(side), defaultdict[int, list[tuple[int, Expression]]](list)
         for (k, j), e in self.upper.items():
             columns[j].append((k, e))
@@ -97,7 +103,7 @@ class Factors:
 
 
 def factorise(pattern: Pattern) -> Factors:
-    """Return the factors of the matrix with the symbols ``J:i:j`` where the pattern is true."""
+    """Return the factors of a matrix with the symbol ``J:i:j`` at each entry that may be nonzero by the pattern."""
     n = len(pattern)
     a = [[symbol(Symbol("J", i, j)) if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]
     lower: dict[tuple[int, int], Expression] = {}
@@ -118,13 +124,19 @@ def factorise(pattern: Pattern) -> Factors:
 
 
 def elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, ...]]:
-    """Return the solution for the right-hand side with the symbols ``r:i``, and the reciprocal pivots."""
+    """Return the solution of the equations J x = r, and the reciprocals of the pivots.
+
+    J has the symbol ``J:i:j`` where the pattern is true, and the right-hand side has the symbols ``r:i``.
+    """
     factors = factorise(pattern)
     return factors.solved([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
 
 
 def transposed_elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, ...]]:
-    """Return the solution with the transposed matrix, and the reciprocal pivots, which are those of the matrix."""
+    """Return the solution of the equations Jᵀ x = r, and the reciprocals of the pivots, which are those of J.
+
+    J has the symbol ``J:i:j`` where the pattern is true, and the right-hand side has the symbols ``r:i``.
+    """
     factors = factorise(pattern)
     return factors.solved_transposed([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
 

@@ -1,8 +1,8 @@
-"""Operation counts of products of matrices of expressions, before the products are built.
+"""Numbers of operations in products of matrices of expressions, counted without building the products.
 
 The matrix a' = ∂_xα + ∂_pα · Hess S_h makes up nearly all of the step of a large system. Building a node of an
-expression takes some fifty times as long as counting it. Here a node is represented by a number, which is the same for
-equal operations on equal operands.
+expression graph takes some fifty times as long as counting it. For the count, a node is represented by an integer;
+equal operations on equal operands get the same integer, and are counted once.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from phigen.scheme.lowering import cost
 from phigen.symbolic.expression import ZERO, Expression, fold, sparse_derivatives, substitute
 from phigen.symbolic.symbols import momentum
 
-#: Number of rows of a matrix that are counted first; a matrix far beyond the limit is recognised by a few rows.
+#: Number of rows of a matrix that are counted first: a few rows are enough to recognise a matrix far beyond the limit.
 FIRST_ROWS = 8
 
-#: The nonzero entries of a row of a matrix, by column.
+#: The nonzero entries of a matrix row, by the index of the column.
 SparseRow = Mapping[int, Expression]
 
 
 def newton_operations(
     realisation: BiRealisation, absent: Collection[str], hessian: Sequence[SparseRow], limit: int
 ) -> int:
-    """Return the operations of the matrices of a Newton step (`phigen.scheme.step`); ``limit`` + 1 if there are more.
+    """Return the number of operations of the matrices in a Newton step; ``limit`` + 1 if there are more than ``limit``.
 
-    ``absent`` are the coordinates that S_h does not depend on; the corresponding momenta are 0. The count is a lower
-    bound: it omits the computation of the Hessian, which is small if H is a polynomial of low degree. For small
-    systems, whose matrices are always below the limit, the result is 0.
+    ``hessian`` is Hess S_h by rows. ``absent`` are the coordinates that S_h does not depend on; their momenta ∂S_h/∂x_i
+    are 0. The count is a lower bound: it omits the computation of the Hessian, which is small if H is a polynomial of
+    low degree. For small systems, whose matrices never exceed the limit, the result is 0.
     """
     names, momenta = realisation.coordinates, realisation.covector
     if realisation.path or not may_have(len(names), limit):
@@ -43,7 +43,7 @@ def newton_operations(
     count = OperationCount(limit, lambda name: name not in state)
     rows_so_far: list[SparseRow] = []
     try:
-        # the number of rows grows from batch to batch, so few rows of a huge matrix are counted
+        # rows are counted in growing batches, so that for a huge matrix the limit is reached after few rows
         while len(rows_so_far) < len(expressions):
             rows = sparse_derivatives(expressions[len(rows_so_far) : 4 * len(rows_so_far) + FIRST_ROWS], momenta)
             new_rows = [{index[p]: e for p, e in row.items()} for row in rows]
@@ -58,12 +58,14 @@ def newton_operations(
 
 
 def may_have(dimension: int, limit: int) -> bool:
-    """Whether a system of this dimension can have more than ``limit`` operations in the matrices of a step."""
+    """Whether the matrices of a step can have more than ``limit`` operations: a product of full n×n matrices has about
+    2n³."""
     return 4 * dimension**3 > limit
 
 
 def path_operations(system: System, hessian: Sequence[SparseRow], limit: int) -> int:
-    """Return the operations of Hess S_h · π in a step along paths; ``limit`` + 1 if there are more."""
+    """Return the number of operations of the matrix Hess S_h · π in a step along paths; ``limit`` + 1 if there are
+    more."""
     tensor = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in system.poisson]
     count = OperationCount(limit, lambda name: name not in system.coordinates)
     try:
@@ -73,14 +75,14 @@ def path_operations(system: System, hessian: Sequence[SparseRow], limit: int) ->
 
 
 class TooManyError(Exception):
-    """The number of operations exceeds the limit."""
+    """Raised by a count as soon as the number of operations exceeds the limit."""
 
 
 class OperationCount:
-    """Counter of the operations of products of matrices, with sums as in `total_at`.
+    """Counter of the operations in products of matrices; sums are added in pairs, as `total_at` does.
 
-    Expressions in fixed symbols only are not counted, since they are computed once. Raises `TooManyError` as soon as
-    there are more operations than the limit.
+    Sub-expressions that contain only symbols for which ``is_fixed`` is true are not counted, since they are computed
+    once before the steps. Raises `TooManyError` as soon as the number of operations exceeds the limit.
     """
 
     def __init__(self, limit: int, is_fixed: Callable[[str], bool]) -> None:
@@ -90,7 +92,8 @@ class OperationCount:
         self._leaves: dict[int, int] = {}
 
     def matrix(self, left: Sequence[SparseRow], right: Sequence[SparseRow]) -> int:
-        """Return the operations of left · right that are not shared with products counted before."""
+        """Return the number of operations of the product left · right, without those that earlier products already
+        contain."""
         operations_before = self.operations
         self._know([e for row in (*left, *right) for e in row.values()])
         columns = self._different([{j: self._leaves[id(e)] for j, e in row.items()} for row in right])
@@ -111,7 +114,7 @@ class OperationCount:
 
     @staticmethod
     def _different(rows: Sequence[Mapping[int, int]]) -> list[dict[int, int]]:
-        """Return the rows without repeated columns: equal columns lead to equal nodes."""
+        """Return the rows of a matrix without repeated columns, since equal columns lead to the same operations."""
         columns: dict[int, list[tuple[int, int]]] = {}
         for k, row in enumerate(rows):
             for j, leaf in row.items():

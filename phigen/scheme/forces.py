@@ -1,4 +1,4 @@
-"""Header lines of generated files on forces: with forces a step is not a Poisson map."""
+"""Lines about forces in the header of generated files: with forces a step is not a Poisson map."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ from phigen.symbolic.expression import Expression
 
 
 def force_facts(system: System, manner: str) -> Iterator[str]:
-    """Yield the header lines on forces; ``manner`` says how forces enter the step, "" for nothing."""
+    """Yield the header lines on the forces of a system; ``manner`` is the formula by which forces enter the step, or
+    ""."""
     yield from forced_lines(system.forces is not None, system.pushed, manner)
 
 
 def forced_lines(forced: bool, pushed: Sequence[str], manner: str) -> Iterator[str]:
-    """Yield the header lines of a ``forced`` system, whose forces change the Casimirs ``pushed``."""
+    """Yield the header lines on forces, if the system is ``forced``; ``pushed`` names the Casimirs that the forces
+    change."""
     if not forced:
         return
     if manner:
@@ -24,5 +26,5 @@ def forced_lines(forced: bool, pushed: Sequence[str], manner: str) -> Iterator[s
 
 
 def acts(force: Sequence[Expression]) -> bool:
-    """Whether a force differs from 0."""
+    """Whether at least one component of a force is not literally 0."""
     return any(not f.is_zero for f in force)

@@ -1,9 +1,9 @@
-"""Gathering of constant factors, which are then multiplied with one another before the steps.
+"""Factoring out of constant factors, so that they are multiplied with one another once, before the steps.
 
-Every value is written as q·s·c, with a number q, a static factor s (of parameters and the step size) and a core c (of
-the state). A product multiplies the q and the s. A sum of terms with the same s has s as a factor: (h²x²)/4 + (h²y²)/4
-is (h²/4)(x² + y²), with one coefficient and four operations. Numbers are also factored out of sums, and become part of
-the coefficient of the next product.
+Every value is written as q·s·c with a number q, a static factor s, which depends on parameters and the step size, and a
+factor c that depends on the state. For a product, the three factors are multiplied separately. In a sum, a static
+factor that all terms share is factored out: (h²x²)/4 + (h²y²)/4 becomes (h²/4)(x² + y²), with one coefficient and four
+operations. Numbers are factored out of sums too, and join the coefficient of the product that contains the sum.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from phigen.symbolic.expression import ONE, Expression, add, fold, neg, number, 
 
 @dataclass(frozen=True)
 class _Value:
-    """The value q·s·c. The core c is 1 if the value does not depend on the state."""
+    """A value q·s·c: a ``number`` q, a ``static`` factor s, and a ``core`` c, which is 1 if the value is independent of
+    the state."""
 
     number: Fraction
     static: Expression
@@ -31,7 +32,7 @@ def _sum(a: Expression, ratio: Fraction, b: Expression) -> Expression:
 
 
 def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with gathered static factors, each replaced by a coefficient."""
+    """Return the roots with static factors collected, each of which is replaced by one coefficient of the table."""
 
     def product(v: _Value) -> Expression:
         if v.static is ONE and v.number in (1, -1):
@@ -63,6 +64,9 @@ def gather(coefficients: Coefficients, roots: Sequence[Expression]) -> list[Expr
 
 
 def staged(increment: Sequence[Expression], coefficients: Coefficients) -> list[Expression]:
-    """Return the increments with coefficients for state-independent values: gathered or not, whichever is cheaper."""
+    """Return the increments with coefficients in place of state-independent values.
+
+    Of two forms the cheaper one is returned: with static factors collected by `gather`, or left as they are.
+    """
     hoisted, gathered = (cost(way(coefficients.empty(), increment)) for way in (Coefficients.hoist, gather))
     return gather(coefficients, increment) if gathered < hoisted else coefficients.hoist(increment)

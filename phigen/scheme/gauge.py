@@ -1,9 +1,10 @@
-"""The Casimir gauge: H and H − Σ λ_c C_c have the same flow, but different discretisations.
+"""The Casimir gauge: multiples of Casimirs that are subtracted from H before a step is derived.
 
-Casimirs subtracted from H before discretising change S_h and hence the error constant. The leading local error of a
-symmetric method is h³ π∇S_3 at order 2, and |π∇S_3| is a good guide for higher orders. With ``auto``, the solver
-chooses λ at the start of each trajectory: it minimises |π∇S_3| along a short piece of the trajectory. For each fixed λ
-the step is an exact Poisson map; trajectories with different λ use different maps.
+H and H − Σ λ_c C_c have the same flow, but different generating functions S_h, and hence steps with different errors.
+The leading local error of a symmetric method of order 2 is h³ π∇S_3, and |π∇S_3| is a good guide for higher orders.
+With the setting ``auto``, the solver chooses the λ_c at the start of each trajectory such that |π∇S_3| is smallest
+along a short piece of the trajectory. For fixed λ the step is an exact Poisson map; trajectories with different λ use
+different maps.
 """
 
 from __future__ import annotations
@@ -23,25 +24,28 @@ from phigen.symbolic.expression import ONE, Expression, gradient, symbol, symbol
 from phigen.symbolic.symbols import GAUGE, LEVEL, Symbol
 from phigen.symbolic.tower import Tower
 
-#: Largest accepted ratio of the numbers of terms with a gauge and without; above it the gauge costs more than it gains.
+#: Largest accepted ratio of the numbers of terms of S_1 … S_3 with a multiple λ and without; above it the additional
+#: terms cost more than the smaller error gains.
 MAX_TERM_RATIO = 1.3
 
-#: Index of the S_i that determines the error term which the gauge minimises.
+#: Index i of the term S_i of the generating function whose error h^i π∇S_i the gauge makes small.
 GUIDE = 3
 
-#: Largest number of operations of π∇S_3, by `guide_operations`, with which a gauge is searched for. The search
-#: evaluates π∇S_3 at 32 states for 7 values of λ, up to four times for each λ: some ten million operations, a hundredth
-#: of a second, at the start of each trajectory. The systems of the corpus need at most 2,600.
+#: Largest number of operations of π∇S_3, as estimated by `guide_operations`, for which the solver searches a gauge. The
+#: search evaluates π∇S_3 at 32 states for 7 values of λ, up to four times for each λ. At this limit it takes some ten
+#: million operations, a hundredth of a second, at the start of each trajectory. The systems of the corpus need at most
+#: 2,600 operations.
 MOST_GUIDE_OPERATIONS = 10_000
 
 
 @dataclass(frozen=True)
 class Gauge:
-    """The Casimirs ``free``, whose multiples λ the solver chooses, and those ``fixed``, which have multiples in the
-    spec.
+    """The Casimirs that are subtracted from H: ``free`` ones, whose multiples λ the solver chooses for each trajectory,
+    and ``fixed`` ones with their multiples from the spec.
 
-    A ``monitor`` g replaces H by K = g(H + e) before the subtraction (`phigen.scheme.monitor`); then no λ is free.
-    ``omitted`` maps Casimirs that are not free to the reason: choosing their λ would cost more than it gains.
+    With a ``monitor`` g, they are subtracted from K = g(H + e) instead (`phigen.scheme.monitor`), and no λ is free.
+    ``omitted`` maps the name of a Casimir to the reason why ``auto`` leaves it out: the search for its λ would be too
+    long.
     """
 
     free: tuple[str, ...] = ()
@@ -51,7 +55,8 @@ class Gauge:
 
     @property
     def symbols(self) -> tuple[str, ...]:
-        """The symbols with a constant value for each trajectory: the free λ, or e."""
+        """The symbols of the values that are constant on a trajectory: the free λ or, with a monitor, the energy level
+        e."""
         return (LEVEL,) if self.monitor else self.multiples
 
     @property
@@ -61,7 +66,8 @@ class Gauge:
 
     @property
     def inputs(self) -> dict[str, tuple[str, ...]]:
-        """The argument of kernels that holds the symbols, by name; empty if there are none."""
+        """The kernel argument ``gauge`` with the symbols that are constant on a trajectory; empty if there are no such
+        symbols."""
         return {"gauge": self.symbols} if self.symbols else {}
 
     @property
@@ -73,7 +79,7 @@ class Gauge:
 
     @property
     def notes(self) -> list[str]:
-        """A line for each reason why the automatic gauge omits Casimirs."""
+        """The lines about Casimirs that the automatic gauge leaves out, one line for each reason."""
         names: dict[str, list[str]] = {}
         for name, reason in self.omitted.items():
             names.setdefault(reason, []).append(name)
@@ -89,14 +95,15 @@ class Gauge:
         return self.monitor * (hamiltonian + symbol(LEVEL)) if self.monitor else hamiltonian
 
     def pace(self, system: System) -> Expression:
-        """Return the factor of ∇H + ζ in the discretised system: g if there are both a monitor and forces, else 1."""
+        """Return the factor of ∇H + ζ in the system that is discretised: g if there are a monitor g and forces, else
+        1."""
         return self.monitor if self.monitor and system.forces else ONE
 
     def applied(self, system: System) -> System:
-        """Return the system that is discretised, with H − Σ λ_c C_c or K − Σ λ_c C_c in place of H.
+        """Return the system that is discretised: H is replaced by H − Σ λ_c C_c or, with a monitor, by K − Σ λ_c C_c.
 
-        With a monitor and forces, H remains: p = τg(∇H + ζ) is derived from H, and the impulse of a vector force f is
-        τgf.
+        With a monitor g and forces, H remains, and the vector force f is replaced by gf; later p = τg(∇H + ζ) is
+        derived from H.
         """
         if self.monitor and system.forces:
             vector = tuple(self.monitor * f for f in system.forces.vector)
@@ -110,7 +117,7 @@ class Gauge:
 
 @dataclass(frozen=True)
 class Gauged:
-    """The system that is discretised, with Casimirs subtracted from H, and its Hamilton–Jacobi series."""
+    """The system that is discretised, with Casimirs subtracted from H, together with its Hamilton–Jacobi series."""
 
     gauge: Gauge
     system: System
@@ -123,11 +130,12 @@ def choose(
     setting: str | Mapping[str, Expression],
     monitor: Expression | None = None,
 ) -> Gauged:
-    """Return the system in the gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
+    """Return the system in the gauge that the spec asks for: ``none``, ``auto``, or expressions for the multiples of
+    some Casimirs.
 
-    ``auto`` frees the λ of a Casimir under three conditions: S_3 depends on λ, which is never so for log-canonical
-    structures; S_3 has hardly more terms with λ, which is not so for tops; π∇S_3 is cheap enough for a search. No λ is
-    free if H depends on the time, or with forces, noise or a monitor.
+    With ``auto`` the multiple λ of a Casimir is free if three conditions hold. S_3 depends on λ; for log-canonical π it
+    never does. S_3 has hardly more terms with λ than without; for tops it has many more. π∇S_3 is cheap enough for a
+    search. No λ is free if H depends on the time, or if there are forces, noise or a monitor.
     """
     if not isinstance(setting, str):
         return _gauged(system, realisation, replace(fixed_gauge(system, setting), monitor=monitor))
@@ -147,7 +155,7 @@ def choose(
 
 
 def unaffordable(system: System) -> str:
-    """Return the reason why λ in this H is not searched for; "" if the search is cheap enough."""
+    """Return the reason why the solver does not search the multiple λ in H − λC; "" if the search is cheap enough."""
     try:
         operations = guide_operations(system)
     except OverflowError as error:
@@ -161,11 +169,11 @@ def unaffordable(system: System) -> str:
 
 
 def guide_operations(system: System) -> int:
-    """Return an estimate of the operations of π∇S_3, from H and π, before S_3 is computed.
+    """Return an estimate of the number of operations of π∇S_3, computed from H and π without S_3.
 
     Up to factors, S_3 is the sum of ∂_i∂_jH v_i v_j with v = π∇H. The estimate is the number of products of monomials
-    in this sum. For sums of thousands of products, 0.6 to 1 times the estimate was measured. Raises `OverflowError` if
-    H or its derivatives are too large to be counted.
+    in this sum. For sums of thousands of products, the true number was measured to be 0.6 to 1 times the estimate.
+    Raises `OverflowError` if H or its derivatives are too large to be counted.
     """
     h, tensor = system.hamiltonian, system.poisson
     entries = [e for row in tensor for e in row if not e.is_zero]
@@ -186,7 +194,7 @@ def guide_operations(system: System) -> int:
 
 @contextmanager
 def fixed_gauge_named(gauge: Gauge, system: System) -> Iterator[None]:
-    """Return a context in which errors about the size of the program name the gauge of the spec."""
+    """Context in which an error about the size of the program also names the gauge of the spec as a possible cause."""
     try:
         yield
     except (LimitError, OverflowError) as error:
@@ -208,7 +216,8 @@ def _gauged(system: System, realisation: BiRealisation, gauge: Gauge) -> Gauged:
 
 
 def fixed_gauge(system: System, values: Mapping[str, Expression]) -> Gauge:
-    """Return the gauge with these multiples of Casimirs. Raises `SpecError` for names that are not Casimirs."""
+    """Return the gauge with the multiples ``values``, by name of the Casimir. Raises `SpecError` for a name that is no
+    Casimir."""
     for name in values:
         if name not in system.casimirs:
             casimir_names = ", ".join(system.casimirs) or "none"
@@ -223,7 +232,7 @@ def _worthwhile(ungauged: Gauged, gauged: Gauged, name: str) -> bool:
     try:
         limit = MAX_TERM_RATIO * _state_terms(ungauged.series.polynomial(GUIDE), ungauged.system)
         if _state_terms(_first_term(gauged), ungauged.system) > limit:
-            return False  # decided without the series, which is slow for a long Casimir
+            return False  # too many terms in S_1 already; S_3 of a long Casimir would take long
         polynomial = gauged.series.polynomial(GUIDE)
     except OverflowError:
         return False
@@ -233,22 +242,27 @@ def _worthwhile(ungauged: Gauged, gauged: Gauged, name: str) -> bool:
 
 
 def _first_term(gauged: Gauged) -> PolynomialSeries:
-    """Return S_1 = H in a separate ring."""
+    """Return S_1 = H − Σ λ_c C_c as a polynomial in a ring of its own, without computing further terms of the
+    series."""
     h = gauged.system.hamiltonian
     tower = Tower(symbols_of(h), [h])
     return PolynomialSeries(tower, (tower.convert(h),))
 
 
 def _state_terms(series: PolynomialSeries, system: System) -> int:
-    """Return the number of monomials in the coordinates in all terms together."""
+    """Return the number of different monomials in variables that depend on the state, over all terms S_1, S_2, … of a
+    series."""
     tower = series.tower
     state = [i for i in range(len(tower.names)) if tower.depends_on(tower.gens[i], system.coordinates)]
     return len({tuple(int(m[i]) for i in state) for s in series.terms for m in s.to_dict()})
 
 
 def free_gauge(system: System, gauged: Gauged) -> FreeGauge | None:
-    """Return the kernels for the choice of λ: the error π∇S_3, and the products of ∇H and ∇C, which set the scale of
-    λ."""
+    """Return the kernels with which the solver chooses the multiples λ; None if no λ is free.
+
+    One kernel computes the error vector π∇S_3. The other computes the scalar products of ∇H and the ∇C, which set the
+    scale of λ in the search.
+    """
     gauge = gauged.gauge
     if not gauge.free:
         return None

@@ -1,4 +1,4 @@
-"""Programs that step by Gauss collocation."""
+"""Programs of solvers that step by Gauss collocation."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ from phigen.symbolic.symbols import STEP
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
-#: Largest number of sweeps in the solve of a step, after which the step fails; the spec may set another number.
+#: Default for the largest number of fixed-point sweeps over the stages in a step; if more are needed, the step fails.
 MAX_SWEEPS = 100
 
-#: Hint for systems without a known exact Poisson map.
+#: Hint in the error for a bracket for which phigen knows no Gauss method that is exactly a Poisson map.
 TRUNCATION_HINT = (
     "structure: to truncation applies to every bracket, but its steps are not Poisson maps; those of scheme: series are"
 )
 
 
 def expect_offered(spec: Spec) -> None:
-    """Raise `SpecError` for options that Gauss methods do not have."""
+    """Raise `SpecError` for the options of a spec that Gauss methods do not offer."""
     diagnostics = [spec.diagnostic(path, f"scheme gauss: {message}", hint) for path, message, hint in _refused(spec)]
     if diagnostics:
         raise SpecError(diagnostics)
 
 
 def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
-    """Yield the options of a spec that Gauss methods do not have, as a path of keys, a message and a hint."""
+    """Yield each option of a spec that Gauss methods do not offer, as the path of its key, a message and a hint."""
     extras, series = spec.extras, "scheme: series has it"
     if spec.lattice:
         yield ("lattice",), "not for lattices", "scheme: auto, splitting or series"
@@ -65,7 +65,8 @@ def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
 
 
 def plan_gauss(spec: Spec) -> Order:
-    """Return the order of the method with its number of stages. Raises `SpecError` for orders that it does not have."""
+    """Return the order of the Gauss method and its number of stages. Raises `SpecError` for an order that is too
+    high."""
     order = spec.wanted_order
     if order > 2 * MOST_STAGES:
         hint = f"order: {2 * MOST_STAGES}"
@@ -75,9 +76,11 @@ def plan_gauss(spec: Spec) -> Order:
 
 
 def realise_gauss(spec: Spec, system: System) -> Realisation:
-    """Return the realisation of the coordinates.
+    """Return the variables in which Gauss steps are made: the coordinates, logarithms of coordinates, or group
+    elements.
 
-    Raises `SpecError` for `structure: exact` if no exact Poisson map is known.
+    With ``structure: exact``, a step in these variables is exactly a Poisson map. Raises `SpecError` if phigen knows no
+    such variables, or if a vector force acts on coordinates with group elements or logarithms.
     """
     if spec.structure == "to truncation":
         return direct(system)
@@ -95,7 +98,8 @@ def realise_gauss(spec: Spec, system: System) -> Realisation:
 
 
 def _other_coordinates(system: System) -> str:
-    """Return the hint that linear combinations of the coordinates may have an exact Poisson map; empty for others."""
+    """Return the beginning of a hint: linear combinations of the coordinates may have an exact Poisson map. Returns ""
+    if this is unlikely by the form of π."""
     if isinstance(system.shape, LiePoisson | Affine):
         return "a basis with fewer structure constants, as those of lie_algebra, may have one; otherwise "
     entries = [entry for row in system.poisson for entry in row]
@@ -112,7 +116,8 @@ def _is_pushed(system: System, i: int) -> bool:
 def build_gauss(
     system: System, gauge: Gauge, realisation: Realisation, order: Order, spec: Spec, group: Group | None = None
 ) -> Program:
-    """Return the solver as a program, with the Casimirs of the gauge subtracted from H. Raises `LimitError`."""
+    """Return the program of a Gauss method for H without the Casimirs of the ``gauge``. Raises `LimitError` if it is
+    too large."""
     discretised = gauge.applied(system)
     points = stage_map(discretised, realisation, gauge.pace(system))
     coefficients = Coefficients((*system.parameter_names, *gauge.symbols))
@@ -179,7 +184,11 @@ def build_gauss(
 
 
 def _lifted(points: StageMap, coefficients: Coefficients) -> tuple[Kernel, Kernel, Lift] | None:
-    """Return the vector field, the change and the frames of steps from F, or None if group elements have no frames."""
+    """Return the kernels of steps in moving frames: the vector field, the change of the coordinates, and the frames.
+
+    A frame is a quaternion F with y = F* k F, where y are three coordinates. The group element of a step then starts at
+    F instead of 1. Returns None if the group elements have no such frames.
+    """
     realisation = points.realisation.lifted
     if realisation is None:
         return None
@@ -200,7 +209,8 @@ def _lifted_step(step: Gauss, lifted: tuple[Kernel, Kernel, Lift], coefficients:
 
 
 def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -> Monitor | None:
-    """Return the physical time of a monitored solver as a record; None without a monitor."""
+    """Return the record of a monitored solver, with the kernels of dt/dτ and of the physical time; None without a
+    monitor."""
     if gauge.monitor is None:
         return None
     level = level_adjoint(system) if spec.extras.adjoint else None
@@ -208,7 +218,8 @@ def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -
 
 
 def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
-    """Return the kernel with the full table of coefficients as input."""
+    """Return the kernel with the whole table of coefficients as its input, instead of the part that existed when it was
+    built."""
     return Kernel(
         kernel.name, kernel.purpose, {**kernel.inputs, "coef": coefficients.slots}, kernel.outputs, kernel.named
     )
@@ -219,7 +230,11 @@ def _with_all_coefficients(reduced: ReducedSweeps, coefficients: Coefficients) -
 
 
 def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
-    """Return the Jacobians of a stage, with respect to the coordinates (without the time) and to the unknowns."""
+    """Return the Jacobians of the vector field of a stage and of the change of the coordinates.
+
+    The derivatives are with respect to the coordinates at the start of the step, without the time, and to the unknowns
+    of the stage.
+    """
     names = (*points.system.coordinates, *points.unknowns)
     kernels = []
     for values, name, subject in (
@@ -235,7 +250,7 @@ def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
 
 
 def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge, step: Gauss) -> Iterator[str]:
-    """Yield the lines about a Gauss method in the header of generated files."""
+    """Yield the lines on a Gauss method for the header of generated files; some may be empty."""
     stages = order.terms
     yield f"scheme: Gauss collocation, {stages} stage{'s' * (stages > 1)}"
     if not realisation.exact:

@@ -1,8 +1,9 @@
-"""Multiples of Casimirs that reduce the velocities of group elements, so that fixed-point sweeps converge faster.
+"""Multiples λ of Casimirs that make the group elements of a Gauss step slower, so that its fixed-point sweeps converge
+faster.
 
-H and H − Σ λ_c C_c have the same flow of the coordinates, but the group element G has the velocity ∇H or ∇H − Σ λ_c
-∇C_c. The second derivatives of a quadratic H and of quadratic Casimirs are constant; the λ_c minimise the norm of the
-second derivatives of the difference.
+H and H − Σ λ_c C_c have the same flow in the coordinates. But the group element G moves with the velocity ∇H in the
+first case and ∇H − Σ λ_c ∇C_c in the second. For quadratic H and C_c the second derivatives are constant. The λ_c are
+chosen such that the matrix of second derivatives of H − Σ λ_c C_c has the least norm.
 """
 
 from __future__ import annotations
@@ -15,12 +16,16 @@ from phigen.geometry.system import System
 from phigen.scheme.gauge import Gauge
 from phigen.symbolic.expression import ZERO, Expression, as_expression, gradient, number, symbols_of, total
 
-#: Multiples are rounded to fractions with at most this denominator, far more precise than a flat optimum needs.
+#: The multiples λ are rounded to fractions with at most this denominator. The norm that they minimise is flat near its
+#: minimum, so even a much coarser rounding would be sufficient.
 LARGEST_DENOMINATOR = 1000
 
 
 def slowest(system: System, realisation: Realisation) -> Gauge:
-    """Return the gauge of the quadratic Casimirs; no gauge if the second derivatives of H are not constant."""
+    """Return the gauge with the multiples of quadratic Casimirs for which the group elements of a step are slowest.
+
+    The gauge is empty if the second derivatives of H are not constant.
+    """
     indices = [i for group in realisation.groups for i in group.indices]
     names = [system.coordinates[i] for i in indices]
     if not names or not realisation.exact or system.driven:
@@ -39,9 +44,9 @@ def _hessian(e: Expression, names: Sequence[str]) -> list[Expression]:
 
 
 def _projected(vector: Sequence[Expression], basis: Sequence[Sequence[Fraction]]) -> list[Expression]:
-    """Return the coefficients, in a basis, of the projection of a vector onto the span of the basis."""
+    """Return the coefficients, in a basis, of the orthogonal projection of a vector onto the span of the basis."""
     orthogonal: list[list[Fraction]] = []
-    transform: list[list[Fraction]] = []  # coefficients of the orthogonal vectors in terms of the basis
+    transform: list[list[Fraction]] = []  # row k: orthogonal vector k as a combination of the basis
     for k, b in enumerate(basis):
         residual, row = list(b), [Fraction(int(i == k)) for i in range(len(basis))]
         for o, t in zip(orthogonal, transform, strict=True):

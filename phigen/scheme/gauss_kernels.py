@@ -1,4 +1,4 @@
-"""Kernels of a Gauss step: the vector field of a stage, the increment of x, and the change of frame."""
+"""Kernels of a Gauss step: the vector field of a stage, the increment of the coordinates, and the change of frame."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import Expression, fold, raw, substitute, symbol
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: Kinds of symbols: of derivatives that are transformed to a new frame, and of velocities in Lie algebras.
+#: Kinds of symbols: for derivatives of the unknowns that are transformed to the frame of the next step, and for
+#: velocities in Lie algebras.
 SLOPE, VELOCITY = "k", "velocity"
 
-#: The symbol of h b_j, the weight of a stage.
+#: The symbol of the weight of stage j: the step size h times the weight b_j of the quadrature.
 WEIGHT = Symbol("w")
 
 
 def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the vector field of the unknowns at a stage, times the weight h b_j of the stage."""
+    """Return the kernel of the derivatives of the unknowns at a stage j, times the weight h b_j of the stage."""
     forms = [_field(points, coefficients, collected=collected) for collected in (False, True)]
     values = min(forms, key=lambda form: operation_counts(form)["multiplications"])
     return Kernel(
@@ -44,7 +45,7 @@ def _field(points: StageMap, coefficients: Coefficients, *, collected: bool) -> 
 
 
 def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with the velocities substituted, without moving numerical factors into the products."""
+    """Return the roots with the symbols of velocities replaced by the ``velocities``; products are not rearranged."""
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op == "symbol" and kind_of(e.value) == VELOCITY:
@@ -56,7 +57,10 @@ def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> 
 
 
 def _with_scaled_weights(roots: Sequence[Expression]) -> list[Expression]:
-    """Return roots with (c·w)·e in place of c·(w·e): compilers then compute c·w once for all sweeps of a step."""
+    """Return the roots with (c·w)·e in place of c·(w·e), where w is the weight of a stage and c a number.
+
+    A compiler then computes c·w once for all sweeps of a step.
+    """
     weight = symbol(WEIGHT)
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
@@ -68,7 +72,8 @@ def _with_scaled_weights(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def elapsed_kernel(points: StageMap, monitor: Expression, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the time that passes at a stage: the weight times dt/dτ."""
+    """Return the kernel of the contribution of a stage to the physical time of a step: its weight times dt/dτ at the
+    stage."""
     (rate,) = coefficients.hoist(substitute([monitor], at_unknowns(points)))
     return Kernel(
         "elapsed",
@@ -79,7 +84,7 @@ def elapsed_kernel(points: StageMap, monitor: Expression, coefficients: Coeffici
 
 
 def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the increment of the coordinates in a step."""
+    """Return the kernel of the increment of the coordinates in a step, from the unknowns at its end."""
     return Kernel(
         "stage_change",
         "the change of the coordinates from x, by the unknowns",
@@ -89,7 +94,11 @@ def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
 
 
 def lift_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the functionals y of copies of the quaternions, of which the frames F are lifts."""
+    """Return the kernel of the vectors y for which quaternions F with y = F* k F are computed at the start of a step.
+
+    These F are the frames of a step; there is one F for each copy of the quaternions in the algebra of the group
+    elements.
+    """
     return Kernel(
         "functionals",
         "y = F* k F for the frame F of each group element at the start of a step",
@@ -99,10 +108,11 @@ def lift_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
 
 
 def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
-    """Return the kernel of the derivatives of group elements in the frame of the next step: G* = G⁻¹ times the
-    derivatives.
+    """Return the kernel that transforms derivatives of group elements to the frame of the next step; None if no frame
+    changes.
 
-    None without group elements.
+    The group element of each step starts at 1. So derivatives from a step that ends at G are multiplied by G* = G⁻¹, to
+    predict the stages of the next step.
     """
     if all(group.copies for group in points.realisation.groups):
         return None

@@ -1,13 +1,14 @@
-"""Elimination of unknowns whose derivatives are linear in others, as those of positions are for q̇ = M⁻¹p.
+"""Gauss sweeps over a part of the unknowns, when the other unknowns follow from it by linear equations.
 
-If ḟ = r₀ + Σ_k c_k z_k with constant c_k, the stages and the end of f follow from the stage increments L of the z_k:
-Z_f = h (τ_i r₀ + Σ_k c_k Σ_j ν_ij L_k,j), f' = f + h (r₀ + Σ_k c_k Σ_j (1 − τ_j) L_k,j). Here τ are the nodes, A is the
-matrix of the method, and ν = Aμ.
+An example is q̇ = M⁻¹p with ṗ = −∇V(q): the sweeps iterate p alone. In general a *follower* f has ḟ = r₀ + Σ_k c_k z_k
+with constant c_k, and all other unknowns z depend on followers only. Let τ_i be the nodes of the method, A its matrix,
+ν = Aμ, and L_j the increment of stage j. Then the offset of f at stage i, and f' at the end of the step, are
 
-If all other unknowns depend on such f only, as momenta depend on positions, sweeps iterate these other unknowns alone;
-one such sweep contracts as much as two sweeps over all unknowns. If ν_ij − ν_ji = τ_i − τ_j, and brackets of two f or
-of two other unknowns are 0, the step is symplectic, as Suris showed. Unknowns that no other unknown depends on, such as
-quadratures, are computed after the last sweep.
+    Z_f = h (τ_i r₀ + Σ_k c_k Σ_j ν_ij L_k,j),    f' = f + h (r₀ + Σ_k c_k Σ_j (1 − τ_j) L_k,j).
+
+One sweep over the z contracts as much as two sweeps over all unknowns. If ν_ij − ν_ji = τ_i − τ_j, and all brackets
+between two followers or between two z are 0, the step is symplectic, as Suris showed. Unknowns on which no other
+unknown depends, such as quadratures, are computed after the last sweep.
 """
 
 from __future__ import annotations
@@ -22,15 +23,21 @@ from phigen.scheme.steps import ReducedSweeps
 from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, substitute, symbol, symbols_of, total
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: Kind of the symbols of the inputs of reduced sweeps: integrals of the increments of unknowns.
+#: Kind of the symbols for the sums Σ_j ν_ij L_j at a stage: integrals of the stage increments, which reduced sweeps
+#: read.
 READ = "u"
 
-#: Symbols of the time of a stage since the start of the step, in steps, and of the step.
+#: Symbols of the time of a stage since the start of the step, as a fraction of the step, and of the step size.
 TIME, LENGTH = Symbol("stage_time"), Symbol("stage_step")
 
 
 def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweeps | None:
-    """Return sweeps over some of the unknowns; None if these depend on unknowns that are not followers."""
+    """Return the kernels of sweeps over a part of the unknowns, from which all other unknowns follow by linear
+    equations.
+
+    Returns None if the unknowns cannot be divided in this way, if an exact step would not be symplectic, or if some
+    unknowns are group elements or logarithms.
+    """
     if points.realisation.groups or points.realisation.logarithms:
         return None
     rates = vector_field(points, at_unknowns(points))
@@ -67,9 +74,10 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
 
 
 def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequence[int]) -> bool:
-    """Whether iterated unknowns and followers are conjugate.
+    """Whether the iterated unknowns and the followers are two commuting sets that together make up all unknowns but the
+    time.
 
-    Together they must be all unknowns except the time, and only brackets between the two sets may be nonzero.
+    Then only brackets between one set and the other are nonzero, as for momenta and positions.
     """
     places = [{points.moved[k] for k in group if k < len(points.moved)} for group in (iterated, followers)]
     index_pairs = ((i, j) for group in places for i in group for j in group)
@@ -78,7 +86,11 @@ def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequenc
 
 
 def _required_unknowns(reads: Sequence[set[int]]) -> list[int]:
-    """Return the unknowns that others depend on, directly or indirectly, and those that depend on themselves."""
+    """Return the unknowns that must be known in the sweeps: those that lie on a cycle of dependences, or on which these
+    depend.
+
+    ``reads[k]`` has the unknowns on which the derivative of unknown k depends.
+    """
     required = set(range(len(reads)))
     while True:
         read_unknowns = {k for i in required for k in reads[i]}
@@ -88,7 +100,10 @@ def _required_unknowns(reads: Sequence[set[int]]) -> list[int]:
 
 
 def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
-    """Return a set of linear unknowns, none of which depends on itself or on another one of the set."""
+    """Return unknowns from ``linear`` none of whose derivatives depends on an unknown that is itself returned.
+
+    ``reads[k]`` has the unknowns on which the derivative of unknown k depends.
+    """
     followers: list[int] = []
     for k in linear:
         candidates = {*followers, k}
@@ -98,11 +113,12 @@ def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
 
 
 def _followed(rate: Expression, row: Mapping[str, Expression], integrals: Mapping[str, Expression]) -> Expression:
-    """Return the increment of a follower up to a stage, from the increments ``integrals`` of the other unknowns.
+    """Return the offset of a follower at a stage: its linear equation integrated from the start of the step.
 
-    At zero offsets a follower has the constant ``rate``; ``row`` has its derivatives with respect to other unknowns.
+    ``rate`` is the right-hand side of the equation, ``row`` has its derivatives with respect to the other unknowns, and
+    ``integrals`` the integrals of the increments of these unknowns up to the stage.
     """
     (start,) = substitute([rate], {z: ZERO for z in symbols_of(rate) if kind_of(z) == OFFSET})
     terms = [symbol(TIME) * start, *(slope * integrals[z] for z, slope in row.items())]
-    # the times of stages are exact, their products with the step are not
+    # multiplied by the step size last: the times of stages are exact numbers, their products with it are rounded
     return symbol(LENGTH) * total(terms)

@@ -1,9 +1,10 @@
-"""The generating function S_h = Σ h^i S_i as code: gradient and Hessian in the cheapest form.
+"""The generating function S_h = Σ h^i S_i as formulas: its gradient and Hessian in the cheapest form.
 
 Two forms are compared by their operation counts. *Collected*: S_h is one polynomial in coordinates and function values,
-whose coefficients depend on parameters and h only. ``prepare`` combines all orders into one set of numbers, and each
-derivative is a nested Horner form. *Graph*: the recursion is not expanded, and is differentiated as a graph. In low
-dimension collected polynomials are much cheaper; in high dimension their expansion is too large.
+with coefficients that depend on parameters and h only. ``prepare`` computes these coefficients once, for all orders in
+h together. Each derivative is evaluated in nested Horner form. *Graph*: the recursion for the S_i is not expanded, but
+differentiated as a graph of shared sub-expressions. In low dimension the collected form is much cheaper; in high
+dimension its expansion is too large.
 """
 
 from __future__ import annotations
@@ -25,11 +26,12 @@ from phigen.symbolic.symbols import LEVEL, STEP
 
 @dataclass(frozen=True)
 class GeneratingFunction:
-    """∇S_h (``slope``) and Hess S_h (``hessian``, full n×n) as expressions; ``form`` names the form in which they are
-    written.
+    """The generating function of a step as expressions: ``slope`` is ∇S_h and ``hessian`` the full n×n matrix Hess S_h.
 
-    ``coefficients`` is the table of their symbols ``c:k``, including coefficients that are renewed in every step. For a
-    monitored system, ``elapsed`` is ∂S_h/∂e, the time that a step takes. With forces, ``free`` is p without the forces.
+    ``form`` names the form in which they are written, and ``terms`` is the number of terms of a polynomial.
+    ``coefficients`` is the table of the symbols ``c:k`` in the expressions, including coefficients that are computed
+    anew in every step. For a monitored system ``elapsed`` is ∂S_h/∂e, the time that a step takes. With forces,
+    ``slope`` includes hζ, and ``free`` is the same covector without the forces.
     """
 
     slope: tuple[Expression, ...]
@@ -42,19 +44,24 @@ class GeneratingFunction:
 
     @property
     def turning(self) -> tuple[Expression, ...]:
-        """The covector that rotates a body: p without the forces, which change only the momentum of the body."""
+        """The covector p that rotates a body in a step: without the forces, which act on the momentum of the body
+        only."""
         return self.free or self.slope
 
     def pushed(self, push: Sequence[Expression], coordinates: Sequence[str]) -> GeneratingFunction:
-        """Return the function with p = ∇S_h + ``push``, a covector field; the Hessian is then not symmetric in
-        general."""
+        """Return the function with p = ∇S_h + ``push`` in place of ∇S_h, and with the derivatives of p in place of the
+        Hessian.
+
+        The covector field ``push`` is no gradient in general, so the matrix is not symmetric.
+        """
         columns = [derivatives(push, c) for c in coordinates]
         slope = tuple(s + z for s, z in zip(self.slope, push, strict=True))
         rows = [[e + columns[j][i] for j, e in enumerate(row)] for i, row in enumerate(self.hessian)]
         return replace(self, slope=slope, hessian=tuple(map(tuple, rows)))
 
     def cost(self) -> int:
-        """Return the cost of one evaluation of gradient and Hessian, with state-independent values computed before."""
+        """Return the cost of one evaluation of gradient and Hessian in units of an addition, without state-independent
+        values."""
         return self._cost
 
     @cached_property
@@ -71,17 +78,18 @@ def collected_form(
     times: Sequence[str] = (),
     increments: Sequence[str] = (),
 ) -> list[GeneratingFunction]:
-    """Return two collected forms: with the Hessian collected entry by entry, and with the Hessian by differentiation.
+    """Return S_h as a collected polynomial, in up to two forms.
 
-    ``increments`` are inputs of a step that the series does not contain, in addition to the time. The list is empty if
-    a gradient of one operation per term would cost more than ``worth``, or if the monomials would need more than
-    `limits.CELLS`. Raises `OverflowError` if the polynomial is too large to be counted.
+    In the first form each entry of the Hessian is a polynomial. In the second form the Hessian is the derivative of the
+    Horner form of the gradient. ``increments`` are the symbols of noise increments, on which coefficients may depend.
+    The list is empty if a gradient with one operation per term would cost more than ``worth``, or if the monomials
+    would take more than `limits.CELLS` numbers. Raises `OverflowError` if the polynomial is too large to be counted.
     """
     tower, n = series.tower, len(coordinates)
     h = tower.variable(STEP)
     s = tower.combine(term * h ** (i + 1) for i, term in enumerate(series.terms))
     worth = max(worth, 200)
-    if len(s) > 10 * worth:  # terms share monomials in the coordinates, but rarely ten terms share one
+    if len(s) > 10 * worth:  # several terms may have one monomial in the coordinates, but rarely ten
         return []
     slopes = tower.gradient(s, coordinates)
     if cells(tower, [s, *slopes]) > limits.CELLS or exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):
@@ -110,10 +118,11 @@ def collected_form(
 def graph_form(
     series: Sequence[Expression], coordinates: Sequence[str], static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """Return the gradient by one reverse sweep over the shared graph, and the Hessian by one sweep for each row.
+    """Return the gradient by one reverse sweep over the shared graph of S_h, and each row of the Hessian by another
+    sweep.
 
-    ``inputs`` are inputs of a step, such as the time. Raises `OverflowError` as soon as the derivatives exceed the
-    budget of one kernel.
+    ``inputs`` are symbols that change from step to step, such as the time. Raises `OverflowError` as soon as the
+    derivatives have more operations than one kernel may have.
     """
     h = symbol(STEP)
     s = total(h ** (i + 1) * term for i, term in enumerate(series) if not term.is_zero)
@@ -132,7 +141,10 @@ def graph_form(
 def forced_form(
     system: System, monitor: Expression, static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """Return p = τg(∇H + ζ) of a monitored system with forces, which is not a gradient and does not depend on e."""
+    """Return p = τg(∇H + ζ) and its derivatives, for a system with the monitor g and forces, in place of ∇S_h.
+
+    p is not a gradient, and does not depend on the energy level e.
+    """
     assert system.forces is not None
     rate = symbol(STEP) * monitor
     slope = gradient(system.hamiltonian, system.coordinates)
@@ -150,6 +162,6 @@ def _differentiated(slope: Sequence[Expression], coordinates: Sequence[str]) -> 
 
 
 def _symmetric(rows: Sequence[Sequence[Expression]]) -> tuple[tuple[Expression, ...], ...]:
-    """Return the full symmetric matrix of upper-triangular rows: entry (i, j) is ``rows[i][j - i]`` for j ≥ i."""
+    """Return the full symmetric matrix from its upper triangle: entry (i, j) is ``rows[i][j - i]`` for j ≥ i."""
     n = len(rows)
     return tuple(tuple(rows[min(i, j)][abs(i - j)] for j in range(n)) for i in range(n))

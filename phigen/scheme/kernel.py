@@ -1,4 +1,4 @@
-"""Kernels: the straight-line functions of a program, as expression graphs.
+"""Kernels: the functions of a program that contain no loops and branches, as expression graphs.
 
 `phigen.scheme.lowering` turns a kernel into a list of assignments.
 """
@@ -11,33 +11,32 @@ from enum import Enum, auto
 
 from phigen.symbolic.expression import Expression
 
-#: Arguments of kernels that are numbers, not arrays: h is the step or the duration of a flow, t the time.
+#: Arguments of kernels that are single numbers, not arrays: h is the step size or the duration of a flow, t the time.
 SCALARS = ("h", "t")
 
-#: Input of a transposed kernel: the cotangents of matrices whose exponentials are taken.
+#: Input of a transposed kernel: the cotangents of the entries of those matrices tA whose exponentials are coefficients.
 EXPONENTS = "exponents_bar"
 
 
 class Role(Enum):
-    """Purpose of a kernel and of the function that contains its loops; loops derive from it the arrays that they
-    use."""
+    """Purpose of a kernel in the step of a lattice; from it follow the arrays that the loops around the kernel use."""
 
     OTHER = auto()
     SWEEP = auto()  # the increment of a state by a flow
-    SWEEP_TANGENT = auto()  # the derivative of SWEEP: the increment of a variation
-    RELAX = auto()  # the right-hand side of the equation of a stage
-    ADVANCE = auto()  # the increment of the state by a stage
-    SLOPE = auto()  # the derivative of RELAX along a variation of y
-    OWN_SLOPE = auto()  # the part of SLOPE from the same site, as a matrix
-    SIDE = auto()  # the derivative of RELAX along a variation of x
-    FOLLOW = auto()  # the derivative of ADVANCE along a variation of y
-    GATHER = auto()  # terms of sums over bonds or pairs
-    ENERGY = auto()  # the Hamiltonian or a part of it, or its density
-    ENERGY_SLOPE = auto()  # the derivative of the density of a part along a variation
+    SWEEP_TANGENT = auto()  # the derivative of SWEEP: the increment of a tangent vector
+    RELAX = auto()  # the right-hand side of the implicit equation y = … of a stage
+    ADVANCE = auto()  # the increment of the state, from the solution y of a stage
+    SLOPE = auto()  # the derivative of RELAX in the direction of a variation of y
+    OWN_SLOPE = auto()  # the derivatives of RELAX with respect to y at the same site, as a matrix
+    SIDE = auto()  # the derivative of RELAX in the direction of a variation of the start x
+    FOLLOW = auto()  # the derivative of ADVANCE in the direction of a variation of y
+    GATHER = auto()  # the terms of the sums over the bonds or pairs of a site
+    ENERGY = auto()  # the Hamiltonian or a part of it; on lattices, its density at a site
+    ENERGY_SLOPE = auto()  # the derivative of the density of a part of H in the direction of a variation
     CASIMIRS = auto()
     VECTOR_FIELD = auto()
-    OBSERVABLES = auto()  # observables that are numbers, or their densities
-    SITE_OBSERVABLES = auto()  # observables that are fields
+    OBSERVABLES = auto()  # observables that are single numbers; on lattices, their density at a site
+    SITE_OBSERVABLES = auto()  # observables that have a value at each site
     TRANSPOSED_SWEEP = auto()
     TRANSPOSED_RELAX = auto()
     TRANSPOSED_ADVANCE = auto()
@@ -45,12 +44,12 @@ class Role(Enum):
 
     @property
     def is_sweep(self) -> bool:
-        """Whether the kernel computes the increments of a state or of a variation."""
+        """Whether the kernel computes the increment of the fields, or of a tangent vector, by a flow."""
         return self in (Role.SWEEP, Role.SWEEP_TANGENT)
 
     @property
     def is_stage(self) -> bool:
-        """Whether the kernel belongs to the equation of a stage."""
+        """Whether the kernel belongs to the implicit equation of a stage on a lattice."""
         is_sweep_or_observable = self.is_sweep or self.is_observable
         return (
             self in (Role.RELAX, Role.ADVANCE, Role.OWN_SLOPE, *_OF_STARTS, *_OF_VARIATIONS)
@@ -65,22 +64,23 @@ class Role(Enum):
 
     @property
     def is_energy(self) -> bool:
-        """Whether the kernel computes the density of an energy, or its derivative; bonds and pairs add to such
+        """Whether the kernel computes the density of an energy, or its derivative; bonds and pairs contribute to such
         densities."""
         return self in (Role.ENERGY, Role.ENERGY_SLOPE)
 
     @property
     def is_transposed_stage(self) -> bool:
-        """Whether the kernel is the transpose of a kernel of the equation of a stage."""
+        """Whether the kernel is the transpose of a kernel for the implicit equation of a stage on a lattice."""
         return self in (Role.TRANSPOSED_RELAX, Role.TRANSPOSED_ADVANCE)
 
     @property
     def transposed(self) -> Role:
-        """The role of the transpose. Raises `KeyError` for roles without one."""
+        """The role of the transposed kernel. Raises `KeyError` for roles that have no transpose."""
         return Role[f"TRANSPOSED_{self.name}"]
 
 
-#: Roles of kernels that read the start of a stage, and of those that read variations.
+#: Roles of kernels that read the state at the start of a stage, and roles of kernels that read a variation, a tangent
+#: vector of the state.
 _OF_STARTS = frozenset({Role.RELAX, Role.SLOPE, Role.SIDE})
 _OF_VARIATIONS = frozenset({Role.SWEEP_TANGENT, Role.SLOPE, Role.SIDE, Role.FOLLOW, Role.ENERGY_SLOPE})
 
@@ -95,15 +95,15 @@ class Output:
 
 @dataclass(frozen=True)
 class Kernel:
-    """A pure function from named vectors of symbols to named arrays.
+    """A pure function from named arrays of symbols to named arrays of expressions.
 
-    ``inputs`` maps the name of an argument to the symbols of its entries. ``named`` are values that get a name in the
-    generated code (momenta, second derivatives).
+    ``inputs`` maps the name of an argument to the symbols of its entries. ``named`` has sub-expressions that get a name
+    in the generated code, such as momenta and second derivatives. ``purpose`` is the comment in generated code.
 
-    ``exponentials`` are parts of the first output, given by start and number of rows, that hold a matrix A; the
-    generated function returns exp(A) − 1 in its place. In the transpose of such a kernel, ``exponents`` computes the
-    matrices A one after the other. The input `EXPONENTS` has the cotangents of the A, which follow from those of exp(A)
-    − 1 in the input ``coef_bar``.
+    The first output may contain matrices A, whose places ``exponentials`` lists by the first index and the number of
+    rows; the generated function returns exp(A) − 1 in their place. The transpose of such a kernel has ``exponents``, a
+    kernel that computes all these A. Its input `EXPONENTS` has the cotangents of the A, which the generated code
+    computes from those of exp(A) − 1 in the input ``coef_bar``.
     """
 
     name: str
@@ -117,20 +117,24 @@ class Kernel:
 
     @property
     def reads_start(self) -> bool:
-        """Whether the kernel reads the start of a stage."""
+        """Whether the kernel reads the state at the start of a stage."""
         return self.role in _OF_STARTS
 
     @property
     def reads_variations(self) -> bool:
-        """Whether the kernel reads a variation."""
+        """Whether the kernel reads a variation, that is, a tangent vector of the state."""
         return self.role in _OF_VARIATIONS
 
     @property
     def roots(self) -> list[Expression]:
-        """The expressions of all outputs, in order."""
+        """The expressions of all outputs as one list, in the order of the outputs."""
         return [v for o in self.outputs for v in o.values]
 
     def along(self, array: str) -> list[tuple[str, Expression]]:
-        """Return, for a transposed kernel, the symbols of the input ``array``, each with its cotangent."""
+        """Return, for a transposed kernel, the symbols of the input ``array`` with the cotangent that it computes for
+        each.
+
+        The list is empty if the kernel computes no cotangents of this array.
+        """
         values = next((o.values for o in self.outputs if o.name == f"{array}_bar"), ())
         return list(zip(self.inputs[array] if values else (), values, strict=True))

@@ -1,4 +1,4 @@
-"""The kernels of a solver: those of steps with a generating function, and the observables."""
+"""The kernels of a step with a generating function, and the kernels of the observables of any solver."""
 
 from __future__ import annotations
 
@@ -28,17 +28,18 @@ from phigen.spec import limits
 from phigen.symbolic.expression import ONE, ZERO, Expression, number, sparse_derivatives, symbol, total
 from phigen.symbolic.symbols import STEP, Symbol, momentum
 
-#: Largest dimension whose elimination is unrolled for every pattern.
+#: Largest dimension in which elimination is written as straight-line code for every matrix, even without zeros.
 UNROLLED_DIMENSION = 4
-#: Largest share of n³ operations with which the elimination of a larger matrix is unrolled; a full matrix needs 0.7 n³.
+#: Largest number of operations, divided by n³, for which elimination is written as straight-line code in higher
+#: dimensions n. A full matrix takes 0.7 n³ operations; the limit is met by matrices with many zeros.
 MAX_SPARSE_SHARE = 0.6
 
 
 def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expression], Sequence[Expression]]:
-    """Return α − y and β − α, with half of the impulse hf of a vector force f before the motion and half after it.
+    """Return α − y and β − α including the impulse hf of a vector force f, half of it before and half after the motion.
 
-    So α(y, p) = x + hf(y)/2 and x' = β(y, p) + hf(y)/2. The step is symmetric if the bi-realisation is, hence of order
-    2.
+    So the step is α(y, p) = x + hf(y)/2 and x' = β(y, p) + hf(y)/2. If the bi-realisation is symmetric, the step is
+    symmetric too, and has order 2.
     """
     if system.forces is None:
         return realisation.displacement, realisation.increment
@@ -48,7 +49,10 @@ def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expressio
 
 
 def is_centred(system: System, realisation: BiRealisation) -> bool:
-    """Whether y is the mean of the ends of a step; then the derivative of the increment is 2(1 − J)."""
+    """Whether the solution y of the implicit equation is the mean of the ends x and x' of the step.
+
+    Then the derivative of the increment β − α is 2(1 − J), where J is the derivative of α.
+    """
     half = number(Fraction(1, 2))
     means = [a + half * d for a, d in zip(*ends(system, realisation), strict=True)]
     names = [*system.coordinates, *map(momentum, system.coordinates)]
@@ -58,7 +62,8 @@ def is_centred(system: System, realisation: BiRealisation) -> bool:
 def explicit_kernel(
     system: System, realisation: BiRealisation, generating: GeneratingFunction, coefficients: Coefficients
 ) -> Kernel | None:
-    """Return the kernel of the increment of a step if the equation for y can be solved by substitution; else None."""
+    """Return the kernel of the increment of an explicit step; None if the equation for y cannot be solved by
+    substitution."""
     coordinates = system.coordinates
     to_start, to_end = ends(system, realisation)
     displacement = at_momenta(to_start, coordinates, generating.slope)
@@ -78,7 +83,8 @@ def explicit_kernel(
 def linearise_kernel(
     system: System, realisation: BiRealisation, generating: GeneratingFunction, coefficients: Coefficients
 ) -> Kernel:
-    """Return the kernel of one Newton iteration at a point; see `phigen.scheme.step`."""
+    """Return the kernel of one Newton iteration: α − y, β − α and their Jacobians at a point y (see
+    `phigen.scheme.step`)."""
     n, coordinates = system.dimension, system.coordinates
     point = linearise(*ends(system, realisation), coordinates, generating)
     flat = [
@@ -104,7 +110,7 @@ def linearise_kernel(
 
 @dataclass(frozen=True)
 class Solvers:
-    """Kernels that solve linear equations with the Newton matrix, as in `phigen.scheme.steps.Newton`."""
+    """Kernels for linear equations with the Newton matrix: the solution, the inverse, or the factors; see `Newton`."""
 
     eliminate: Kernel | None = None
     invert: Kernel | None = None
@@ -112,7 +118,7 @@ class Solvers:
 
 
 def newton_solvers(linearised: Kernel, *, centred: bool) -> Solvers:
-    """Return the elimination kernels for the pattern of the Jacobian, if unrolled code is worthwhile.
+    """Return kernels of unrolled elimination for the pattern of the Newton matrix; no kernels if a loop is better.
 
     ``centred`` is the result of `is_centred`.
     """
@@ -126,12 +132,12 @@ def newton_solvers(linearised: Kernel, *, centred: bool) -> Solvers:
 
 
 def transposed_elimination_kernel(linearised: Kernel) -> Kernel:
-    """Return the elimination kernel for the transposed Jacobian, by the pattern of the Jacobian."""
+    """Return the kernel of elimination with the transposed Newton matrix, for the pattern of the Newton matrix."""
     return _elimination_kernel(_patterns(linearised)[0], transposed=True)
 
 
 def _patterns(linearised: Kernel) -> tuple[Pattern, Pattern]:
-    """Return two patterns: entries that may be nonzero in the Jacobian, and in the derivative of the increment."""
+    """Return the entries that may be nonzero in the Newton matrix, and in the derivative of the increment β − α."""
     _, _, jacobian, slope = linearised.outputs
     return _pattern(jacobian.values), _pattern(slope.values)
 
@@ -142,7 +148,7 @@ def _pattern(entries: Sequence[Expression]) -> Pattern:
 
 
 def full(n: int) -> Pattern:
-    """Return the pattern of a matrix without known zeros."""
+    """Return the pattern of an n×n matrix all of whose entries may be nonzero."""
     return [[True] * n] * n
 
 
@@ -163,7 +169,10 @@ def _entries(name: str, n: int) -> tuple[str, ...]:
 
 
 def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
-    """Return elimination in two kernels, for many right-hand sides; solutions are also multiplied by the ``slope``."""
+    """Return elimination as two kernels, which factorise the matrix once and then solve for many right-hand sides.
+
+    The second kernel also multiplies each solution by the derivative of the increment, whose pattern is ``slope``.
+    """
     n, factor_symbols = len(slope), factors.named("f")
     side = tuple(Symbol("r", i) for i in range(n))
     solution = factor_symbols.solved([symbol(s) for s in side])
@@ -185,9 +194,9 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
 
 
 def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
-    """Return the kernel of the inverse of a matrix J and of the slope times it, unrolled.
+    """Return the kernel, without loops, of the inverse of a matrix J and of the product K J⁻¹.
 
-    If ``centred``, the slope is 2(1 − J).
+    K is the derivative of the increment β − α; it is 2(1 − J) if the step is ``centred``.
     """
     n = len(pattern)
     entries, reciprocals = inversion(pattern)
@@ -206,9 +215,9 @@ def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
 
 
 def generate_kernel(system: System, generating: GeneratingFunction, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of ∇S_h at the mean m of a path, and of the matrix 1 − ½ Hess S_h(m) π(m).
+    """Return the kernel for a step along paths: ∇S_h(y) and 1 − ½ Hess S_h(y) π(y), at the mean y of a path.
 
-    The matrix is the Jacobian of p − ∇S_h(m(p)) up to O(h²).
+    The matrix is, up to O(h²), the Jacobian of the equation p − ∇S_h(y(p)) = 0 that is solved for p.
     """
     n, hessian, pi = system.dimension, generating.hessian, system.poisson
     half = number(Fraction(1, 2))
@@ -227,7 +236,10 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
 
 
 def path_elimination(n: int) -> Kernel | None:
-    """Return the elimination kernel for the equation for p, whose matrix is full; None if a loop is faster."""
+    """Return the kernel of elimination for the equation for p of a step along paths; None if a loop is faster.
+
+    The n×n matrix of this equation has no zeros that are known before.
+    """
     return _elimination_kernel(full(n)) if n <= UNROLLED_DIMENSION else None
 
 
@@ -246,13 +258,14 @@ def system_inputs(system: System) -> dict[str, tuple[str, ...]]:
 
 
 def step_inputs(system: System) -> dict[str, tuple[str, ...]]:
-    """Return the inputs of a step other than its size: the time and the increments of the noise, if there are any."""
+    """Return the inputs of a step that are new in each step, by name: the time and the noise increments, if there are
+    any."""
     inputs = {"t": system.times, "dw": system.increments}
     return {name: symbols for name, symbols in inputs.items() if symbols}
 
 
 def noise_fields(system: System) -> Kernel:
-    """Return the kernel of σπ∇g for all sources of noise."""
+    """Return the kernel of the vector fields σ π∇g of all sources of noise, one after the other."""
     fields = [hamiltonian_vector_field(system.poisson, s.impulse(system.coordinates)) for s in system.noise]
     values = tuple(e for field in fields for e in field)
     purpose = "sigma pi(x) grad g(x) of each source of noise"
@@ -260,7 +273,8 @@ def noise_fields(system: System) -> Kernel:
 
 
 def field_formula(*, timed: bool, forced: bool) -> str:
-    """Return the formula of the vector field, with the time and with forces if there are any, for comments."""
+    """Return the formula of the vector field as text for comments; ``timed`` adds the argument t, ``forced`` the
+    forces."""
     at = "(t, x)" if timed else "(x)"
     return f"pi(x) (grad H{at} + zeta{at}) + f{at}" if forced else f"pi(x) grad H{at}"
 

@@ -1,10 +1,12 @@
-"""The explicit monitor of a splitting in two parts, H = A + B: K = log(A + e) − log(−B).
+"""The monitor ``log`` of a splitting into two parts, H = A + B: steps of equal size in τ for K = log(A + e) − log(−B).
 
-A is constant along its own flow, so the flow of log(A + e) is that of A over the time τ/(A + e). Likewise the flow of
-−log(−B) is that of B over τ/(−B). The orbits are those of H where K = 0, that is, where A + e = −B; e = −H(x₀) is held
-fixed. The flow of A takes the physical time ∂K/∂e τ = τ/(A + e), that of B takes none. A + e > 0 and −B > 0 are
-required: S. Mikkola, K. Tanikawa, Celestial Mechanics and Dynamical Astronomy 74 (1999); M. Preto, S. Tremaine, Astron.
-J. 118 (1999).
+A is constant along its own flow, so the flow of log(A + e) over τ is the flow of A over the time τ/(A + e). In the same
+way the flow of −log(−B) is the flow of B over τ/(−B). The orbits are those of H where K = 0, that is, where A + e = −B;
+the energy level e = −H(x₀) is constant on a trajectory. The physical time advances by ∂K/∂e τ = τ/(A + e) in the flow
+of A, and not at all in the flow of B. Steps require A + e > 0 and −B > 0.
+
+S. Mikkola, K. Tanikawa, Celestial Mechanics and Dynamical Astronomy 74 (1999); M. Preto, S. Tremaine, Astron. J. 118
+(1999).
 """
 
 from __future__ import annotations
@@ -30,29 +32,30 @@ from phigen.symbolic.symbols import LEVEL
 
 @dataclass(frozen=True)
 class Logarithmic:
-    """The monitor of a splitting. ``negative`` is B, the Hamiltonian of one of the flows."""
+    """The monitor ``log`` of a splitting H = A + B, with K = log(A + e) − log(−B); ``negative`` is the function B."""
 
     negative: Expression
 
     def outputs(self, flow: Flow) -> tuple[Expression, ...]:
-        """Return the outputs of the kernel of a flow of K.
+        """Return the expressions that the kernel of a flow of K computes, for the flow of the corresponding part of H.
 
-        They are the increments, the physical time of the flow, and the square root of A + e or −B, which is NaN outside
-        the domain.
+        These are the increments of the coordinates, the physical time of the flow, and the square root of A + e or of
+        −B. The square root is NaN where the step is not defined, so that the step fails.
         """
         argument, time = self._argument(flow), self.time(flow)
         increments = substitute(flow.increment, {TIME: time})
         return (*increments, ZERO if self._is_negative(flow) else time, power(argument, Fraction(1, 2)))
 
     def time(self, flow: Flow) -> Expression:
-        """Return the time over which the flow of a part of H is the flow of that part of K over τ."""
+        """Return the time τ/(A + e) or τ/(−B) over which the flow of a part of H equals the flow of a part of K over
+        τ."""
         return symbol(TIME) * power(self._argument(flow), -1)
 
     def _argument(self, flow: Flow) -> Expression:
         return -flow.hamiltonian if self._is_negative(flow) else flow.hamiltonian + symbol(LEVEL)
 
     def monitor(self, system: System) -> Monitor:
-        """Return the record of the monitor, with dt/dτ = 1/(−B)."""
+        """Return the record of the monitor for the program, with dt/dτ = 1/(−B)."""
         return Monitor(rate_kernel(system, power(-self.negative, -1)), None)
 
     def _is_negative(self, flow: Flow) -> bool:
@@ -65,14 +68,15 @@ class Logarithmic:
 
 
 def fact_of(negative: str) -> str:
-    """Return the header line of a monitor with this B."""
+    """Return the line about the monitor ``log`` in the header of generated files; ``negative`` is B as text."""
     return f"monitor: log, steps are equal in tau; K = log(A + e) - log(-B) with B = {negative}"
 
 
 def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarithmic | None:
-    """Return the monitor of a splitting, or None if the spec has none.
+    """Return the monitor ``log`` of a splitting, or None if the spec has no monitor.
 
-    Raises `SpecError` unless H is split into two parts A and B as the monitor requires.
+    Raises `SpecError` unless H consists of two parts A and B, one of which is negative at least where runs start, and
+    for options that exclude the monitor.
     """
     if spec.monitor is None:
         return None
@@ -102,20 +106,20 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
 
 
 def composition_of(requested: str, order: int) -> str:
-    """Return the composition of a splitting with this monitor: one of Strang's splitting, unless the spec names
-    another.
+    """Return the name of the composition of a splitting with the monitor ``log``: if the spec asks for ``auto``, a
+    composition of Strang's splitting.
 
-    Steps of Strang's splitting of K, of any size, stay on the orbit of a Kepler motion. Steps of other methods need
-    not.
+    Steps of Strang's splitting of K stay on the orbit of a Kepler motion for every step size; steps of other methods
+    need not.
     """
     composition = find("auto", order + order % 2)
     return composition.name if requested == "auto" and composition else requested
 
 
 def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
-    """Whether an expression is negative, by its form or at the start of all runs.
+    """Whether the expression ``e``, a part of H, is negative: by its form, or else at the starts of all runs.
 
-    Without runs, 0 counts as negative.
+    If the spec has no runs, an expression that is never positive by its form counts as negative.
     """
     sign = sign_of(-e, system.positive)
     if sign == POSITIVE or (sign == NOT_NEGATIVE and not spec.runs):
@@ -131,6 +135,7 @@ def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
 
 
 def trimmed(kernel: Kernel, count: int) -> Kernel:
-    """Return the kernel of a flow with its first ``count`` outputs only, the increments of the coordinates."""
+    """Return the kernel of a flow with only its first ``count`` outputs, which are the increments of the
+    coordinates."""
     (output,) = kernel.outputs
     return replace(kernel, outputs=(replace(output, values=output.values[:count]),))

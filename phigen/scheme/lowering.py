@@ -1,7 +1,7 @@
-"""Lowering: from expression graphs to assignments that a target prints unchanged.
+"""Lowering: from expression graphs to assignments that a target prints without further changes.
 
-Passes, in order: `expand_powers` (powers become products, quotients and square roots), then `assign` (shared or long
-sub-expressions become temporaries). The result is a list of trees over symbols.
+Two passes run in this order. `expand_powers` writes powers as products, quotients and roots. `assign` stores shared or
+long sub-expressions in temporaries. The result is a list of expression trees over symbols.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from phigen.symbolic.expression import Expression, fold, raw, symbol, topologica
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import TEMPORARY, Symbol
 
-#: Cost of an operation in units of one addition: throughput measured on current x86-64 processors. A call is one of a
-#: library function.
+#: Cost of an operation in units of an addition, from its throughput measured on current x86-64 processors. "call" is a
+#: call of a library function.
 COST = {"add": 1, "sub": 1, "mul": 1, "neg": 0, "reciprocal": 4, "sqrt": 5, "call": 20}
 
 #: Largest number of operations in one printed statement, so that lines remain readable.
@@ -25,15 +25,17 @@ MAX_STATEMENT_OPERATIONS = 14
 
 @dataclass(frozen=True)
 class Assignment:
-    """``target`` = ``value``; the value is a tree over symbols and over temporaries of earlier assignments."""
+    """The assignment of ``value``, an expression tree over symbols and earlier temporaries, to the name ``target``."""
 
     target: str
     value: Expression
 
 
 def expand_powers(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with powers rewritten: only squares, reciprocals, square roots, cube roots and calls of pow
-    remain."""
+    """Return the roots with all powers written as products of squares, reciprocals, square roots and cube roots.
+
+    Powers with other exponents remain, as calls of pow.
+    """
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op == "pow":
@@ -45,9 +47,9 @@ def expand_powers(roots: Sequence[Expression]) -> list[Expression]:
 
 def _power(base: Expression, exponent: Fraction) -> Expression:
     if exponent < 0:
-        if exponent.denominator == 1:  # one reciprocal, which all negative powers of the base share
+        if exponent.denominator == 1:  # all negative powers of the base share one reciprocal
             return _integer_power(raw("pow", (base,), Fraction(-1)), -int(exponent))
-        # One reciprocal root, then products: r**(-3/2) is (1/sqrt(r))**3.
+        # A fractional power takes one reciprocal root, then products: r**(-3/2) is (1/sqrt(r))**3.
         root = _root(base, exponent.denominator)
         if root is not None:
             return _integer_power(raw("pow", (root,), Fraction(-1)), -exponent.numerator)
@@ -63,9 +65,9 @@ def _power(base: Expression, exponent: Fraction) -> Expression:
 
 
 def _root(base: Expression, degree: int) -> Expression | None:
-    """Return base^(1/degree), written with square roots and at most one cube root; None for degrees not 2^n or 3·2^n.
+    """Return base^(1/degree) by square roots and at most one cube root, which other powers of the base can share.
 
-    Other powers of the same base reuse these roots.
+    Returns None if ``degree`` is not 2^n or 3·2^n.
     """
     if degree in (2, 3):
         return raw("pow", (base,), Fraction(1, degree))
@@ -82,7 +84,7 @@ def _integer_power(base: Expression, n: int) -> Expression:
 
 
 def cost(roots: Sequence[Expression]) -> int:
-    """Return the cost of computing the roots together, each shared value once (see `COST`)."""
+    """Return the cost of computing the roots together, in units of an addition (`COST`); a shared value counts once."""
     return sum(_cost(e) for e in topological(expand_powers(roots)))
 
 
@@ -97,7 +99,7 @@ def _cost(e: Expression) -> int:
 
 
 def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with ½(ab) and ½(ac) written as (½a)b and (½a)c, if this needs fewer operations."""
+    """Return the roots with ½(ab) and ½(ac) written as (½a)b and (½a)c, where that saves operations."""
     roots = list(roots)
     while True:
         regrouped = _numbers_regrouped(roots)
@@ -107,9 +109,10 @@ def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots in which a number is first multiplied into one factor of a product.
+    """Return the roots with each number times a product, such as ½(ab), written with the number at one factor, as
+    (½a)b.
 
-    The factor is the one that the most products with the same number contain.
+    The chosen factor is the one that occurs in the most products with the same number.
     """
     scaled = [e for e in topological(roots) if e.op == "mul" and e.args[0].is_number and e.args[1].op == "mul"]
     counts = Counter((e.args[0], factor) for e in scaled for factor in e.args[1].args)
@@ -127,7 +130,8 @@ def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:
-    """Return the numbers of additions, multiplications, divisions and function calls of all roots together."""
+    """Return the numbers of additions, multiplications, divisions and function calls that compute all roots
+    together."""
     counts = {"additions": 0, "multiplications": 0, "divisions": 0, "functions": 0}
     for e in topological(expand_powers(roots)):
         if e.op in ("add", "sub"):
@@ -144,11 +148,11 @@ def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:
 def assign(
     roots: Sequence[Expression], temporaries: Mapping[int, str] | None = None
 ) -> tuple[list[Assignment], list[Expression]]:
-    """Return assignments of temporaries, and the roots as trees over them.
+    """Return assignments of temporaries, and the roots as trees over these temporaries.
 
-    A value gets a temporary if it is used more than once, is named in ``temporaries`` (by ``id`` of the node in the
-    graph of ``roots``), is the operand of a square, or its tree would exceed `MAX_STATEMENT_OPERATIONS` operations. The
-    roots must have passed `expand_powers`.
+    A value gets a temporary in four cases: it is used more than once; it is the operand of a square; its tree would
+    exceed `MAX_STATEMENT_OPERATIONS` operations; or ``temporaries`` gives it a name, by the ``id`` of its node in the
+    graph of ``roots``. The roots must have passed `expand_powers`.
     """
     temporaries = temporaries or {}
     order = topological(roots)

@@ -1,9 +1,9 @@
-"""Derivatives with respect to the mean of a path, from those with respect to its middle, about which the path is
-expanded.
+"""Derivatives of the ends of a path with respect to its mean y, from those with respect to its middle m.
 
-Let the path take the time −1 … 1 under p/2, so that it starts at α and ends at β. Let even and odd be the sums of the
-terms of even and odd order of its Taylor series: α = even − odd and β − α = 2 odd, and likewise for derivatives. Each
-sum of derivatives is an n×2n matrix: derivatives with respect to the middle m, then to p.
+The runtime computes a path as a Taylor series about its middle. Let the path take the time from −1 to 1 under the
+covector p/2, so that it starts at α and ends at β. If ``even`` and ``odd`` are the sums of the even and of the odd
+terms of its Taylor series, then α = even − odd and β − α = 2 odd. The same relations hold for derivatives. Each sum of
+derivatives is an n×2n matrix: first the derivatives with respect to m, then those with respect to p.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from phigen.symbolic.symbols import Symbol
 
 
 def along_mean(n: int) -> Kernel:
-    """Return the kernel of the derivatives of the ends of a path with respect to its mean y, from those along m and p.
+    """Return the kernel of the derivatives of α and of β − α with respect to the mean y of a path with n coordinates.
 
-    The path has n coordinates. For fixed p, the derivative of m with respect to y is M⁻¹, with M the derivative of the
-    mean with respect to m. With p = ∇S_h(y) it is M⁻¹ (1 − N H), with N the derivative of the mean with respect to p
-    and H the Hessian of S_h.
+    Its inputs are the derivatives with respect to the middle m and to p, and the Hessian H of S_h. Let M and N be the
+    derivatives of the mean with respect to m and p. For fixed p, the derivative of m with respect to y is M⁻¹. If p =
+    ∇S_h(y) varies with y, it is M⁻¹ (1 − N H).
     """
     inputs = {name: tuple(Symbol(name, i) for i in range(2 * n * n)) for name in ("even", "odd", "mean")}
     inputs["hessian"] = tuple(Symbol("hessian", i) for i in range(n * n))

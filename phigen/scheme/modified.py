@@ -1,4 +1,5 @@
-"""The modified Hamiltonian of the step of a program, as a kernel and as a formula."""
+"""The modified Hamiltonian H̃ of a step, whose exact flow the step is up to a power of h: as a kernel and as a
+formula."""
 
 from __future__ import annotations
 
@@ -19,8 +20,10 @@ from phigen.symbolic.symbols import STEP
 
 
 def powers(order: Order, count: int, *, symmetric: bool) -> list[int]:
-    """Return the powers of h of the first ``count`` corrections: order, order + 1, …; every second one if
-    ``symmetric``."""
+    """Return the powers of h of the first ``count`` corrections in the modified Hamiltonian, starting at the order.
+
+    For a symmetric method only every second power occurs.
+    """
     return [order.order + (2 if symmetric else 1) * k for k in range(count)]
 
 
@@ -32,10 +35,11 @@ def corrections(
     gauge: Gauge | None = None,
     values: Mapping[str, Fraction] | None = None,
 ) -> ModifiedSeries:
-    """Return H_0, H_1, … of the modified Hamiltonian of H − Σ λC with ``count`` corrections.
+    """Return the terms H_0, H_1, … of the modified Hamiltonian, the coefficients of powers of h, up to ``count``
+    corrections.
 
-    The tower contains the step size. ``values`` of parameters are substituted, which shortens formulas. Raises
-    `LimitError` if a correction is too large.
+    The Casimirs of the ``gauge`` are subtracted from H before. The ring of the terms also contains the step size.
+    Numbers in ``values`` replace parameters, which shortens formulas. Raises `LimitError` if a correction is too large.
     """
     gauge = gauge or Gauge()
     gauged = gauge.applied(system)
@@ -63,7 +67,10 @@ def corrections(
 def modified_hamiltonian(
     system: System, realisation: BiRealisation, order: Order, count: int, gauge: Gauge | None = None
 ) -> Expression:
-    """Return H̃_h as one expression in coordinates, parameters, symbols of the gauge and step size."""
+    """Return the modified Hamiltonian H̃_h with ``count`` corrections as one expression.
+
+    Its symbols are the coordinates, the parameters, the step size, and the multiples of the gauge.
+    """
     series = corrections(system, realisation, order, count, gauge)
     h = series.tower.variable(STEP)
     summed = series.tower.expression(series.tower.combine([t * h**j for j, t in enumerate(series.terms)]))
@@ -73,7 +80,8 @@ def modified_hamiltonian(
 
 
 def expect_modified(system: System, realisation: BiRealisation, stages: int) -> None:
-    """Raise `SpecError` for compositions, forces and approximate bi-realisations, for which H̃_h is not available."""
+    """Raise `SpecError` for compositions, forces and approximate bi-realisations, which have no modified Hamiltonian
+    here."""
     if stages > 1 or not realisation.exact or system.forces:
         obstacle = "a composition" if stages > 1 else "a system with forces"
         obstacle = obstacle if realisation.exact else "an approximate bi-realisation"
@@ -84,7 +92,8 @@ def expect_modified(system: System, realisation: BiRealisation, stages: int) -> 
 def modified_of(
     system: System, realisation: BiRealisation, order: Order, gauge: Gauge, count: int, stages: int
 ) -> Modified:
-    """Return the modified Hamiltonian as a kernel. Raises the errors of `expect_modified`."""
+    """Return the modified Hamiltonian as a kernel, with the power of h that it omits. Raises the errors of
+    `expect_modified`."""
     expect_modified(system, realisation, stages)
     value = modified_hamiltonian(system, realisation, order, count, gauge)
     time = {"t": system.times} if system.time else {}

@@ -1,13 +1,13 @@
-"""Steps of equal size in τ, dt = g dτ, g > 0, that are Poisson maps: a monitored system.
+"""Monitored systems: steps of equal size in another time τ, with dt = g dτ and g > 0, that are Poisson maps.
 
-A canonical pair (t, e) is added to the coordinates. K = g(x)(H(x) + e) has the orbits of H where K = 0, that is for e =
-−H(x₀), and along them dt/dτ = ∂K/∂e = g. K does not depend on t, so e is constant: for the solver, e is a parameter
-with a value for each trajectory. In the midpoint realisation of the pair, the step in x is that of the series S_τ(x; e)
-of K, and t₁ − t₀ = ∂S_τ/∂e at its point y. The time has the order of the method, since (t, x) is one step of one
-method.
+A canonical pair (t, e) is added to the coordinates. K = g(x)(H(x) + e) has the orbits of H where K = 0, that is, for e
+= −H(x₀). Along these orbits dt/dτ = ∂K/∂e = g. K does not depend on t, so e is constant, and the solver treats it as a
+parameter with a value for each trajectory. With the midpoint realisation for the pair, the step in x is that of the
+series S_τ(x; e) of K, and t₁ − t₀ = ∂S_τ/∂e at the solution y of its implicit equation. The time is as accurate as x,
+since (t, x) is a step of one method.
 
-With forces −H(x) is not constant and no step is a Poisson map, so K is not used. Instead p = τg(∇H + ζ) and the impulse
-τgf at y, with t₁ − t₀ = τg(y), form a symmetric step of order 2 for (t, x).
+With forces, −H(x) is not constant and no step is a Poisson map, so K is not used. Instead, p = τg(∇H + ζ) and the
+impulse τgf at y, together with t₁ − t₀ = τg(y), form a symmetric step of order 2 for (t, x).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.spec.model import Spec
 from phigen.symbolic.expression import Expression
 
-#: Alternative if H depends on the time, so that e is not constant: t and e as coordinates.
+#: Hint if H depends on the time, so that e is not constant: the user can make t and e coordinates of the system.
 EXTENDED_SYSTEM_HINT = (
     "without time: make t and e coordinates too, a canonical pair; hamiltonian: g*(H + e), with e = -H at the start"
 )
 
 
 def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | None:
-    """Return the kernel of ∂S_τ/∂e at the point y of a step; None for a system without a monitor."""
+    """Return the kernel of ∂S_τ/∂e at the point y of a step, the physical time of the step; None without a monitor."""
     if generating.elapsed is None:
         return None
     (value,) = generating.coefficients.hoist([generating.elapsed])
@@ -41,7 +41,7 @@ def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | N
 
 
 def rate_kernel(system: System, monitor: Expression) -> Kernel:
-    """Return the kernel of dt/dτ at a state."""
+    """Return the kernel of dt/dτ = g at a state; ``monitor`` is g as an expression."""
     return Kernel(
         "monitor",
         "dt/dtau, which has to be positive",
@@ -51,7 +51,7 @@ def rate_kernel(system: System, monitor: Expression) -> Kernel:
 
 
 def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
-    """Yield the line about the monitor in the header of generated files, if there is a monitor."""
+    """Yield the line about the monitor in the header of generated files; nothing without a monitor."""
     if monitor and forced:
         yield f"monitor: dt = g dtau with g = {monitor}, steps are equal in tau; e has no part in them"
     elif monitor:
@@ -59,7 +59,11 @@ def monitor_facts(monitor: Expression | None, *, forced: bool) -> Iterator[str]:
 
 
 def monitor_of(spec: Spec) -> Expression | None:
-    """Return the monitor g of a spec whose steps are those of a series. Raises `SpecError` if g does not apply."""
+    """Return the monitor g of a spec whose steps have a generating function, or None.
+
+    Raises `SpecError` if the monitor is ``log``, or excluded by a lattice, a time in H, or a gauge together with
+    forces.
+    """
     if spec.monitor is None:
         return None
     obstacles = {"time:": spec.time, "lattice:": spec.lattice}

@@ -29,7 +29,8 @@ from phigen.gauss.tableau import gauss_nodes
 from phigen.scheme.alternation import Alternation, Schedule
 from phigen.scheme.corrector import corrector, schedule
 
-# The first halves of a and b with their middle values, to 60 digits: solutions of the conditions by Newton's method.
+# The first halves of the fractions a and b of each method, up to the middle values. All digits are from Newton's method
+# on the order conditions.
 _8_4 = (
     "0.0753469602698928884165278036834744643726526645540790631409721 "
     "0.517916854688256782300773978496315644323847447821980915025719 "
@@ -63,10 +64,10 @@ _10_6_4 = (
 
 @dataclass(frozen=True)
 class NearIntegrable(Alternation):
-    """A method for H = A + εB.
+    """A splitting method for H = A + εB.
 
-    ``generalised`` has the powers of h at which the errors of order ε, ε², … begin. ``a`` and ``b`` are the fractions
-    of the step of the flows of A and of B.
+    ``a`` and ``b`` are the fractions of the step for which the flows of A and of εB run. ``generalised`` has the powers
+    of h with which the errors of order ε, ε², … begin.
     """
 
     generalised: tuple[int, ...] = ()
@@ -75,23 +76,24 @@ class NearIntegrable(Alternation):
 
     @property
     def errors(self) -> str:
-        """The leading errors as text, such as ε h^8 + ε² h^4."""
+        """The leading errors as text, such as ``ε h^8 + ε² h^4``."""
         powers = ("ε", "ε²", "ε³")
         return " + ".join(f"{power} h^{m}" for power, m in zip(powers, self.generalised, strict=False))
 
 
 @dataclass(frozen=True)
 class Corrected(NearIntegrable):
-    """Steps of one flow of B and one of A, between the inverse of a `corrector` and the corrector, given by its times.
+    """A method with a symplectic corrector for H = A + εB: each step is one flow of εB and one flow of A.
 
-    In a step ``multiple`` h² {B, {B, A}} is added to B; in the corrector it is not.
+    ``corrector`` has the durations of the flows at the end of a run; the inverse flows come at its start. ``multiple``
+    h² {B, {B, A}} is added to B in the steps, but not in the corrector.
     """
 
     corrector: tuple[Fraction, ...] = ()
     multiple: Fraction = Fraction(0)
 
     def schedule(self) -> Schedule:
-        """Return the flows of a step, in which part 0 is B, and those of the corrector."""
+        """Return the flows of a step, and those at the start and the end of a run; part 0 is B, part 1 is A."""
         flows = schedule(self.corrector)
         if not self.multiple:
             return flows
@@ -99,7 +101,7 @@ class Corrected(NearIntegrable):
 
 
 def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[Fraction]) -> NearIntegrable:
-    """Return the method with these fractions of the flows of A and B, each of which sum to 1."""
+    """Return the method with the fractions ``a`` and ``b`` for the flows of A and of εB; both lists sum to 1."""
     times = [t for pair in zip(a, b, strict=False) for t in pair]
     alpha = [times[0]]
     for t in times[1:]:
@@ -110,20 +112,24 @@ def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[
 def _method_from_halves(
     name: str, generalised: tuple[int, ...], stages: int, halves: tuple[str, str]
 ) -> NearIntegrable:
-    """Return the method with these first halves of a and b, including the middle values."""
+    """Return the method with ``stages`` flows of εB from the first halves of a and b, which include the middle
+    values."""
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     return _method(name, generalised, _mirrored(a, stages + 1), _mirrored(b, stages))
 
 
 def _mirrored(half: list[Fraction], count: int) -> list[Fraction]:
-    """Return all ``count`` fractions from the first half; its last one is adjusted so that the sum is exactly 1."""
+    """Return all ``count`` fractions of a symmetric list from its first half.
+
+    The last fraction of the half is replaced by the number for which the sum is exactly 1.
+    """
     outer, odd = half[:-1], count % 2
     last = 1 - 2 * sum(outer, Fraction(0)) if odd else Fraction(1, 2) - sum(outer, Fraction(0))
     return [*outer, last, *([] if odd else [last]), *reversed(outer)]
 
 
 def _quadrature(stages: int) -> NearIntegrable:
-    """Return the method of Laskar and Robutel with ``stages`` flows of B: nodes and weights of Gauss."""
+    """Return the method of Laskar and Robutel with ``stages`` flows of εB, at the nodes of Gauss's quadrature."""
     nodes = [Fraction(0), *gauss_nodes(stages), Fraction(1)]
     a = [next_node - node for node, next_node in pairwise(nodes)]
     b = [_weight(nodes[1:-1], i) for i in range(stages)]
@@ -132,7 +138,10 @@ def _quadrature(stages: int) -> NearIntegrable:
 
 
 def _weight(nodes: list[Fraction], i: int) -> Fraction:
-    """Return the integral over [0, 1] of the polynomial that is 1 at node i and 0 at the other nodes."""
+    """Return the weight of node i in the quadrature over [0, 1] with these nodes.
+
+    It is the integral of the polynomial that is 1 at node i and 0 at the other nodes.
+    """
     p = [Fraction(1)]
     for c in (c for j, c in enumerate(nodes) if j != i):
         p = [(x - c * y) / (nodes[i] - c) for x, y in zip([Fraction(0), *p], [*p, Fraction(0)], strict=True)]
@@ -140,7 +149,10 @@ def _weight(nodes: list[Fraction], i: int) -> Fraction:
 
 
 def _modified(order: int) -> Corrected:
-    """Return the method with a modified flow of B, without errors ε² h², and the corrector of an order."""
+    """Return the method with the corrector of an odd ``order`` in h, and B − h²{B, {B, A}}/24 in place of B.
+
+    Its errors begin at ε h^(order + 1) and ε² h^4.
+    """
     unmodified = _wisdom_holman(order)
     return replace(
         unmodified,
@@ -153,13 +165,16 @@ def _modified(order: int) -> Corrected:
 
 
 def _wisdom_holman(order: int) -> Corrected:
-    """Return the method with the corrector of an order; order 1 has no corrector."""
+    """Return the method with the corrector of an odd ``order`` in h; at order 1 there is no corrector.
+
+    Its errors begin at ε h^(order + 1) and ε² h^2.
+    """
     name = "wisdom-holman" if order == 1 else f"wisdom-holman-{order}"
     half = Fraction(1, 2)
     return Corrected(name, 2, (half, half), (order + 1, 2), (half, half), (Fraction(1),), corrector(order))
 
 
-#: All methods, the recommended one of each order first.
+#: All methods for near-integrable systems. The first one of each order is recommended.
 METHODS = (
     _quadrature(4),
     _quadrature(2),
@@ -175,10 +190,11 @@ NAMES = tuple(method.name for method in METHODS)
 
 
 def find(name: str, order: int) -> NearIntegrable | None:
-    """Return the method of this name (``auto``: the recommended one) and order, or None."""
+    """Return the near-integrable method with this name and order, or None; ``auto`` stands for the recommended
+    method."""
     return next((m for m in METHODS if m.order == order and name in ("auto", m.name)), None)
 
 
 def orders(name: str) -> list[int]:
-    """Return the orders of the methods of this name."""
+    """Return the orders for which there is a near-integrable method with this name."""
     return sorted({m.order for m in METHODS if m.name == name})
