@@ -1,4 +1,4 @@
-"""Checks and conversions of the arguments of solvers: numbers, counts, states and parameters."""
+"""Checks and conversions of the arguments that users pass to solvers: numbers, counts, states and parameters."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ from phigen.runtime.members import Members
 #: Largest number of steps. The C counts steps in unsigned 64 bits, NumPy's largest integers have 63 bits and a sign.
 _MOST = int(np.iinfo(np.int64).max)
 
-#: Largest finite number in single precision, for C with ``real: float``.
+#: Largest finite number in single precision, the range of states and parameters in C with ``real: float``.
 LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
-#: Largest values of the arguments that select random numbers; they are limited by the types in the C.
+#: Largest values of the arguments that select random numbers: those of their integer types in the C.
 _LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
 
 
-#: No selection of random numbers: seed, member and step0 are all omitted.
+#: Value for "seed, member and step0 are all omitted".
 NONE_DRAWN: Mapping[str, int | None] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class Beginning:
-    """Checked arguments of a trajectory: initial state ``x`` at the time ``t0``, step size, parameters, random numbers.
+    """Checked arguments of a trajectory: initial state ``x`` at the time ``t0``, step size ``h``, and parameter
+    ``values``.
 
-    ``first`` are the values of the initial attitude and position, None for the default. ``level`` is the energy level e
-    of a lattice whose steps are equal in τ; None stands for −H(x).
+    ``draws`` selects the random numbers. ``first`` are the values of the initial attitude and position, None for the
+    default. ``level`` is the energy level e of a lattice with a monitor (dt = g dτ); None stands for −H(x).
     """
 
     x: Floats
@@ -49,9 +50,11 @@ class Beginning:
 
 
 def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
-    """Return the energy level e of a lattice whose steps are equal in τ, and remove it from the arguments (``gauge``).
+    """Return the energy level e that the argument ``gauge`` sets for a lattice with a monitor, and remove this
+    argument.
 
-    None stands for −H of the initial state. Raises `ValueError` unless the value is a finite number.
+    None, for no such argument, stands for −H of the initial state. Raises `ValueError` for other values than one finite
+    number.
     """
     if not interface.monitored or "gauge" not in by_keyword:
         return None
@@ -62,7 +65,8 @@ def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
 
 
 def step_size(h: float) -> float:
-    """Return a step size. Raises `ValueError` if it is not finite, or 0."""
+    """Return the step size ``h`` as a float. Raises `ValueError` if it is 0 or not finite, `TypeError` if it is no
+    number."""
     size = number(h, "the step size h")
     if size == 0:
         raise ValueError("the step size h must not be 0")
@@ -70,7 +74,8 @@ def step_size(h: float) -> float:
 
 
 def end(until: float, begin: float, h: float) -> float:
-    """Return the time from ``begin`` to ``until``. Raises `ValueError` if its sign differs from that of the step."""
+    """Return the time from ``begin`` to ``until``. Raises `ValueError` if steps of size ``h`` lead away from
+    ``until``."""
     span = number(until, "the time until") - begin
     if span * h <= 0:
         raise ValueError(f"until = {until!r} is never reached from {begin!r} by steps of {h!r}")
@@ -78,8 +83,10 @@ def end(until: float, begin: float, h: float) -> float:
 
 
 def count(value: int, name: str, minimum: int, maximum: int = _MOST) -> int:
-    """Return an integer from ``minimum`` to ``maximum``. Raises `TypeError` for other types, `ValueError` for other
-    values."""
+    """Return ``value`` if it is an integer from ``minimum`` to ``maximum``; ``name`` is its name in messages.
+
+    Raises `TypeError` for values that are no integers, `ValueError` for integers outside of the range.
+    """
     try:
         number = operator.index(value)
     except TypeError:
@@ -92,9 +99,9 @@ def count(value: int, name: str, minimum: int, maximum: int = _MOST) -> int:
 
 
 def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, float]) -> float:
-    """Return the initial time, 0 by default.
+    """Return the initial time ``t0``, by default 0, of a trajectory.
 
-    If the Hamiltonian does not depend on the time, t0 may be the name of a parameter; its value is then added to
+    If the Hamiltonian does not depend on the time, a parameter may have the name t0; its value is then added to
     ``by_keyword``.
     """
     if t0 is None or interface.time:
@@ -106,9 +113,9 @@ def start_time(t0: float | None, interface: Interface, by_keyword: dict[str, flo
 
 
 def draws(interface: Interface, by_keyword: dict[str, Any], selections: Mapping[str, int | None] = NONE_DRAWN) -> Draws:
-    """Return the random numbers selected by the arguments seed, member and step0.
+    """Return the selection of random numbers that the arguments seed, member and step0 make.
 
-    Without noise these may be names of parameters; their values are then added to ``by_keyword``.
+    Without noise, parameters may have these names; their values are then added to ``by_keyword``.
     """
     selected = {name: value for name, value in selections.items() if value is not None}
     if interface.noise:
@@ -122,7 +129,10 @@ def draws(interface: Interface, by_keyword: dict[str, Any], selections: Mapping[
 
 
 def increments(values: ArrayLike, interface: Interface) -> Floats:
-    """Return the increments of the noise as an array (steps, draws). Raises `TypeError` and `ValueError`."""
+    """Return prescribed increments of the noise as an array (steps, draws).
+
+    Raises `TypeError` if the system has no noise, and `ValueError` for other shapes and for values that are not finite.
+    """
     if not interface.noise:
         raise TypeError(f"increments were given, but {interface.name} has no noise")
     rows = real(values, "increments")
@@ -134,7 +144,7 @@ def increments(values: ArrayLike, interface: Interface) -> Floats:
 
 
 def expect_no_noise(argument: str, interface: Interface) -> None:
-    """Raise `TypeError` if the system has noise, for functions that divide steps into parts.
+    """Raise `TypeError` if the system has noise; called for arguments that need shortened steps.
 
     The parts of a step would use other random numbers than the whole step.
     """
@@ -143,7 +153,8 @@ def expect_no_noise(argument: str, interface: Interface) -> None:
 
 
 def times_within(times: ArrayLike, t: Floats) -> Floats:
-    """Return times as an array (times,). Raises `ValueError` if one is outside the range of ``t``."""
+    """Return times as an array (times,). Raises `ValueError` if a time is outside the range of the trajectory's times
+    ``t``."""
     requested_times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     low, high = sorted((float(t[0]), float(t[-1])))
     slack = 1e-9 * (high - low)
@@ -153,7 +164,10 @@ def times_within(times: ArrayLike, t: Floats) -> Floats:
 
 
 def rows_at(t: Floats, x: Floats, requested_times: Floats) -> Floats:
-    """Return the rows of ``x`` (rows, DIM) at requested times. Raises `ValueError` for times that are not in ``t``."""
+    """Return those rows of ``x`` (rows, DIM) that are at the requested times; ``t`` (rows,) are the times of the rows.
+
+    Raises `ValueError` for a time at which there is no row.
+    """
     nearest = np.argmin(np.abs(t[:, np.newaxis] - requested_times), axis=0)
     apart = np.abs(t[nearest] - requested_times)
     if (apart > 1e-9 * np.ptp(t)).any():
@@ -169,10 +183,10 @@ def rows_at(t: Floats, x: Floats, requested_times: Floats) -> Floats:
 def times(
     t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], by_keyword: dict[str, Any]
 ) -> Floats | None:
-    """Return the times ``t`` of states as a flat array; ``shape`` is that of the leading axes of the states.
+    """Return the times ``t`` of states as a flat array, with one time for each state.
 
-    Returns None if the Hamiltonian does not depend on the time. Then t may be the name of a parameter, and its value is
-    added to ``by_keyword``.
+    ``shape`` is the shape of the array of states without the last axis. Returns None if the Hamiltonian does not depend
+    on the time; a parameter may then have the name t, and its value is added to ``by_keyword``.
     """
     if not interface.time:
         if t is not None and "t" not in interface.parameters:
@@ -188,7 +202,8 @@ def times(
 
 
 def together(mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the parameters of a mapping and those passed by keyword. Raises `TypeError` for a name in both."""
+    """Return parameters from a mapping and from keyword arguments in one dict. Raises `TypeError` for a name in
+    both."""
     repeated = sorted(set(mapped or {}) & set(by_keyword))
     if repeated:
         raise TypeError(f"parameter {repeated[0]!r} is given twice")
@@ -196,7 +211,8 @@ def together(mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any]) ->
 
 
 def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
-    """Return the declared bound of a parameter, ``positive`` or ``nonnegative``, if the value violates it; else ""."""
+    """Return the bound that a value violates: ``positive`` or ``nonnegative``, as the spec declares for the parameter,
+    or ""."""
     least = float(np.min(np.asarray(value), initial=np.inf))
     if name in interface.positive and not least > 0:
         return "positive"
@@ -206,7 +222,7 @@ def broken_bound(name: str, value: ArrayLike, interface: Interface) -> str:
 def parameters(
     interface: Interface, mapped: Mapping[str, float] | None, by_keyword: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the values of all parameters, from ``mapped`` and ``by_keyword``; the others have their defaults.
+    """Return the values of all parameters. Parameters that are in neither mapping have their default values.
 
     Raises `TypeError` for unknown names and names passed twice, `ValueError` for values that are not admissible.
     """
@@ -221,7 +237,7 @@ def parameters(
 
 
 def state(x: ArrayLike, argument: str, interface: Interface) -> Floats:
-    """Return a copy of one state (DIM,). Raises `TypeError` and `ValueError`, as `states`."""
+    """Return a copy of one state (DIM,). Raises `TypeError` and `ValueError` for values that are not a state."""
     copy = states(x, argument, interface)
     if copy.ndim != 1:
         expected = f"({interface.dimension},)"
@@ -230,7 +246,8 @@ def state(x: ArrayLike, argument: str, interface: Interface) -> Floats:
 
 
 def members(x: ArrayLike, argument: str, interface: Interface) -> Floats:
-    """Return a copy of the states of an ensemble (members, DIM). Raises `TypeError` and `ValueError`, as `states`."""
+    """Return a copy of the states of an ensemble (members, DIM). Raises `TypeError` and `ValueError` for other
+    values."""
     copies = states(x, argument, interface)
     if copies.ndim != 2:
         raise ValueError(f"{argument} must have shape (members, {interface.dimension}), not {copies.shape}")
@@ -248,17 +265,17 @@ def ensemble(
     interface: Interface,
     draws: Draws = FIRST_DRAWS,
 ) -> Members:
-    """Return the members of an ensemble from the arguments of `Solver.ensemble`, checked."""
+    """Return the checked arguments of `Solver.ensemble` as one `Members`."""
     per_member: dict[str, Any] = {name: v for name, v in {**(mapped or {}), **by_keyword}.items() if np.ndim(v) > 0}
     if t0 is not None and np.ndim(t0) > 0 and not interface.time:
-        per_member["t0"] = t0  # for systems without a time, t0 can only be a parameter
+        per_member["t0"] = t0  # if H does not depend on the time, t0 can only be the name of a parameter
     several: list[Any] = [v for v in (h, t0, *per_member.values()) if v is not None and np.ndim(v) > 0]
     if np.ndim(X0) == 1 and several:
         start = np.tile(state(X0, "X0", interface), (len(several[0]), 1))
     else:
         start = members(X0, "X0", interface)
     shape = (len(start),)
-    # Names are checked with one number in place of each array.
+    # To check the names of parameters, one number stands for each array.
     shared_values: list[dict[str, Any]] = [
         {n: 1.0 if n in per_member else v for n, v in (part or {}).items()} for part in (mapped, by_keyword)
     ]
@@ -306,7 +323,7 @@ def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: 
     identity and the origin.
     """
     if not interface.attitude:
-        first(np.eye(1), None, interface)  # raises the error that gives the reason why there is no attitude
+        first(np.eye(1), None, interface)  # raises the `TypeError` that says why this system has no attitude
     several = np.ndim(attitude0) > len(interface.attitude) if attitude0 is not None else False
     has_member_positions = position0 is not None and np.ndim(position0) > 1
     turns = array(attitude0, "attitude0", (members, *interface.attitude)) if several else None  # type: ignore[arg-type]
@@ -322,9 +339,9 @@ def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: 
 
 
 def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface) -> Floats | None:
-    """Return the numbers of an initial attitude, a unit quaternion or a matrix, and of a position, in one array.
+    """Return an initial attitude (a unit quaternion or a matrix) and a position as one flat array of numbers.
 
-    Returns None if neither is passed. Raises `TypeError` if the system has no attitude or position, and `ValueError`
+    Returns None if neither is passed. Raises `TypeError` if the system has no attitude or no position, and `ValueError`
     for other shapes.
     """
     if attitude0 is None and position0 is None:
@@ -374,8 +391,11 @@ def real(values: ArrayLike, argument: str) -> Floats:
 
 
 def number(value: float, argument: str) -> float:
-    """Return a value as a float. Raises `TypeError` if it is not a number, `ValueError` if it is not finite."""
-    if isinstance(value, str | bytes | bytearray):  # float() would accept text
+    """Return ``value`` as a float; ``argument`` is its name in messages.
+
+    Raises `TypeError` if the value is not a number, `ValueError` if it is not finite.
+    """
+    if isinstance(value, str | bytes | bytearray):  # refused, since float() would convert text to a number
         raise TypeError(f"{argument} must be a number, not {_shown(value)}")
     try:
         number = float(value)
@@ -391,14 +411,14 @@ def number(value: float, argument: str) -> float:
 
 
 def _shown(value: Any) -> str:
-    """Return a value as text for a message; Python refuses to print integers of thousands of digits."""
+    """Return a value as text for a message; Python's ``repr`` refuses integers with thousands of digits."""
     if isinstance(value, int) and abs(value) > _MOST:
         return f"an integer of {int(math.log10(abs(value))) + 1} digits"
     return shortened(value)
 
 
 def beyond_single(numbers: Mapping[str, Any]) -> str:
-    """Return a message that names the first value too large for single precision; "" if there is none."""
+    """Return a message about the first of some named numbers that is too large for single precision; "" if none is."""
     for name, value in numbers.items():
         largest = max(np.ravel(value).tolist(), key=abs, default=0.0)
         if abs(largest) > LARGEST_SINGLE:
@@ -407,7 +427,7 @@ def beyond_single(numbers: Mapping[str, Any]) -> str:
 
 
 def expect_known(names: Iterable[str], known: Mapping[str, float]) -> None:
-    """Raise `TypeError` for the first name that is not the name of a parameter."""
+    """Raise `TypeError` if one of the names is not a parameter; ``known`` are the parameters by name."""
     for name in names:
         if name not in known:
             raise TypeError(_unknown(name, known))

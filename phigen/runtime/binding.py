@@ -1,4 +1,4 @@
-"""Functions of a shared library through ctypes, with the types of their arguments."""
+"""Declaration, through ctypes, of the functions of a shared library with the types of their arguments and results."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ Signatures = Mapping[str, tuple[Any, tuple[Any, ...]]]
 def bound(
     library: Any, prefix: str, required: Signatures, optional: Signatures | None = None, *, single: bool = False
 ) -> Any:
-    """Return a namespace of the library's functions ``PREFIX_NAME``, with their types; ``optional`` functions may be
-    missing.
+    """Return a namespace of the library's functions ``PREFIX_NAME``, whose ctypes argument and result types are set.
 
-    With ``single``, arguments and results of type double are float. Raises `ToolchainError` if a ``required`` function
-    is missing.
+    Functions in ``optional`` may be missing from the library. With ``single``, each C double is declared as a float.
+    Raises `ToolchainError` if a ``required`` function is missing.
     """
     numbers = {ctypes.c_double: ctypes.c_float} if single else {}
     functions = SimpleNamespace()

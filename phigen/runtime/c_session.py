@@ -1,4 +1,4 @@
-"""Sessions of a generated C solver, each in a struct NAME_solver."""
+"""Sessions of a generated C solver; the state of each session is in a C struct NAME_solver."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from phigen.runtime.interface import BackendError, Floats, MissingExtraError, st
 Bytes = NDArray[np.uint8]
 Real = Any  # np.float64, or np.float32 where the C computes in single precision
 
-# Python delivers keyboard interrupts between two calls, which last milliseconds for small systems.
+# Largest number of steps in one call of C, which takes milliseconds for small systems: Python handles Ctrl-C only
+# between two calls.
 _STEPS_PER_CALL = 1 << 16
 _ALIGNMENT = 64  # bytes: the width of the widest vector registers (AVX-512)
 
 
 class Cotangents(NamedTuple):
-    """Cotangents that a reverse pass updates: of the state, of the parameters, and of the energy level e."""
+    """Cotangents that a reverse pass updates: those of the state, of the parameters, and of the energy level e of a
+    monitor."""
 
     state: Floats
     parameters: Floats
@@ -30,7 +32,7 @@ class Cotangents(NamedTuple):
 
 
 class CSession:
-    """A session in a C struct NAME_solver: a `phigen.runtime.session.Session`.
+    """A `phigen.runtime.session.Session` whose data are in a C struct NAME_solver.
 
     The struct contains no pointers, so a copy of its bytes is a copy of the session.
     """
@@ -80,11 +82,11 @@ class CSession:
         return tangent.astype(np.float64, copy=False)
 
     def pull_back(self, h: float, segment: Segment, tape: Floats, bars: Floats, cotangents: Cotangents) -> Floats:
-        """Return the rows (rows, DIM) of the segment that begins at the current state, and pull ``cotangents`` back to
-        its start.
+        """Compute the rows (rows, DIM) of a segment that begins at the current state, and pull cotangents back to its
+        start.
 
-        ``cotangents`` are overwritten: on entry those after the segment, on return those before it. ``bars`` are the
-        cotangents of the rows, ``tape`` is work space.
+        ``cotangents`` are overwritten: on entry they belong to the end of the segment, on return to its start. ``bars``
+        are the cotangents of the rows, ``tape`` is work space.
         """
         rows, level = np.empty_like(bars), (cotangents.level.ctypes.data,) * hasattr(self._c, "level_bar")
         out = (rows.ctypes.data, bars.ctypes.data, cotangents.state.ctypes.data, cotangents.parameters.ctypes.data)
@@ -155,7 +157,7 @@ def aligned(size: int) -> Bytes:
 
 
 def aligned_copy(struct: Bytes) -> Bytes:
-    """Return an aligned copy of the bytes of a struct."""
+    """Return a copy of the bytes of a struct, at an address that is aligned for vector registers."""
     copy = aligned(len(struct))
     copy[:] = struct
     return copy

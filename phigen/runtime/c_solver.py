@@ -1,9 +1,9 @@
-"""A generated C solver, called through ctypes.
+"""Loaded solver in C: a shared library, called through ctypes.
 
-Besides the documented functions it calls ``size_t NAME_solver_size(void)``; ``size_t NAME_solver_steps_done(const
-NAME_solver *)``, the number of successful steps since ``NAME_init``; and with a monitor ``double NAME_solver_time(const
-NAME_solver *)``. Of the solver's struct only the first member, ``x[DIM]`` of double or float, is read; the struct is
-copied and stored as bytes.
+Besides the documented functions, this module calls ``size_t NAME_solver_size(void)``; ``size_t
+NAME_solver_steps_done(const NAME_solver *)``, the number of successful steps since ``NAME_init``; and with a monitor
+``double NAME_solver_time(const NAME_solver *)``. It reads only the first member of the solver's struct, ``x[DIM]`` of
+double or float; otherwise the struct is copied and stored as bytes.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from phigen.runtime.members import Members, one_by_one, shared_out
 
 
 class CSolver:
-    """Back end over the shared library compiled from generated C files (name → text).
+    """Solver over the shared library of generated C files (name → text): a `phigen.runtime.backend.Backend`.
 
-    It implements `phigen.runtime.backend.Backend`. It has no state of a trajectory, so several threads may use it. The
-    library is taken from the cache or compiled. Raises `ToolchainError`.
+    The object has no state of a trajectory, so several threads may use it. The library is taken from the cache or, if
+    it is not there, compiled. Raises `ToolchainError`.
     """
 
     target = "c"
@@ -88,7 +88,10 @@ class CSolver:
         return session
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> CSession:
-        """See `phigen.runtime.backend.Backend`; the parameters are part of the bytes."""
+        """Return the session that was saved as bytes, as `phigen.runtime.backend.Backend.restored` says.
+
+        ``parameters`` is not used, since the bytes contain the parameters.
+        """
         if len(saved) != self._c.solver_size():
             raise ValueError(f"{len(saved)} bytes are not a {self.interface.name}_solver of this library")
         struct, interface = aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
@@ -108,7 +111,7 @@ class CSolver:
         frames = members.frames() if members.stride else None
 
         def make(part: slice) -> None:
-            x = self._own(members.x0[part].T)  # x[DIM][members]
+            x = self._own(members.x0[part].T)  # the C expects x[DIM][members]
             if are_identical:
                 self._alike(members.part(part), x, status[part])
             else:
@@ -125,7 +128,7 @@ class CSolver:
     def _expect_parameters(self, members: Members) -> None:
         """Raise `BackendError` if no step is possible with the parameters of an ensemble that has no members.
 
-        Systems with a monitor are not checked: for them the check depends on the initial state.
+        With a monitor nothing is checked, since its check needs an initial state.
         """
         if hasattr(self._c, "monitor"):
             return
@@ -142,7 +145,8 @@ class CSolver:
             raise BackendError(status_name(status), 0, members.x0)
 
     def _alike(self, members: Members, x: Floats, status: Bytes) -> None:
-        """Integrate members ``x`` (DIM, members) in place; the members differ in their states only."""
+        """Integrate the states ``x`` (DIM, members) in place, for members that have equal parameters, step sizes and
+        times."""
         h, parameters, t0 = members.numbers(0)
         packed = self._packed(parameters)
         start, further_arguments = (
@@ -159,7 +163,8 @@ class CSolver:
             self._c.ensemble(*start, *further_arguments)
 
     def _each(self, members: Members, x: Floats, status: Bytes, rows: Floats | None) -> None:
-        """Integrate members ``x`` (DIM, members) in place; each has its own parameters, step size and initial time.
+        """Integrate the states ``x`` (DIM, members) in place; each member has its own parameters, step size and initial
+        time.
 
         ``rows`` (frames, members, DIM) receives the states of the frames; None if there are no frames.
         """
@@ -175,7 +180,8 @@ class CSolver:
             rows[: len(frames)] = frames.transpose(0, 2, 1)
 
     def _with_attitudes(self, members: Members, threads: int | None, attitudes: Floats) -> Floats:
-        """Return the result of `ensemble` for members with attitudes, and write these into ``attitudes``."""
+        """Return the result of `ensemble` for members with attitudes, and write their attitudes into the array
+        ``attitudes``."""
         count, row_count = len(members), members.steps // members.stride if members.stride else 0
         frames = members.frames() if members.stride else None
         final, last, status = members.x0.copy(), attitudes[0].copy(), np.zeros(count, dtype=np.uint8)
@@ -205,7 +211,8 @@ class CSolver:
     ) -> None:
         """Integrate members with attitudes in place.
 
-        ``initial`` are their states and attitudes (numbers, members); ``rows`` receives those of the frames.
+        ``initial`` are their states (DIM, members) and attitudes (numbers, members). ``rows`` are two arrays that
+        receive the states and the attitudes of the frames.
         """
         packed, times_or_gauges, h = self._packed_arguments(members)
         start = [packed if members.parameters else None, *initial]
@@ -223,10 +230,11 @@ class CSolver:
         )
 
     def _packed_arguments(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
-        """Return parameters (members, parameters), a list of times or gauges, and the step sizes (members,).
+        """Return the arrays of an ensemble for the C: parameters (members, parameters), times or gauges, and steps
+        (members,).
 
-        The list has one entry if the system has a time or a gauge, else none. The entry for gauges is None if the C
-        chooses them.
+        The list of times or gauges has one entry if H depends on the time, or if Casimirs are subtracted from H, else
+        none. The entry for gauges, the multiples of Casimirs, is None if the C chooses them.
         """
         count, width = len(members), max(1, len(members.parameters))
         packed = np.empty((count, width))
@@ -279,10 +287,11 @@ class CSolver:
         return rows, x0_bar, parameters_bar
 
     def _can_batch_pullback(self, members: Members) -> bool:
-        """Whether all members can be pulled back together, by one call for each segment of the run.
+        """Whether the derivatives of all members can be computed together, by one call of C for each segment of the
+        run.
 
-        A run of several segments cannot be batched if it has a time or a gauge: each segment would need its own initial
-        values of these.
+        This is not possible for several segments if H depends on the time or has a gauge, since the C would take the
+        initial values of time and gauge at the start of each segment.
         """
         if not hasattr(self._c, "pullback_each"):
             return False
@@ -294,7 +303,8 @@ class CSolver:
     def _all_pulled(
         self, members: Members, segments: Sequence[Segment], tape: Floats, bars: Floats, status: Bytes
     ) -> tuple[Floats, Floats, Floats]:
-        """Return the pullback of some members; one call of C processes all of them over one segment."""
+        """Return the pullback of the members of one part of an ensemble; each call of C processes all members over one
+        segment."""
         rows, (packed, times_or_gauges, h) = np.empty_like(bars), self._packed_arguments(members)
         parameters_bar, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)
         parameters_address = packed.ctypes.data if members.parameters else None
@@ -339,7 +349,7 @@ class CSolver:
         parameters: Mapping[str, float],
         t0: float,
     ) -> tuple[Floats, Floats, Floats]:
-        """Return the pullback of one member; the segments are processed in reverse order."""
+        """Return the pullback of one member of an ensemble; its segments are processed in reverse order."""
         current, segment_sessions, rows = self.start(x0, parameters, t0), list[CSession](), np.empty_like(bars)
         for segment in segments:
             segment_sessions.append(current)
@@ -395,7 +405,7 @@ class CSolver:
         return result.astype(np.float64, copy=False)
 
     def _packed(self, parameters: Mapping[str, float]) -> Floats:
-        # A struct without parameters has one unused char, so that one zero is large enough.
+        # A C struct cannot be empty: without parameters it has one unused char, and one zero is large enough for it.
         return self._own(np.array(list(parameters.values()) or [0.0]))
 
     def _own(self, values: Floats) -> NDArray[Any]:
@@ -407,8 +417,8 @@ class CSolver:
 
 
 def _times(t: Floats | None) -> list[list[float]]:
-    """Return a list that contains the times of rows, the first argument of C functions; empty if the system has no
-    time."""
+    """Return a list with the list of times as its only element, to be unpacked as an argument of ``zip``; [] for
+    None."""
     return [] if t is None else [t.tolist()]
 
 
@@ -419,7 +429,7 @@ def _addresses(x: Floats) -> range:
 
 
 def load(files: Mapping[str, str], interface: Interface) -> CSolver | CLattice:
-    """Return the back end of generated files; see `phigen.registry`."""
+    """Return the solver that runs generated C code; ``files`` maps file names to texts."""
     if isinstance(interface, LatticeInterface):
         return CLattice(files, interface)
     return CSolver(files, interface)

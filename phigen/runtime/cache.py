@@ -1,9 +1,9 @@
-"""A content-addressed cache of compiled solvers.
+"""A cache of compiled solvers in a folder, addressed by content.
 
 An entry is one file, ``KEY-DIGEST.so``. KEY is a hash of everything that determines the library: sources, compiler,
-flags, machine. DIGEST is a hash of the library, by which an entry verifies itself. Entries are published by an atomic
-rename and never changed, so processes may share the directory. A process that finds no entry, or a damaged one,
-compiles the library and publishes it.
+flags, machine. DIGEST is a hash of the library file, by which damage is detected. An entry is written by an atomic
+rename and never changed, so several processes may share the folder. A process that finds no entry, or a damaged one,
+compiles the library and stores it as a new entry.
 """
 
 from __future__ import annotations
@@ -28,16 +28,18 @@ from phigen.errors import PhigenWarning, ToolchainError
 from phigen.runtime import toolchain
 from phigen.runtime.toolchain import Compiler
 
-#: Bytes of the cache beyond which the least recently used entries are removed: about 10,000 solvers of small systems.
+#: Size of the cache in bytes beyond which the least recently used entries are removed: about 10,000 solvers of small
+#: systems.
 MAXIMUM_SIZE = 512 * 2**20
 
 _SUFFIX = ".so"
 _SCRATCH = "building-"
-_SCRATCH_LIFETIME = 3600.0  # seconds; an older folder belongs to a process that died: compilations end after minutes
+_SCRATCH_LIFETIME = 3600.0  # seconds; compilations take minutes, so an older folder belongs to a process that died
 
 
 def directory() -> Path:
-    """Return the folder of the cache: PHIGEN_CACHE_DIR, else the platform's folder for caches. It may not exist yet."""
+    """Return the folder of the cache, which may not exist yet: PHIGEN_CACHE_DIR, or else the user's folder for
+    caches."""
     configured = os.environ.get("PHIGEN_CACHE_DIR")
     if configured:
         return Path(configured)
@@ -51,17 +53,17 @@ def directory() -> Path:
 
 
 def load(files: Mapping[str, str], *, threads: bool = False) -> ctypes.CDLL:
-    """Return the shared library compiled from C files (name → text), from the cache or compiled now.
+    """Return the shared library of C files (name → text), from the cache or, if it is not there, compiled now.
 
-    Files whose names end in ``.c`` are compiled, the others are headers. With ``threads``, the library uses OpenMP if
+    Files whose names end in ``.c`` are compiled, all others are headers. With ``threads``, the library uses OpenMP if
     the compiler has it. Raises `ToolchainError`.
     """
     path = build(files, threads=threads)
     try:
         return ctypes.CDLL(str(path))
     except OSError:
-        # Either another process has just cleared the cache, or its folder is mounted noexec. A library in a private
-        # folder works in both cases.
+        # Either another process has just cleared the cache, or its folder is mounted with noexec. In both cases a
+        # library in a private folder can be loaded.
         path = build(files, _private_directory(), threads=threads)
     try:
         return ctypes.CDLL(str(path))
@@ -71,9 +73,9 @@ def load(files: Mapping[str, str], *, threads: bool = False) -> ctypes.CDLL:
 
 
 def build(files: Mapping[str, str], folder: Path | None = None, *, threads: bool = False) -> Path:
-    """Return the path of the verified library compiled from C files, in ``folder`` or by default in the cache.
+    """Return the path of the compiled library of C files, in ``folder`` or, by default, in the cache.
 
-    If the cache cannot be written, the library goes to a private temporary folder, with a warning.
+    If the folder cannot be written, the library goes to a private temporary folder, with a warning.
     """
     compiler = toolchain.threaded(toolchain.find()) if threads else toolchain.find()
     name = _key(files, compiler)
@@ -98,12 +100,13 @@ def build(files: Mapping[str, str], folder: Path | None = None, *, threads: bool
 
 
 def key_of(library: ctypes.CDLL) -> str:
-    """Return the hash of everything that determined a library from `load`."""
+    """Return the key in the cache, a hash of sources, compiler, flags and machine, of a library that `load`
+    returned."""
     return Path(library._name).stem.rpartition("-")[0]
 
 
 def clear() -> int:
-    """Remove all entries and return their number. Loaded libraries stay usable."""
+    """Remove all entries of the cache and return their number. Libraries that are loaded stay usable."""
     count = 0
     for entry in list(_entries(directory())):
         with contextlib.suppress(OSError):
@@ -131,9 +134,9 @@ def _look_up(folder: Path, name: str) -> Path | None:
         for entry in sorted(folder.glob(f"{name}-*{_SUFFIX}")):
             if entry.stem.rpartition("-")[2] == _digest(entry):
                 with contextlib.suppress(OSError):
-                    os.utime(entry)  # _trim removes entries by the time of their last use
+                    os.utime(entry)  # marks the entry as used now: _trim removes the least recently used entries
                 return entry
-    except OSError:  # unreadable, or removed by another process
+    except OSError:  # the folder cannot be read, or another process has removed the entry
         pass
     return None
 
@@ -175,7 +178,11 @@ def _entries(folder: Path) -> Iterator[Path]:
 
 
 def _trim(folder: Path, keep: Path) -> None:
-    """Remove the least recently used entries beyond the maximum size, and folders of dead processes; ignore errors."""
+    """Remove the least recently used entries beyond `MAXIMUM_SIZE`, but not ``keep``, and folders of processes that
+    died.
+
+    Errors are ignored.
+    """
     sizes: list[tuple[float, int, Path]] = []
     with contextlib.suppress(OSError):
         for left in folder.glob(f"{_SCRATCH}*"):
@@ -195,9 +202,9 @@ def _trim(folder: Path, keep: Path) -> None:
 
 @cache
 def _private_directory() -> Path:
-    """Return a folder of this process, which is removed when the process ends.
+    """Return a temporary folder for this process only, which is removed when the process ends.
 
-    Its name is random: other users could place libraries in a folder with a predictable name.
+    The name of the folder is random: in a folder with a predictable name, other users could place libraries.
     """
     folder = Path(tempfile.mkdtemp(prefix="phigen-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)

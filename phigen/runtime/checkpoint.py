@@ -15,7 +15,7 @@ from phigen.reading import opened
 from phigen.writing import replacing
 
 _IDENTITY = "identity"
-#: Entries of an identity that are hashes; messages do not print their values.
+#: Entries of the identity of a run whose values are hashes, which error messages therefore do not print.
 HASHES = ("spec", "solver")
 
 
@@ -25,13 +25,16 @@ class MismatchError(Exception):
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A checkpoint: ``identity`` describes the run in plain data, ``arrays`` are its state."""
+    """A checkpoint: ``arrays`` are the state of a run, and ``identity`` are the settings of the run, as plain data."""
 
     identity: Mapping[str, Any]
     arrays: Mapping[str, Any]
 
     def save(self, path: Path) -> None:
-        """Write the file and rename it into place, so that a complete checkpoint exists whenever the process ends."""
+        """Write the checkpoint to a temporary file and rename it to ``path``.
+
+        So ``path`` is always a complete checkpoint, even if the process ends during the writing.
+        """
         text = np.frombuffer(json.dumps(self.identity).encode(), dtype=np.uint8)
         entries: dict[str, Any] = {_IDENTITY: text, **self.arrays}
         with replacing(path) as file:
@@ -39,10 +42,10 @@ class Checkpoint:
 
 
 def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) -> str:
-    """Return the reason why a run may not begin or resume with these files; "" if it may.
+    """Return the reason why a run may not begin, or resume, with the existing files; "" if it may.
 
     A new run does not overwrite the files of an interrupted run, and a complete run cannot be resumed. ``how`` is the
-    name of the option for resuming, for the message.
+    option for resuming, which the message names.
     """
     if not resume and checkpoint.exists():
         return f"{checkpoint} belongs to an interrupted run: continue it with {how}, or remove the file"
@@ -59,7 +62,7 @@ def objection_to_frames(part: Path) -> str:
 
 
 def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the arrays of the checkpoint of a run.
+    """Return the arrays of the checkpoint at ``path``, for a run with the settings ``identity``.
 
     Raises `MismatchError` if the checkpoint belongs to another run, or if the file is not a checkpoint.
     """
@@ -79,5 +82,5 @@ def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _difference(key: str, earlier: Any, current: Any) -> str:
-    # The values of hashes are left out: they do not help a reader.
+    # A hash is not printed: its value does not help the user.
     return f"the {key} has changed" if key in HASHES else f"{key} was {earlier!r} and is {current!r}"

@@ -1,4 +1,4 @@
-"""Conversion of trajectories to objects of xarray and pandas, which are optional packages."""
+"""Conversion of trajectories to datasets of xarray and data frames of pandas, which are optional packages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 
 def to_xarray(trajectory: Trajectory) -> xr.Dataset:
-    """Return a Dataset: ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and observables (t), with attributes."""
+    """Return a trajectory as a Dataset: ``x`` (t, coordinate), and ``energy``, ``casimir_NAME``, each observable (t).
+
+    Step size, number of steps and parameters are attributes.
+    """
     xarray = imported("xarray")
     dataset: xr.Dataset = xarray.Dataset(
         {
@@ -34,7 +37,11 @@ def to_xarray(trajectory: Trajectory) -> xr.Dataset:
 
 
 def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
-    """Return a DataFrame with the columns of a ``.csv``, indexed by t; its ``attrs`` hold step and parameters."""
+    """Return a trajectory as a DataFrame indexed by t, with the columns of the ``.csv`` file that `Trajectory.save`
+    writes.
+
+    ``attrs`` of the data frame has the step size, the number of steps and the parameters.
+    """
     pandas = imported("pandas")
     names = [name for column in trajectory.columns() for name in column.names]
     frame: pd.DataFrame = pandas.DataFrame(trajectory.rows(), columns=names).set_index(names[0])
@@ -43,7 +50,10 @@ def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
 
 
 def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
-    """Return a Dataset: ``x`` (t, coordinate, *axes), ``energy`` (t), Casimirs, observables, arrays of parameters."""
+    """Return a trajectory of a lattice as a Dataset with the state ``x`` (t, coordinate, *axes) and ``energy`` (t).
+
+    Casimirs, observables, parameters that are arrays, and the bonds of a graph are further variables.
+    """
     xarray = imported("xarray")
     interface = trajectory.solver.interface
     axes = trajectory.axes

@@ -11,7 +11,7 @@ Inner = TypeVar("Inner", bound=Followed)
 
 
 class Forwarding(Generic[Inner]):
-    """A `phigen.runtime.session.Followed` with the state, the time and the attitude of the wrapped ``session``."""
+    """A `phigen.runtime.session.Followed` whose state, time and attitude are those of the wrapped ``session``."""
 
     def __init__(self, session: Inner) -> None:
         self.session = session

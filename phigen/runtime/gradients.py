@@ -1,5 +1,7 @@
-"""Pullback of cotangents through runs with checkpointing: division of a run into segments, some of which are
-recomputed."""
+"""Derivatives of runs in reverse mode, with checkpointing: a run is divided into segments that fit on a tape.
+
+All segments but the last are computed twice.
+"""
 
 from __future__ import annotations
 
@@ -16,19 +18,22 @@ from phigen.runtime.interface import BackendError, Floats, Interface, MissingExt
 if TYPE_CHECKING:
     from phigen.runtime.solver import Solver
 
-#: Largest number of values on the tape of one segment of a run (32 MiB in double precision). Longer runs are divided
-#: into segments, and all but the last are computed twice.
+#: Largest number of values on the tape, which holds one segment of a run (32 MiB in double precision). Longer runs are
+#: divided into segments, of which all but the last are computed twice.
 MAX_TAPE_VALUES = 1 << 22
 
 
 def without_pullback(interface: Interface) -> TypeError:
-    """Return the error for a solver that was compiled without the extra ``adjoint``."""
+    """Return the `TypeError` for a solver that was compiled without ``adjoint``, and so has no pullback."""
     hint = "compile it with adjoint=True, or write adjoint: true in the spec"
     return TypeError(f"{interface.name} was compiled without pullback; {hint}")
 
 
 class Pullback(NamedTuple):
-    """Result of `Solver.pullback`: states, and cotangents of the initial state and of the parameters (by name)."""
+    """Result of `Solver.pullback`: states, and derivatives by the initial state and by the parameters (by name).
+
+    The derivatives are those of the scalar product of the states with a cotangent.
+    """
 
     x1: Floats
     x0_bar: Floats
@@ -36,7 +41,8 @@ class Pullback(NamedTuple):
 
 
 class Jacobian(NamedTuple):
-    """Result of `Solver.jacobian`: the last state, and its derivatives by the initial state and by the parameters."""
+    """Result of `Solver.jacobian`: the last state, its derivative by the initial state, and derivatives by
+    parameters."""
 
     x1: Floats
     by_x0: Floats
@@ -45,10 +51,10 @@ class Jacobian(NamedTuple):
 
 @dataclass(frozen=True)
 class Segment:
-    """Part of a run between two stored states: ``count`` steps after the step ``first``.
+    """Part of a run that is differentiated at once: ``count`` steps, which begin after step number ``first``.
 
-    ``rows`` are the numbers of the trajectory's rows in it: one after every ``stride`` steps, and the last at its end.
-    They are empty if the segment ends between two rows.
+    ``rows`` are the numbers of the rows of the trajectory in this part: one after every ``stride`` steps, and the last
+    at its end. ``rows`` is empty if the segment ends between two rows.
     """
 
     first: int
@@ -58,9 +64,9 @@ class Segment:
 
 
 def segments(steps: int, stride: int, limit: int) -> list[Segment]:
-    """Return the segments of a run, each of at most ``limit`` steps.
+    """Return the segments of a run of ``steps`` steps, each of at most ``limit`` steps.
 
-    Row r of the run follows r strides; the last row follows the last step.
+    Row r of the run is after r·stride steps, the last row after the last step.
     """
 
     def cut() -> Iterator[Segment]:
@@ -72,7 +78,7 @@ def segments(steps: int, stride: int, limit: int) -> list[Segment]:
             if last - first <= limit:
                 yield Segment(first, last - first, stride, rows)
                 continue
-            for begin in range(first, last, limit):  # a single stride that is longer than the limit
+            for begin in range(first, last, limit):  # one stride is longer than the limit, so it is divided
                 count = min(limit, last - begin)
                 yield Segment(begin, count, count, rows if begin + count == last else range(0))
 
@@ -90,7 +96,7 @@ def pullback(
     threads: int | None,
     parameters: Mapping[str, Any],
 ) -> Pullback:
-    """Return the result of `Solver.pullback`, for arguments in the shapes that users pass."""
+    """Compute the pullback of a run: the implementation of `Solver.pullback`, with arguments not yet checked."""
     interface = solver.interface
     start = arguments.states(x0, "x0", interface)
     if start.ndim > 2:
@@ -124,7 +130,8 @@ def pullback(
 
 
 def cotangents(cotangent: ArrayLike, shape: tuple[int, ...]) -> Floats:
-    """Return cotangents as an array of the given shape. Raises `ValueError` for other shapes and non-finite values."""
+    """Return the user's cotangent as an array. Raises `ValueError` if its shape is not ``shape``, or a value is not
+    finite."""
     bars = arguments.real(cotangent, "cotangent")
     if bars.shape != shape:
         raise ValueError(f"cotangent must have shape {shape}, that of the states, not {bars.shape}")

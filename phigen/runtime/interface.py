@@ -1,4 +1,5 @@
-"""Interfaces of generated solvers: names, sizes and features that the runtime needs, and the errors of back ends."""
+"""Interfaces of generated solvers (names, sizes and features that the runtime needs), and the errors of failing
+steps."""
 
 from __future__ import annotations
 
@@ -14,16 +15,16 @@ from phigen.ir.launches import EnsembleLaunch, LatticeLaunches
 
 Floats = NDArray[np.float64]
 
-#: Function that is called from time to time with the number of steps done so far.
+#: Function that an integration calls from time to time, with the number of steps done so far.
 Progress = Callable[[int], Any]
 
 
-#: Names of NAME_status in C, by value, without the prefix.
+#: Names of the constants of the C enumeration NAME_status, by value, without the prefix NAME_.
 STATUSES = ("OK", "NO_CONVERGENCE", "SINGULAR", "NOT_FINITE", "BAD_ARGUMENT")
 
 
 def status_name(value: int) -> str:
-    """Return the name of a status of the C, without its prefix."""
+    """Return the name of a status code of the generated C, without the prefix; ``STATUS_9`` for the unknown code 9."""
     return STATUSES[value] if value < len(STATUSES) else f"STATUS_{value}"
 
 
@@ -36,31 +37,31 @@ class Draws:
     step: int = 0
 
 
-#: The random numbers of a trajectory by default.
+#: Default selection of random numbers: those of seed 0 and member 0, from step 0 on.
 FIRST_DRAWS = Draws()
 
 
 @dataclass(frozen=True)
 class Interface:
-    """Names, sizes and features of a generated solver; names are in the order of declaration."""
+    """Names, sizes and features of a generated solver; names are in the order of their declaration in the spec."""
 
-    name: str  # prefix of the symbols of the C code
+    name: str  # name of the system, the prefix of the symbols of the C code
     coordinates: tuple[str, ...]
     order: int
-    parameters: Mapping[str, float]  # defaults
+    parameters: Mapping[str, float]  # name → default value
     positive: frozenset[str] = frozenset()  # the parameters that must be positive
     nonnegative: frozenset[str] = frozenset()  # the parameters that must be 0 or positive
     casimirs: tuple[str, ...] = ()
     time: str = ""  # the name of the time, "" if the Hamiltonian does not depend on it
-    moving: frozenset[str] = frozenset()  # the names among energy and Casimirs whose values time or forces change
-    monitored: bool = False  # whether steps are equal in τ, not in t
+    moving: frozenset[str] = frozenset()  # those of ``energy`` and the Casimirs that explicit time or forces change
+    monitored: bool = False  # whether a monitor rescales time by dt = g dτ: steps are equal in τ, not in t
     attitude: tuple[int, ...] = ()  # the shape of the attitude, () if the spec reconstructs none
     position: bool = False  # whether the spec reconstructs a position too
     noise: tuple[str, ...] = ()  # names of the sources of noise
-    draws: int = 0  # number of increments of the noise in a step
+    draws: int = 0  # number of random increments that a step with noise uses
     single: bool = False  # whether the C computes in single precision
     observables: tuple[str, ...] = ()
-    # launch parameters of the ensemble kernel on devices
+    # launch parameters of the kernel that integrates ensembles on graphics cards
     ensemble: EnsembleLaunch = field(default_factory=EnsembleLaunch)
 
     @property
@@ -70,7 +71,8 @@ class Interface:
 
     @property
     def element(self) -> int:
-        """The number of values of an attitude and a position together."""
+        """The number of values that describe an attitude and a position together; 0 if the spec reconstructs
+        neither."""
         return math.prod(self.attitude) + 3 * self.position if self.attitude else 0
 
 
@@ -78,9 +80,10 @@ class Interface:
 class LatticeInterface(Interface):
     """Interface of the solver of a lattice, whose states have the shape (coordinates, *sizes).
 
-    ``coordinates`` are those of one site. Parameters in ``at_sites`` have a value at each site, those in ``at_bonds``
-    at each bond of a graph. An entry of ``casimir_kinds`` is ``sites`` for a Casimir of each site, ``sum`` or
-    ``product`` for one over all sites. Sizes are multiples of ``periods``, and at least ``least``.
+    ``coordinates`` are the coordinates of one site. Parameters in ``at_sites`` have a value at each site, parameters in
+    ``at_bonds`` a value at each bond of a graph. ``casimir_kinds`` has one entry per Casimir: ``sites`` if each site
+    has its own, ``sum`` or ``product`` if one number is the sum or product of densities over all sites. The number of
+    sites along an axis is a multiple of its entry in ``periods``, and at least its entry in ``least``.
     """
 
     axes: tuple[str, ...] = ()
@@ -88,33 +91,35 @@ class LatticeInterface(Interface):
     casimir_kinds: tuple[str, ...] = ()
     periods: tuple[int, ...] = ()
     least: tuple[int, ...] = ()
-    required: frozenset[str] = frozenset()  # parameters at sites and bonds whose default is an array
+    required: frozenset[str] = frozenset()  # parameters at sites or bonds whose defaults depend on the sizes
     first_open: bool = False  # whether the first axis has open ends
     open_axes: tuple[bool, ...] = ()
-    colour_period: int = 1  # number of planes of the first axis after which the colouring of sites repeats
+    colour_period: int = 1  # number of planes of the first axis after which the colours of sites repeat
     graph: bool = False
     pairs: bool = False  # whether every pair of sites interacts
-    compensated: bool = False  # whether the C stores a compensation term for each field
+    compensated: bool = False  # whether the C stores a compensation term for each value of the state
     at_bonds: tuple[str, ...] = ()
-    masses: str = ""  # parameter with the masses of bodies in relative coordinates, the first of which is positive
+    masses: str = ""  # parameter that holds masses of bodies in relative coordinates; its first value must be positive
     observed_fields: tuple[str, ...] = ()  # observables with a value at each site
     colours: int = 1
-    # colour of a site: the sum of weights times position, modulo the number of colours
+    # weights w of the axes: the site (i, j, …) has the colour (w₁ i + w₂ j + …) modulo the number of colours
     colour_weights: tuple[int, ...] = ()
     launches: LatticeLaunches = field(default_factory=LatticeLaunches)  # launch parameters of the kernels on devices
-    slow_steps: bool = False  # whether recomputing a step takes longer than writing and reading its tape
+    slow_steps: bool = False  # whether a step takes longer to recompute than to write to a tape and read back
 
     def is_shared(self, sites: int) -> bool:
-        """Whether threads share the work on a lattice of ``sites`` sites, by the thresholds of the C runtime."""
+        """Whether several threads share a lattice of ``sites`` sites; smaller lattices use one thread, as in the C
+        runtime.
+        """
         return sites > (512 if self.pairs else 4096)
 
 
 @dataclass
 class Clock:
-    """The time as a function of the number of steps.
+    """The time as a function of the number of steps, without accumulated rounding errors.
 
-    It is t + (steps − counted)·h, where ``t`` and ``counted`` are the time and the number of steps at the last change
-    of the step size. So rounding errors do not accumulate.
+    The time after ``steps`` steps is t + (steps − counted)·h, where ``t`` and ``counted`` are the time and the number
+    of steps at the last change of the step size.
     """
 
     t: float = 0.0
@@ -126,17 +131,17 @@ class Clock:
         return self.t + (steps - self.counted) * self.h
 
     def set_step(self, h: float, steps: int) -> None:
-        """Change the step size to h, after a number of steps."""
+        """Change the step size to h after ``steps`` steps; the time of that step is the new origin of `after`."""
         if h != self.h:
             self.t, self.h, self.counted = self.after(steps), h, steps
 
 
 class BackendError(Exception):
-    """A step failed inside a back end; `phigen.runtime.solver` turns this into the user's `StepError`.
+    """A step failed in the generated code; `phigen.runtime.solver` converts this error to the user's `StepError`.
 
-    ``states`` are the rows up to the failure; the last row is the state before the failing step. For an ensemble they
-    are the last states of all members. ``step`` is the number of successful steps, −1 if unknown. ``failures`` maps
-    each failed member to its status.
+    ``states`` are the rows up to the failure, of which the last is the state before the failing step. For an ensemble,
+    ``states`` are the last states of all members. ``step`` is the number of successful steps, −1 if unknown.
+    ``failures`` maps the number of each failed member to the name of its status.
     """
 
     def __init__(
@@ -153,10 +158,11 @@ class BackendError(Exception):
 
 
 class MissingExtraError(Exception):
-    """The generated code was built without the requested function."""
+    """The generated code lacks the requested function, since an option such as ``tangent`` or ``adjoint`` was not
+    set."""
 
 
 def row_steps(steps: int, stride: int) -> NDArray[np.int64]:
-    """Return the numbers of the steps that are stored: 0, stride, 2·stride, …, and the last."""
+    """Return the numbers of the steps after which a state is stored: 0, stride, 2·stride, …, and the last."""
     rows = np.arange(0, steps + 1, stride, dtype=np.int64)
     return rows if rows[-1] == steps else np.append(rows, steps)

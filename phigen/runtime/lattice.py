@@ -1,4 +1,4 @@
-"""Solvers of lattices of any size, with states of shape (coordinates, *sizes) and frames in memory or in a file."""
+"""Solvers of lattices of any size, and their trajectories of states (coordinates, *sizes), in memory or in a file."""
 
 from __future__ import annotations
 
@@ -68,7 +68,8 @@ if TYPE_CHECKING:
 
 
 class LatticeSession(Protocol):
-    """A lattice being integrated. A failing step raises `BackendError` and leaves the state before it."""
+    """Protocol of a lattice that is integrated step by step. If a step fails, `BackendError` is raised, and the state
+    before the step remains."""
 
     @property
     def steps(self) -> int:
@@ -80,11 +81,11 @@ class LatticeSession(Protocol):
         ...
 
     def time(self) -> float:
-        """Return the physical time since the start. With a monitor, whose steps are equal in a rescaled time τ."""
+        """Return the physical time since the start, if a monitor (dt = g dτ) makes steps equal in τ, not in t."""
         ...
 
     def hold(self, level: float) -> None:
-        """Set the energy level e of the monitor, which is −H of the state by default."""
+        """Set the energy level e of a lattice with a monitor; by default e is −H of the initial state."""
         ...
 
     def advance(self, h: float, steps: int) -> None:
@@ -92,26 +93,30 @@ class LatticeSession(Protocol):
         ...
 
     def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
-        """Make ``steps`` steps, and return ``vectors`` (count, coordinates, *sizes) multiplied by their derivatives.
+        """Make ``steps`` steps, and return the ``vectors`` (count, coordinates, *sizes) multiplied by the derivatives
+        of the steps.
 
-        Raises `MissingExtraError` without the extra ``tangent``.
+        Raises `MissingExtraError` if the solver was compiled without ``tangent``.
         """
         ...
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays that `resume` needs, in addition to the state, to continue with the same bits."""
+        """Return the arrays that `resume` needs, in addition to the state, to continue this integration with the same
+        bits."""
         ...
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
-        """Continue after ``steps`` steps of size h.
+        """Continue an integration after ``steps`` steps of size h, from the state with which the session was started.
 
-        The session is at the saved state; ``arrays`` are the result of `saved`.
+        ``arrays`` are the result of `saved` at that state.
         """
         ...
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes); nothing else changes. Raises `BackendError` if x is not
-        finite."""
+        """Replace the state by ``x`` (coordinates, *sizes); with a monitor, the energy level e becomes −H(x).
+
+        Time, step number and parameters are unchanged. Raises `BackendError` if x is not finite.
+        """
         ...
 
     def kick(self, change: Floats) -> None:
@@ -127,7 +132,7 @@ class LatticeSession(Protocol):
         ...
 
     def casimirs(self) -> Floats:
-        """Return the densities of the Casimirs (Casimirs, *sizes)."""
+        """Return the Casimirs as densities (Casimirs, *sizes); `reduced` makes sums and products of them."""
         ...
 
     def vector_field(self) -> Floats:
@@ -144,13 +149,13 @@ class LatticeSession(Protocol):
 
 
 class LatticeBackend(Protocol):
-    """A loaded solver of one target."""
+    """Protocol of the loaded solver of a lattice, in the language of one target."""
 
     target: str
 
     @property
     def identity(self) -> str:
-        """A hash of everything that determines the results."""
+        """A hash of everything that determines the results. Checkpoints store it."""
         ...
 
     def start(
@@ -165,7 +170,7 @@ class LatticeBackend(Protocol):
 
     @property
     def has_pullback(self) -> bool:
-        """Whether the generated code has the extra ``adjoint``."""
+        """Whether the solver was compiled with ``adjoint``, and so has `pullback`."""
         ...
 
     def pullback(
@@ -178,27 +183,30 @@ class LatticeBackend(Protocol):
         parameters: Mapping[str, Any],
         t0: float = 0.0,
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
-        """Return the rows (rows, coordinates, *sizes) of a run from t0 on, and cotangents of x0 and of parameters.
+        """Return the rows (rows, coordinates, *sizes) of a run from the time t0 on, and the cotangents of x0 and of
+        parameters.
 
-        Cotangents have the shapes of x0 and of the parameters; ``bars`` are the cotangents of the rows. Raises
-        `MissingExtraError` without the extra ``adjoint``.
+        ``bars`` are the cotangents of the rows. The cotangents that are returned have the shapes of x0 and of the
+        parameters. Raises `MissingExtraError` if the solver was compiled without ``adjoint``.
         """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class LatticeTrajectory:
-    """Frames of one integration. The first is the initial state, the last the final state.
+    """States of a lattice along one integration, called frames. The first is the initial state, the last the final
+    state.
 
     ``t`` (frames,) are the times, ``x`` (frames, coordinates, *sizes) the states, as a memory map if they were written
     to a file, and ``energy`` (frames,) the values of H. There is a frame for every stride-th of the ``steps`` steps of
     size ``h``, or at given times, and one for the end, which may be inside a step. ``observed`` (frames, observables)
     are the observables that are one number each. ``crossings`` are the states at which the section of a run is crossed.
-    ``retried`` are the numbers of the steps that were made in parts.
+    ``retried`` are the numbers of those steps that failed and were repeated as several smaller steps.
 
-    With a monitor, ``h`` is a step in τ, and ``tau`` (frames,) has the values of τ. ``tau`` is None without a monitor,
-    and if the run continues another run (``joined``). ``structure_factor`` and ``correlated`` are the results of
-    ``spectrum`` and ``correlation`` of a run; ``origin`` is a text on the provenance, for files.
+    With a monitor (dt = g dτ), ``h`` is a step in τ, and ``tau`` (frames,) has the values of τ. ``tau`` is None without
+    a monitor. If the run continues another run, ``joined`` is true and ``tau`` None. ``structure_factor`` and
+    ``correlated`` are the results of the keys ``spectrum`` and ``correlation`` of a run; ``origin`` is the provenance
+    text for files.
     """
 
     t: Floats
@@ -231,10 +239,11 @@ class LatticeTrajectory:
         return cast(str, display("page of a lattice trajectory")(self))
 
     def plot(self) -> Figure:
-        """Return a figure of the fields over space and time (chains), or of planes at some times.
+        """Return a figure of the state over space and time (chains), or on planes of the lattice at some times (larger
+        dimension).
 
-        Below are the errors of conserved quantities. Notebooks show the figure; ``.savefig(path)`` writes it. Raises
-        `MissingPackageError` without matplotlib.
+        Panels below show the errors of conserved quantities. Notebooks show the figure; ``.savefig(path)`` writes it.
+        Raises `MissingPackageError` without matplotlib.
         """
         return cast("Figure", display("figure of a lattice run")(self, self.changes(), ""))
 
@@ -252,32 +261,35 @@ class LatticeTrajectory:
         """Return the absolute changes since the start (frames,) of the energy and of each Casimir, by name.
 
         The change of the energy is in units of `energy_scale`, and includes the effects of time, forces and noise. For
-        a Casimir of each site it is the largest change at any site.
+        a Casimir of each site, the largest change at any site is returned.
         """
         changes = {"energy": np.abs(self.energy - self.energy[0]) / self.energy_scale}
         return changes | self.casimir_changes()
 
     @property
     def energy_scale(self) -> float:
-        """The unit of errors of energy: |H| at the start or, if that is nearly 0, Σ |energy of a site|."""
+        """The unit in which errors of the energy are given: |H| at the start or, if that is nearly 0, Σ |energy of a
+        site|."""
         return self.energy_unit.size
 
     @property
     def energy_unit(self) -> Unit:
-        """The unit of errors of energy, with the reason for it."""
+        """The unit in which errors of the energy are given, with the reason for its choice."""
         when = float(self.t[0]) if self.solver.interface.time else None
         sites = np.abs(self.solver.density(self.x[0], when, parameters=self.parameters)).sum()
         return unit_of(float(self.energy[0]), float(sites), SITES)
 
     @property
     def casimirs(self) -> dict[str, Floats]:
-        """The Casimirs by name: (frames, *sizes) for those of sites, (frames,) for sums and products."""
+        """The Casimirs by name: arrays (frames, *sizes) for Casimirs of each site, (frames,) for sums and products over
+        sites."""
         rows = list(self._casimirs_by_frame())
         return {name: np.array([row[name] for row in rows]) for name in self.solver.interface.casimirs}
 
     @property
     def observables(self) -> dict[str, Floats]:
-        """The observables of the spec by name: (frames,), and (frames, *sizes) for those of sites."""
+        """The observables of the spec by name: arrays (frames, *sizes) for observables of each site, (frames,) for all
+        others."""
         interface = self.solver.interface
         numbers = {name: self.observed[:, k] for k, name in enumerate(interface.observables)}
         if not interface.observed_fields:
@@ -305,44 +317,56 @@ class LatticeTrajectory:
         return {name: np.array([row[name] for row in rows]) for name in first}
 
     def transforms(self) -> dict[str, tuple[tuple[str, ...], Floats]]:
-        """Return ``spectrum``, ``spectrum_q_AXIS``, ``spectrum_omega`` and ``correlation``, as names of dimensions and
-        values.
+        """Return the spectrum and the correlation that the run requested, as dimension names and values by variable
+        name.
 
-        Only those that the run asks for are present.
+        The names are ``spectrum``, ``spectrum_q_AXIS``, ``spectrum_omega`` and ``correlation``. A result that the run
+        did not request is missing.
         """
         spectrum, pair = self.structure_factor, self.correlated
         arrays = spectrum.variables("spectrum", "spectrum_") if spectrum else {}
         return arrays | ({"correlation": (("distance",), pair.values)} if pair else {})
 
     def column(self, coordinate: str) -> Floats:
-        """Return the frames (frames, *sizes) of one coordinate. Raises `KeyError` if there is no such coordinate."""
+        """Return the values (frames, *sizes) of one coordinate. Raises `KeyError` if there is no coordinate of that
+        name."""
         if coordinate not in self.coordinates:
             raise KeyError(f"{coordinate!r} is not a coordinate; there are {', '.join(self.coordinates)}")
         return self.x[:, self.coordinates.index(coordinate)]
 
     def spectrum(self, of: Sequence[str], *, after: float | None = None) -> DynamicSpectrum:
-        """Return the dynamic structure factor S(q, ω) of coordinates of a grid; see `spectra.spectrum`."""
+        """Return the dynamic structure factor S(q, ω) of the coordinates ``of`` on a grid, from the frames of this
+        trajectory.
+
+        ``after`` and the errors are documented in `spectra.spectrum`.
+        """
         return spectra.spectrum(self, of, after=after)
 
     def correlation(
         self, of: str, other: str | None = None, *, axis: str | None = None, up_to: int, after: float | None = None
     ) -> Floats:
-        """Return ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ of two coordinates, or of one with itself, for d = 0 … ``up_to``.
+        """Return ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ for d = 0 … ``up_to`` sites, where f and g are the coordinates ``of`` and
+        ``other``.
 
-        The axis of d is the first by default; see `spectra.correlation`.
+        By default g is f, and d is along the first axis. ``after`` and the errors are documented in
+        `spectra.correlation`.
         """
         return spectra.correlation(self, of, other or of, axis or self.axes[0], up_to, after=after)
 
     def at(self, times: ArrayLike) -> Floats:
-        """Return the states (times, coordinates, *sizes) at given times, by steps of the method from the nearest frame.
+        """Return the states (times, coordinates, *sizes) at given times, computed by steps of the method from the
+        nearest frame.
 
         Conventions and errors are those of `phigen.Trajectory.at`.
         """
         return self.solver.states_at(self, arguments.times_within(times, self.t))
 
     def save(self, path: str | Path) -> None:
-        """Write ``.npz`` (t, x, energy, coordinates, axes, steps, h, observable_NAME and parameter_NAME), the frames as
-        ``.npy``, or ``.csv`` with a column for each number of a state, of which there are at most 1,000.
+        """Write the trajectory to a file in the format that the suffix of the path names.
+
+        A ``.npz`` has the arrays t, x, energy, coordinates, axes, steps, h, observable_NAME and parameter_NAME. A
+        ``.npy`` has the frames only. A ``.csv`` has one column for each number of a state, at most 1,000. A ``.zarr``
+        has the variables of `to_xarray`. Raises `ValueError` for other suffixes.
         """
         target = stream_path(path)
         if target is None:
@@ -370,11 +394,11 @@ class LatticeTrajectory:
 class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates, *sizes).
 
-    Parameters are keyword arguments, or entries of ``parameters={…}``. Those at sites are arrays (*sizes), those at
-    bonds arrays (bonds,), or one number for all. Parameters that are not passed have their defaults of the spec, at the
-    sizes of the state; a list or a file with another number of values raises `SpecError`. Graphs take ``bonds`` in the
-    same way, an array (bonds, 2) of numbers of sites from 0. Wrong arguments raise `ValueError` or `TypeError`, and a
-    failing step `phigen.StepError`. Several threads may use a solver.
+    Parameters are keyword arguments, or entries of ``parameters={…}``. A parameter at sites is an array (*sizes), at
+    bonds an array (bonds,), or one number for all sites or bonds. Parameters that are not passed have their defaults of
+    the spec, evaluated at the sizes of the state; a list or a file with another number of values raises `SpecError`. A
+    graph also takes ``bonds`` as an argument, an array (bonds, 2) of numbers of sites from 0. Wrong arguments raise
+    `ValueError` or `TypeError`, and a failing step `phigen.StepError`. Several threads may use a solver.
     """
 
     def __init__(self, backend: LatticeBackend, interface: LatticeInterface, spec: Spec | None = None) -> None:
@@ -412,21 +436,24 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **by_keyword: Any,
     ) -> LatticeTrajectory:
-        """Make ``steps`` steps of size ``h`` from ``x0`` (coordinates, *sizes).
+        """Make ``steps`` steps of size ``h`` from ``x0`` (coordinates, *sizes), and return the trajectory of the
+        frames.
 
-        Frames are the states after every ``stride``-th step and the last. With ``until`` in place of ``steps``, the
-        last step is the part of one that ends at that time. A step that fails is made in 2, 4, …, 2**retry equal parts,
-        which is another map than a whole step, but also Poisson. With a monitor, ``h`` is a step in τ, and ``gauge=e``
-        is held in place of −H of the start.
+        Frames are the states after every ``stride``-th step and after the last. With ``until`` in place of ``steps``,
+        the last step is shortened to end at that time. A step that fails is repeated as 2, 4, …, up to 2**retry smaller
+        steps; together they are another map than one whole step, but also a Poisson map. With a monitor (dt = g dτ),
+        ``h`` is a step in τ, and ``gauge=e`` sets the energy level e, by default −H of the start.
+
         ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With noise, the random
-        numbers of a site are a function of ``seed``, ``member``, the number of the step, which begins with ``step0``,
-        and the site. With ``output``, a path that ends in .npy or .npz, frames are written to that file one by one; to
-        a .csv at the end, if states have up to 1,000 numbers.
+        numbers of a site are a function of ``seed``, ``member``, the site, and the number of the step, where ``step0``
+        is the number of the first step. With ``output``, a path that ends in .npy or .npz, frames are written to that
+        file one by one; a path that ends in .csv is written at the end, if a state has at most 1,000 numbers.
+
         With ``checkpoints``, a path, the state is saved there at every frame; a call with the same arguments resumes
-        from that state, and removes the file at the end. ``resume=False`` starts a new run, and refuses to overwrite
-        the files of an interrupted one. ``progress`` is called after each frame with the number of steps done. Raises
-        `StepError`, whose ``trajectory`` ends with the state before the failing step, and `ValueError` if the files
-        belong to an interrupted run, or to a complete one that cannot be resumed.
+        from that state. The file is removed at the end of the run. ``resume=False`` starts a new run, and refuses to
+        overwrite the files of an interrupted one. ``progress`` is called after each frame with the number of steps
+        done. Raises `StepError`, whose ``trajectory`` ends with the state before the failing step, and `ValueError` if
+        the files belong to an interrupted run, or to a complete one that cannot be resumed.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments)
@@ -437,7 +464,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def _planned(
         self, beginning: Beginning, steps: int | None, stride: int, until: float | None, retry: int
     ) -> IntegrationPlan:
-        """Return the plan of an integration over a number of steps, or until a time."""
+        """Return the plan of an integration over a number of steps, or up to the time ``until``; exactly one must be
+        passed."""
         if (steps is None) == (until is None):
             requirement = "needs the number of steps, or the time until which to integrate"
             raise TypeError(f"integrate {requirement if steps is None else 'takes either steps or until, not both'}")
@@ -456,9 +484,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def carried_out(
         self, plan: IntegrationPlan, of: Sequence[str] = (), **where: Any
     ) -> LatticeTrajectory | LatticeSeries:
-        """Carry out a plan by `numbered` if ``of`` names quantities to record, else by `framed`.
+        """Integrate as planned: record the numbers that ``of`` names or, if there are none, the states.
 
-        ``where`` are the arguments on files and progress.
+        ``where`` are the arguments about files and progress, which `numbered` and `framed` take.
         """
         return self.numbered(plan, of, **where) if of else self.framed(plan, **where)
 
@@ -471,7 +499,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         resume: bool = True,
         progress: Progress | None = None,
     ) -> LatticeTrajectory:
-        """Integrate as planned, with a frame for each row. Files and errors are those of `integrate`."""
+        """Integrate as planned, and return the trajectory with a state for each row. Files and errors are those of
+        `integrate`."""
         shape, stream = plan.at.x.shape, stream_path(output) if output else None
         table = Path(output) if output and stream is None else None
         if table and table.suffix == ".csv":
@@ -518,9 +547,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return trajectory
 
     def _expect_place(self, run: LatticeRun, output: str | Path | None, frames: Frames | None, *, resume: bool) -> None:
-        """Raise `ValueError` if files of an interrupted run would be overwritten, or if a run to resume is complete.
+        """Raise `ValueError` if the run would overwrite files of an interrupted run, or resume a run that is complete.
 
-        A longer run that continues a complete one may overwrite the file of the latter.
+        If the run continues a complete run, it may overwrite the output file of that run.
         """
         if run.checkpoints:
             target = Path(output) if output and run.plan.past is None else None
@@ -554,12 +583,12 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
         A run whose ``record`` has no ``state`` returns the result of `series`. The initial state, the bonds, and
         parameters at sites and bonds are computed from the formulas, files and random numbers of the run, at its
-        ``sizes`` or at those passed. The other arguments replace the settings of the spec: the ``step``, the number of
-        ``steps`` or the time ``until`` where it ends, the ``stride`` or the time ``every`` between rows, or the times
-        ``at`` which rows are stored, the ``seed`` of the noise. ``x0`` (coordinates, *sizes) is the initial state,
-        ``retry`` an argument of `integrate`. A run with ``stop`` ends where that expression first passes through 0.
-        ``crossings`` of the result are crossings of the ``section``. Raises `ValueError` if there is no run of that
-        name, and `SpecError` for an initial state that does not fit the sizes.
+        ``sizes`` or at those passed. Further arguments replace settings of the spec: the ``step``, the number of
+        ``steps`` or the time ``until`` where the run ends, the ``stride`` or the time ``every`` between rows, or the
+        times ``at`` which rows are stored, and the ``seed`` of the noise. ``x0`` (coordinates, *sizes) is the initial
+        state; ``retry`` is explained at `integrate`. A run with ``stop`` ends where that expression first passes
+        through 0. ``crossings`` of the result are crossings of the ``section``. Raises `ValueError` if there is no run
+        of that name, and `SpecError` for an initial state that does not fit the sizes.
         """
         from phigen.lattice.states import start_of
 
@@ -579,7 +608,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return self.carried_out(plan, recorded, output=output, checkpoints=checkpoints, progress=progress)
 
     def _plan_of(self, run: Run, beginning: Beginning, retry: int) -> IntegrationPlan:
-        """Return the plan of a run of the spec, for checked initial values."""
+        """Return the plan of a run of the spec, whose initial values ``beginning`` have been checked."""
         if retry or run.is_timed:
             arguments.expect_no_noise("retry" if retry else "every", self.interface)
         end, in_tau = None, self.interface.monitored and run.is_timed
@@ -597,12 +626,16 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         )
 
     def function(self, expression: Expression, values: Mapping[str, Any]) -> Function:
-        """Return an expression in observables, parameters and the time as a function of observables (rows,
-        observables)."""
+        """Return an expression in observables, parameters and time as a function of arrays (rows, observables), and of
+        times.
+
+        ``values`` are the parameters. The times are an argument only if the spec has a time.
+        """
         return function_of(expression, self.interface.observables, values, self.interface.time)
 
     def transforms_of(self, run: Run) -> Transforms | None:
-        """Return the spectrum and the correlation that a run asks for; None if it asks for neither."""
+        """Return the settings of the spectrum and of the correlation that a run requests; None if it requests
+        neither."""
         requested = run.lattice
         return (
             Transforms(requested.spectrum, requested.correlation)
@@ -611,7 +644,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         )
 
     def section_of(self, run: Run, values: Mapping[str, Any]) -> Crossed | None:
-        """Return the section of a run with its function; None if the run has no section."""
+        """Return the section of a run, with its expression as a function of observables; None if the run has no
+        section."""
         from phigen.symbolic.readable import readable
 
         if run.section is None:
@@ -639,12 +673,12 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **by_keyword: Any,
     ) -> LatticeSeries:
-        """Integrate as `integrate` does, and record numbers every ``stride`` steps in place of frames.
+        """Integrate as `integrate` does, but record a few numbers every ``stride`` steps instead of states.
 
-        ``of`` names the numbers: ``energy``, Casimirs that are sums or products, and observables; by default all but
-        the Casimirs. With ``output``, a path that ends in .csv or .npz, they are written to that file at the end. With
-        ``checkpoints`` the state and the rows are saved every two seconds. Raises the same as `integrate`; the
-        ``trajectory`` of a `StepError` is the series.
+        ``of`` names the numbers: ``energy``, Casimirs that are sums or products over sites, and observables; by default
+        all of these except the Casimirs. With ``output``, a path that ends in .csv or .npz, the numbers are written to
+        that file at the end. With ``checkpoints`` the state and the rows are saved every two seconds. Raises the errors
+        of `integrate`; the ``trajectory`` of a `StepError` is the series up to the failure.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments)
@@ -662,7 +696,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         resume: bool = True,
         progress: Progress | None = None,
     ) -> LatticeSeries:
-        """Integrate as planned, and record numbers. Names, files and errors are those of `series`."""
+        """Integrate as planned, and record the numbers that ``of`` names. Names, files and errors are those of
+        `series`."""
         recordable_names = recordable(self.interface)
         if strange := [name for name in of if name not in recordable_names]:
             raise ValueError(f"cannot record {strange[0]!r}; there are {', '.join(recordable_names)}")
@@ -692,7 +727,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return series
 
     def ends_of(self, series: LatticeSeries) -> LatticeTrajectory:
-        """Return the trajectory of the first and the last state of a series; see `LatticeSeries.ends`."""
+        """Return a trajectory of two frames: the first and the last state of a series."""
         x, interface = np.array([series.first, series.last]), self.interface
         t = np.array([series.t[0], series.t[-1]])
         when = t.tolist() if interface.time else [None, None]
@@ -738,7 +773,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **by_keyword: Any,
     ) -> tuple[Floats, Floats]:
-        """Return the state one step after ``x``, and the product of its derivative with each of some ``vectors``.
+        """Return the state one step after ``x``, and the derivative of this step multiplied by each of some
+        ``vectors``.
 
         Vectors have the shape (count, coordinates, *sizes). The derivative is exact to round-off. Raises `StepError`,
         `LimitError` for more vectors than fit into memory, and `TypeError` if the solver was compiled without
@@ -767,7 +803,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """Yield the state and the tangent ``vectors`` after every ``stride`` steps of a trajectory, and after the last.
 
         Vectors have the shape (count, coordinates, *sizes), and are multiplied by the derivative of each step. Vectors
-        that are sent to the generator replace them. Raises the same as `step_tangent`.
+        that the caller sends to the generator by ``send`` replace the present vectors. Raises the errors of
+        `step_tangent`.
         """
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, {"seed": seed, "step0": step0})
         start, steps = beginning.x, arguments.count(steps, "steps", 0)
@@ -809,12 +846,13 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     ) -> Floats:
         """Return the final states (members, coordinates, *sizes) of several lattices of the same size.
 
-        ``X0`` has that shape, or is one initial state for all. ``h``, ``t0`` and parameters may have a first axis of
-        members, as for an average over disorder. With a ``stride`` the result has a further first axis of rows: the
-        states at steps 0, stride, 2·stride, … and at the last. Small lattices are shared out between ``threads``, by
-        default one for each core; large ones are integrated one after another, by all threads. With noise, member k
-        takes the random numbers of ``member`` + k. Raises `StepError`: its ``members`` are the failed ones, its
-        ``trajectory`` the array of states, in which failed members have their last state, or NaN in the rows after it.
+        ``X0`` has the shape of the result, or is one initial state for all members. ``h``, ``t0`` and parameters may
+        have a first axis of members, for instance for an average over disorder. With a ``stride`` the result has a
+        further first axis of rows: the states at steps 0, stride, 2·stride, … and at the last. Small lattices are
+        divided among ``threads``, by default one for each core; large lattices are integrated one after another, each
+        by all threads. With noise, member k uses the random numbers of ``member`` + k. Raises `StepError`: its
+        ``members`` are the failed members, and its ``trajectory`` the array of states, in which failed members have
+        their last state, and later rows repeat NaN.
         """
         times = self._times(t0, by_keyword)
         draws = arguments.draws(self.interface, by_keyword, {"seed": seed, "member": member, "step0": step0})
@@ -822,7 +860,11 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, values, times, draws)
 
     def _times(self, t0: ArrayLike | None, by_keyword: dict[str, Any]) -> Floats:
-        """Return the initial times, a number or an array (members,), as `arguments.start_time` does."""
+        """Return the initial time as a number, or as an array (members,) if ``t0`` is one; the default is 0.
+
+        If H does not depend on the time, ``t0`` can only be the name of a parameter, whose value is added to
+        ``by_keyword``.
+        """
         begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
         alone: Any = t0 if begin is None else 0.0
         first = arguments.start_time(alone, self.interface, by_keyword)
@@ -842,12 +884,12 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     ) -> Pullback:
         """Return the state after ``steps`` steps, and the derivatives of its scalar product with a ``cotangent``.
 
-        The result is (x1, x0_bar, parameters_bar): the state, the derivative of the product by ``x0``, and those by the
-        parameters, by name and in their shapes. ``x0`` is (coordinates, *sizes), or has a first axis of members; x1 and
-        the cotangent have its shape. Parameters, ``h`` and ``t0`` may have an axis of members too. The derivative by an
-        argument that all members share is the sum over members. With a ``stride``, x1 and the cotangent have a further
-        first axis of rows, for all frames of `integrate`. Derivatives are exact to round-off. Raises `StepError`, and
-        `TypeError` if the solver was compiled without ``adjoint=True``.
+        The result is (x1, x0_bar, parameters_bar): the final state, the derivative of the product by ``x0``, and its
+        derivatives by the parameters, by name and in the shapes of the parameters. ``x0`` is (coordinates, *sizes), or
+        has a first axis of members; x1 and the cotangent have the shape of x0. Parameters, ``h`` and ``t0`` may have an
+        axis of members too. The derivative by an argument that all members share is the sum over members. With a
+        ``stride``, x1 and the cotangent have a further first axis of rows, for all frames of `integrate`. Derivatives
+        are exact to round-off. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
         """
         times = self._times(t0, by_keyword)
         values = arguments.together(parameters, by_keyword)
@@ -880,7 +922,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     # --- functions of states
 
     def states_at(self, trajectory: LatticeTrajectory, times: Floats) -> Floats:
-        """Return the states of a trajectory of this solver at given times; see `LatticeTrajectory.at`."""
+        """Return the states (times, coordinates, *sizes) of a trajectory of this solver at given times.
+
+        This is the implementation of `LatticeTrajectory.at`, which documents conventions and errors.
+        """
         t, x = trajectory.t, trajectory.x
         if self.interface.noise:
             return arguments.rows_at(t, x, times)
@@ -911,7 +956,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def casimirs(
         self, x: ArrayLike, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
     ) -> dict[str, Any]:
-        """Return the Casimirs of a state, by name: arrays (*sizes) for those of sites, else numbers."""
+        """Return the Casimirs of a state, by name: arrays (*sizes) for Casimirs of each site, numbers for sums and
+        products."""
         interface = self.interface
         densities = self._session_at(x, parameters, by_keyword, 0.0 if self.interface.time else None).casimirs()
         kinds = zip(interface.casimirs, interface.casimir_kinds, densities, strict=True)
@@ -920,7 +966,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def observables(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
     ) -> dict[str, Any]:
-        """Return the observables of the spec of a state, by name: numbers, and arrays (*sizes) for those of sites."""
+        """Return the values, at a state, of the observables of the spec, by name.
+
+        Observables with a value at each site are arrays (*sizes), all others are numbers.
+        """
         interface, session = self.interface, self._session_at(x, parameters, by_keyword, t)
         numbers = dict(zip(interface.observables, session.observables().tolist(), strict=True))
         return numbers | dict(zip(interface.observed_fields, session.observed_fields(), strict=True))
@@ -928,7 +977,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def vector_field(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
     ) -> Floats:
-        """Return π∇H of a state (coordinates, *sizes), the same shape."""
+        """Return π∇H at a state (coordinates, *sizes), an array of the same shape."""
         return self._session_at(x, parameters, by_keyword, t).vector_field()
 
     def _session_at(
@@ -973,9 +1022,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def values(
         self, mapped: Mapping[str, Any] | None, by_keyword: Mapping[str, Any], sizes: Sequence[int]
     ) -> dict[str, Any]:
-        """Return all parameters: numbers, and arrays over the sites or the bonds. For a graph the bonds are included.
+        """Return the values of all parameters by name: numbers, and arrays over the sites or the bonds.
 
-        Raises `TypeError` for unknown names, `ValueError` for values that are not admissible.
+        For a graph the entry ``bonds`` has the checked bonds. Raises `TypeError` for unknown names, and `ValueError`
+        for values that are not admissible.
         """
         interface = self.interface
         everything = arguments.together(mapped, by_keyword)
@@ -1001,9 +1051,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return values | bonds
 
     def defaults(self, passed_values: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Floats]:
-        """Return the defaults of parameters not in ``passed_values`` that are formulas, lists, files or random numbers.
+        """Return the default values of those parameters that are not in ``passed_values`` and whose defaults need the
+        sizes.
 
-        They are evaluated at the given sizes. Raises `SpecError` for those that do not fit the sizes.
+        These defaults are formulas, lists, files or random numbers. Raises `SpecError` if one does not fit the sizes.
         """
         missing_names = self.interface.required - set(passed_values)
         if not missing_names:
@@ -1036,7 +1087,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return Beginning(start, size, self.values(parameters, by_keyword, start.shape[1:]), begin, draws, level=level)
 
     def started(self, beginning: Beginning) -> LatticeSession:
-        """Return a session for checked arguments. Raises `StepError`."""
+        """Return a session that begins with checked arguments. Raises `StepError` if no step is possible with them."""
         try:
             session = self.backend.start(beginning.x, beginning.values, beginning.t0, beginning.draws)
             if beginning.level is not None:
@@ -1048,8 +1099,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def failure(
         self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any], start: Floats | None = None
     ) -> StepError:
-        """Return the exception for users after a failure in the back end; ``so_far`` are the results up to the
-        failure."""
+        """Return the `StepError` that users get for a failure in the generated code.
+
+        ``so_far`` are the results up to the failure.
+        """
         name = self.interface.name
         facts = {"step": error.step, "status": error.status, "trajectory": so_far, "members": error.members}
         if error.status == "BAD_ARGUMENT":
@@ -1097,7 +1150,10 @@ def missing_bonds() -> TypeError:
 
 
 def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
-    """Return bonds as an array (bonds, 2). Raises `TypeError` and `ValueError`."""
+    """Return bonds as an array (bonds, 2) of pairs of different sites, numbered from 0 to ``sites`` − 1.
+
+    Raises `TypeError` if ``bonds`` is None, and `ValueError` for other arrays.
+    """
     if bonds is None:
         raise missing_bonds()
     array = np.asarray(bonds)
@@ -1116,8 +1172,8 @@ def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
 
 
 def reduced(kind: str, densities: Floats) -> Any:
-    """Return a Casimir from its densities at the sites: the densities, their sum, or their product, depending on
-    ``kind``."""
+    """Return a Casimir from its densities at the sites: for the kind ``sites`` the densities, for ``sum`` their sum,
+    for ``product`` their product."""
     if kind == "sites":
         return densities
     return float(densities.sum() if kind == "sum" else densities.prod())

@@ -1,4 +1,5 @@
-"""Ensembles of lattices whose members have different states, steps and parameters; threads share the members."""
+"""Ensembles of lattices whose members have different states, steps and parameters; members are divided among
+threads."""
 
 from __future__ import annotations
 
@@ -32,7 +33,9 @@ def ensemble(
     t0: Floats,
     draws: Draws,
 ) -> Floats:
-    """Return the result of `LatticeSolver.ensemble`, for arguments in the shapes that users pass."""
+    """Integrate the members of an ensemble: the implementation of `LatticeSolver.ensemble`, with arguments not yet
+    checked.
+    """
     per_member = {
         name: np.asarray(value) for name, value in parameters.items() if has_members(solver.interface, name, value)
     }
@@ -67,7 +70,7 @@ def ensemble(
     max_threads = cores() if threads is None else arguments.count(threads, "threads", 1)
     uses_all_threads = solver.interface.is_shared(
         math.prod(start.shape[2:])
-    )  # if true, members are integrated one by one, each by all threads
+    )  # if true, members are integrated one after another, each by all threads
     in_threads(1 if uses_all_threads else max(1, min(max_threads, count)), make, range(count))
     states_or_frames = final if stride is None else frames
     if failures:
@@ -93,10 +96,10 @@ def has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
 
 
 def states(solver: LatticeSolver, X0: ArrayLike, per_member: Mapping[str, Any], argument: str = "X0") -> Floats:
-    """Return the initial states (members, coordinates, *sizes). Raises `ValueError` for other shapes.
+    """Return the initial states (members, coordinates, *sizes) from ``X0``. Raises `ValueError` for other shapes.
 
-    ``per_member`` are the arguments that have an axis of members; if there are any, a single state is used for all
-    members.
+    ``per_member`` maps names of other arguments to their values, which have an axis of members. If there are any,
+    ``X0`` may be one state, with which all members start.
     """
     axes = 1 + len(solver.interface.axes)
     member_states: Iterable[Floats]

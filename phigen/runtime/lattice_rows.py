@@ -1,4 +1,4 @@
-"""Plans of integrations of lattices: the times of rows, retries, sections, and a finished run to continue."""
+"""Plans of integrations of lattices: the steps at which rows are stored, and the other settings of a run."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RowSteps:
-    """Rows of a run: after ``whole`` steps (rows,) and a further step of size ``part`` (rows,), 0 for none.
+    """Positions of the rows of a run: each after ``whole`` (rows,) steps, and a further step of size ``part`` (rows,).
 
-    The first row is the start. If there is an ``end``, it makes the last row. If steps are equal in τ and rows are at
-    given times, only the times ``spans`` (rows,) after the start are known; the steps before them are counted during
-    the run.
+    ``part`` is 0 for rows at whole steps. The first row is the start. If there is an ``end``, it makes the last row.
+    With a monitor (dt = g dτ) and rows at given times, only the times ``spans`` (rows,) after the start are known
+    beforehand; the number of steps before each row is counted during the run.
     """
 
     whole: NDArray[np.int64]
@@ -46,14 +46,15 @@ class RowSteps:
         return np.asarray(begin + (h * self.whole + self.part), dtype=np.float64)
 
     def described(self) -> list[int | float]:
-        """Return plain data that identify these rows when a run is resumed."""
+        """Return a few numbers that identify these rows; a run resumes only if they equal those in its checkpoint."""
         rows = [len(self), self.steps, int(self.whole[min(1, len(self) - 1)])]
         spans = [] if self.spans is None else [float(self.spans.sum())]
         return [*rows, *spans, *([] if not self.part.any() else [float(self.part.sum()), float(self.part[-1])])]
 
 
 def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSteps:
-    """Return rows at every ``stride``-th of ``steps`` steps and at the last; with an ``end``, the last row is there."""
+    """Return rows at every ``stride``-th of ``steps`` steps, and at the last step or, if there is one, at the
+    ``end``."""
     if end is None or not end.part:
         whole_rows = row_steps(steps if end is None else end.steps, stride)
         return RowSteps(whole_rows, np.zeros(len(whole_rows)), end)
@@ -64,7 +65,9 @@ def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSte
 
 
 def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) -> RowSteps:
-    """Return rows at the times ``spans`` after the start, and at the end: after ``steps`` steps, or at ``end``."""
+    """Return rows at the times ``spans`` after the start, and at the end: ``end`` or, if None, the last of ``steps``
+    steps.
+    """
     last = h * steps if end is None else end.span
     inner = [span for span in spans if abs(last - span) > EQUAL * abs(last)]
     step_numbers = [whole_steps(h, span) for span in inner]
@@ -76,7 +79,9 @@ def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) 
 
 
 def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
-    """Return rows at the times ``spans`` after the start, and at the end, for steps that are equal in τ."""
+    """Return rows at the times ``spans`` after the start, and at the end, if a monitor makes steps equal in τ, not in
+    t.
+    """
     inner = [span for span in spans if abs(end.span - span) > EQUAL * abs(end.span)]
     step_numbers = np.zeros(len(inner) + 2, dtype=np.int64)
     step_numbers[-1] = end.steps
@@ -85,8 +90,10 @@ def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
 
 @dataclass(frozen=True)
 class Crossed:
-    """A section: the zeros of ``g``, a function of the observables, in a ``direction``; ``text`` is the formula of
-    g."""
+    """A section: the zeros of a function ``g`` of the observables that are crossed in ``direction``.
+
+    ``text`` is the formula of g.
+    """
 
     g: Function
     direction: str
@@ -95,11 +102,11 @@ class Crossed:
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """A finished run that another run continues: its times ``t`` (rows,), ``energy``, observables and states.
+    """A finished run that another run continues.
 
-    ``x`` (rows, coordinates, *sizes) are the states of all rows, None if only numbers were recorded; ``first`` and
-    ``last`` are the first and the last state. ``columns`` are recorded numbers (rows,) by name. The run made ``steps``
-    steps.
+    ``t`` (rows,) are its times, and ``columns`` its recorded numbers (rows,) by name, such as the energy. ``x`` (rows,
+    coordinates, *sizes) are the states of all rows, None if only numbers were recorded; ``first`` and ``last`` are the
+    first and the last state. The run made ``steps`` steps.
     """
 
     t: Floats
@@ -112,11 +119,12 @@ class Past:
 
 @dataclass(frozen=True)
 class IntegrationPlan:
-    """An integration: its initial values, its rows, and the number of halvings allowed for a failing step.
+    """An integration before it begins: initial values ``at``, the ``rows`` to store, and further settings.
 
-    ``begin`` is the initial time, also if `Beginning` has no time because H does not depend on it. ``transforms`` are
-    the spectra and correlations to be computed from its frames; ``origin`` is the provenance text that is written into
-    output files.
+    ``begin`` is the initial time, also for an H that does not depend on the time. A failing step is halved at most
+    ``retry`` times. ``section`` is the section whose crossings are recorded. ``transforms`` are the spectra and
+    correlations to compute from the frames, ``past`` is the finished run that this one continues, and ``origin`` is the
+    provenance text for output files.
     """
 
     at: Beginning
@@ -130,11 +138,13 @@ class IntegrationPlan:
 
     @property
     def times(self) -> Floats:
-        """The times of all rows, including those of a continued run."""
+        """The times of all rows. If the integration continues an earlier run, they begin with the times of the earlier
+        run.
+        """
         times = self.rows.times(self.begin, self.at.h)
         return times if self.past is None else np.append(self.past.t, times[1:])
 
     @property
     def steps(self) -> int:
-        """Number of whole steps up to the end, including those of a continued run."""
+        """Number of whole steps up to the end, with the steps of an earlier run that this one continues."""
         return self.rows.steps + (self.past.steps if self.past else 0)

@@ -1,4 +1,5 @@
-"""The loop of every integration of a lattice: rows at and between steps, sections, checkpoints, continued runs."""
+"""The loop that all integrations of lattices use: it makes the rows, and handles sections, checkpoints, continued
+runs."""
 
 from __future__ import annotations
 
@@ -22,12 +23,12 @@ from phigen.runtime.timed import EQUAL, reached, steps_until
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
-#: Largest number of values in the states of a block of steps that is searched for crossings: 32 MB.
+#: Crossings are searched in blocks of steps; largest number of values in the stored states of a block (32 MB).
 MOST_FOLLOWED = 1 << 22
 
 
 class Sink(Protocol):
-    """Storage of rows. ``seconds`` is the least time between two checkpoints."""
+    """Protocol of objects that store the rows of a run. ``seconds`` is the least time between two checkpoints."""
 
     seconds: float
 
@@ -36,11 +37,11 @@ class Sink(Protocol):
         ...
 
     def begin(self, earlier_run: Past) -> None:
-        """Store the rows of a finished run that this one continues."""
+        """Store the rows of a finished run, which the present run continues."""
         ...
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays for `restore`, without those that are in files."""
+        """Return the arrays that a checkpoint stores for `restore`; rows that are already in a file are left out."""
         ...
 
     def restore(self, arrays: Mapping[str, Any]) -> None:
@@ -50,8 +51,10 @@ class Sink(Protocol):
 
 @dataclass
 class LatticeRun:
-    """One integration. ``rows`` stores its rows, of which ``count`` are complete. ``crossings`` are those of a
-    section."""
+    """One integration of a lattice: ``rows`` stores its rows, ``crossings`` the crossings of its section.
+
+    ``count`` is the number of rows that are complete.
+    """
 
     solver: LatticeSolver
     plan: IntegrationPlan
@@ -60,8 +63,8 @@ class LatticeRun:
     checkpoints: Path | None
     identity: Mapping[str, Any] = field(default_factory=dict)
     count: int = 0
-    crossed: list[float] = field(default_factory=list)  # the times of the crossings
-    clocks: list[float] = field(default_factory=list)  # if steps are equal in τ: times and numbers of steps of the rows
+    crossed: list[float] = field(default_factory=list)  # times of the crossings
+    clocks: list[float] = field(default_factory=list)  # physical times since the start, of each row
     numbers: list[float] = field(default_factory=list)
     course: Any = None
     last: Any = None  # the session at the latest row
@@ -85,7 +88,7 @@ class LatticeRun:
 
     @property
     def times(self) -> Floats:
-        """The times of the complete rows."""
+        """The times of the complete rows, after the times of the earlier run if this run continues one."""
         if self.solver.interface.monitored:
             earlier_times = [] if self.plan.past is None else self.plan.past.t[:-1].tolist()
             return np.array([*earlier_times, *(self.plan.begin + t for t in self.clocks)])
@@ -93,19 +96,21 @@ class LatticeRun:
 
     @property
     def tau(self) -> Floats | None:
-        """The values of τ of the complete rows, if steps are equal in τ and the run does not continue another; else
-        None."""
+        """The values of τ of the complete rows, if a monitor rescales time by dt = g dτ; else None.
+
+        None as well if this run continues another run.
+        """
         if not self.solver.interface.monitored or self.plan.past is not None:
             return None
         return self.plan.at.h * np.array(self.numbers)
 
     def _store_mark(self, course: ObservedCourse, number: float) -> None:
-        """Store the time and the number of steps of a row."""
+        """Store the time and the number of steps of a row, which may be a fraction."""
         self.clocks.append(course.time())
         self.numbers.append(number)
 
     def _steps_before(self, k: int) -> int:
-        """Return the number of whole steps before row k."""
+        """Return the number of whole steps from the start of the run to row k."""
         rows, course = self.plan.rows, self.course
         if rows.spans is None or k == len(rows) - 1:
             return int(rows.whole[k])
@@ -113,7 +118,7 @@ class LatticeRun:
         return int(course.steps + ahead)
 
     def _begin(self) -> None:
-        """Store the first row, or restore the checkpoint."""
+        """Store the first row or, if there is a checkpoint, restore the rows and the state that it holds."""
         plan, arrays = self.plan, self._loaded()
         if arrays:
             self.course = ObservedCourse.restored(self.solver, plan.at, plan.retry, arrays)
@@ -135,7 +140,9 @@ class LatticeRun:
         self.count = 1
 
     def _finder(self, arrays: Mapping[str, Any]) -> CrossingFinder[ObservedCourse]:
-        """Return the finder of the crossings of the section, restored from the ``arrays`` of a checkpoint."""
+        """Return the object that finds crossings of the section; ``arrays`` of a checkpoint, if not empty, restore its
+        state.
+        """
         plan, section = self.plan, self.plan.section
         assert section
         block = max(1, min(BLOCK, MOST_FOLLOWED // plan.at.x.size))
@@ -159,15 +166,17 @@ class LatticeRun:
             self._store_crossings(crossings)
 
     def _store_crossings(self, crossings: list[tuple[float, Floats]]) -> None:
-        """Store crossings, with the states of the finder's sessions at them."""
+        """Store the given crossings, with the states of the lattice at which the finder located them."""
         assert self.finder
         for (t, _), (_, crossing_session) in zip(crossings, self.finder.places, strict=False):
             self.crossed.append(t)
             self.crossings.see(crossing_session.sites)
 
     def _reached(self, k: int) -> tuple[ObservedCourse, float]:
-        """Return the course at row k and its number of steps, by a part of a step after the whole steps before the
-        row."""
+        """Return a lattice session at row k and its number of steps, once the whole steps before the row are made.
+
+        If the row lies inside a step, a copy of the session makes the shorter step to it.
+        """
         rows, part, h = self.plan.rows, float(self.plan.rows.part[k]), self.plan.at.h
         course: ObservedCourse = self.course
         inner_course: ObservedCourse
@@ -217,7 +226,7 @@ class LatticeRun:
         return {**identity, **self.identity}
 
     def _loaded(self) -> Mapping[str, Any]:
-        """Return the arrays of the checkpoint, if there is one; else none."""
+        """Return the arrays of the checkpoint file; {} if there is no file."""
         if self.checkpoints is None or not self.checkpoints.exists():
             return {}
         return checkpoint.load(self.checkpoints, self._identity())

@@ -1,4 +1,4 @@
-"""Caller-driven stepping: trajectories whose user makes the steps, and may change the state between them."""
+"""Caller-driven stepping: sessions in which the caller makes the steps, and may change the state between two steps."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class LiveSession:
 
     Properties of the state are ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by name),
     ``attitude`` and ``position`` (None without ``reconstruct``). `step` makes steps. `kick` and assignment to ``x``
-    change the state; predictors and the gauge remain. `set_parameters` changes parameters. With a monitor, each of
-    these changes sets the energy level e to −H. ``copy()`` returns an independent session. A pickled session continues
-    with the same bits.
+    change the state, but not the gauge (the multiples of Casimirs that are subtracted from H). `set_parameters` changes
+    parameters. With a monitor (dt = g dτ), each of these changes sets the energy level e to −H. ``copy()`` returns an
+    independent session. A session that was pickled and loaded continues with the same bits.
     """
 
     def __init__(
@@ -47,7 +47,8 @@ class LiveSession:
 
     @property
     def x(self) -> Floats:
-        """A copy of the state (DIM,). Assignment replaces the state, and `leaf` becomes the leaf of the new state."""
+        """A copy of the state (DIM,). Assignment replaces the state; `leaf` then returns the Casimirs of the new
+        state."""
         return self._session.state()
 
     @x.setter
@@ -57,7 +58,7 @@ class LiveSession:
     def kick(self, change: ArrayLike) -> Self:
         """Add ``change`` (DIM,) to the state, as an impulse does, and return the session.
 
-        If the new state is on another leaf, ``leaf`` then has the Casimirs of that leaf.
+        If the new state has other Casimirs, the property `leaf` returns these from then on.
         """
         self._move(self._session.kick, self._checked(change, "change"))
         return self
@@ -65,7 +66,8 @@ class LiveSession:
     def set_parameters(self, parameters: Mapping[str, float] | None = None, /, **by_keyword: float) -> Self:
         """Replace parameters, and return the session; state, time, attitude and random numbers are unchanged.
 
-        Raises `TypeError` and `ValueError` for names and values that are not admissible; then nothing changes.
+        Raises `TypeError` for unknown names, and `ValueError` for values that are not admissible; then no parameter
+        changes.
         """
         changes = arguments.together(parameters, by_keyword)
         values = self.solver.values({**self.parameters, **changes}, {})
@@ -78,13 +80,14 @@ class LiveSession:
         return self
 
     def _go_on(self, values: dict[str, Any], begin: Clock) -> None:
-        """Take over parameters; without a monitor, steps count the time anew, from ``begin`` on."""
+        """Replace the parameters. Without a monitor, time is then counted from the clock ``begin`` on."""
         self.parameters = values
         if not self.solver.interface.monitored:
             self._clock = begin
 
     def step(self, h: float, steps: int = 1) -> Self:
-        """Make steps of size ``h`` (in τ with a monitor), and return the session.
+        """Make ``steps`` steps of size ``h`` (in the rescaled time τ if the spec has a monitor), and return the
+        session.
 
         Raises `StepError`; the session then has the state before the failing step.
         """
@@ -104,7 +107,7 @@ class LiveSession:
 
     @property
     def t(self) -> float:
-        """The physical time."""
+        """The physical time t of the present state."""
         if self.solver.interface.monitored:
             return self._clock.t + self._session.time()
         return self._clock.after(self.steps)
@@ -181,8 +184,8 @@ class LiveSession:
 class LiveLattice(LiveSession):
     """A trajectory of a lattice at its present state, made by `LatticeSolver.session`.
 
-    ``x`` has the shape (coordinates, *sizes), and Casimirs of sites have a value at each site. All else is as for
-    `LiveSession`. The cost of a step, a kick or a copy is proportional to the number of sites.
+    ``x`` has the shape (coordinates, *sizes), and a Casimir of each site is an array (*sizes). Methods and properties
+    are those of `LiveSession`. The cost of a step, a kick or a copy is proportional to the number of sites.
     """
 
     def __init__(self, solver: LatticeSolver, beginning: Beginning) -> None:
@@ -191,9 +194,9 @@ class LiveLattice(LiveSession):
     def set_parameters(self, parameters: Mapping[str, Any] | None = None, /, **by_keyword: Any) -> Self:
         """Replace parameters by numbers or arrays, and return the session.
 
-        The state, the time and the random numbers are unchanged. The session goes on like one that starts at the
-        present state: compensation terms and predictors are dropped. Raises `TypeError`, `ValueError` and `StepError`
-        for names and values that are not admissible; then nothing changes.
+        The state, the time and the random numbers are unchanged. The session continues like a session that starts at
+        the present state: compensation terms and predictors are dropped. Raises `TypeError`, `ValueError` and
+        `StepError` for names and values that are not admissible; then nothing changes.
         """
         changes = arguments.together(parameters, by_keyword)
         if "bonds" in changes:

@@ -1,4 +1,5 @@
-"""Back end and sessions over the generated NumPy module of a lattice. See `phigen.runtime.lattice`."""
+"""Lattices in NumPy: the solver and the sessions that call a generated module. `phigen.runtime.lattice` has the
+protocols."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ from phigen.scheme.policies import StartPolicy
 
 
 class NumpyLatticeSession:
-    """A session that holds the variables of the module's ``integrate``. See `phigen.runtime.lattice.LatticeSession`."""
+    """A `phigen.runtime.lattice.LatticeSession` that makes its steps by calling functions of a generated NumPy
+    module."""
 
     def __init__(
         self,
@@ -52,7 +54,7 @@ class NumpyLatticeSession:
         self._tell_time()
 
     def _begin(self) -> None:
-        """Start the clock of steps that are equal in τ. Raises `ValueError` if the monitor is not positive at the
+        """Initialise the physical time of a lattice with a monitor (dt = g dτ). Raises `ValueError` if g ≤ 0 at the
         start."""
         if hasattr(self._module, "_begin"):
             self._module._begin(self._sites, self._x)
@@ -96,7 +98,8 @@ class NumpyLatticeSession:
         return np.array(carried).reshape(vectors.shape)
 
     def advance_along(self, h: float, increments: Floats) -> None:
-        """Make one step for each row of the increments of the noise (steps, parts, sources, *sizes)."""
+        """Make one step for each row of ``increments`` (steps, parts, sources, *sizes), the random increments of the
+        noise."""
         try:
             for row in increments:
                 self._sites.increments = row
@@ -105,11 +108,12 @@ class NumpyLatticeSession:
             self._sites.increments = None
 
     def prepare(self, h: float) -> None:
-        """Compute the coefficients that depend on the step size. Raises `BackendError` if one is not finite."""
+        """Compute the coefficients that depend on the step size. Raises `BackendError` if a coefficient is not
+        finite."""
         if h != self._h:
             try:
                 self._h, self._rows = h, self._module._coefficients(self._sites, h)
-            except ValueError:  # raised for steps after which no state is finite; other targets report it as a status
+            except ValueError:  # raised if no state after the step is finite; the C reports this as a status
                 raise BackendError("NOT_FINITE", self.steps, self._x[None].copy()) from None
             self._clock.set_step(h, self.steps)
 
@@ -119,15 +123,15 @@ class NumpyLatticeSession:
             self._sites.t = self._clock.after(self.steps)
 
     def saved(self) -> dict[str, Any]:
-        """Return the energy level and the physical time, for steps equal in τ; else {}."""
+        """Return the energy level and the physical time, if a monitor (dt = g dτ) makes steps equal in τ; else {}."""
         return {"passed": np.array([self._sites.level, *self._sites.clock])} if hasattr(self._sites, "level") else {}
 
     def time(self) -> float:
-        """Return the physical time since the start, for steps equal in τ."""
+        """Return the physical time since the start, if a monitor (dt = g dτ) makes steps equal in τ, not in t."""
         return float(sum(self._sites.clock))
 
     def hold(self, level: float) -> None:
-        """Hold another energy level e, for steps equal in τ."""
+        """Set the energy level e of a lattice with a monitor; by default e is −H of the initial state."""
         self._sites.level = level
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
@@ -140,7 +144,10 @@ class NumpyLatticeSession:
         self._tell_time()
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes). Raises `BackendError` if it is not finite."""
+        """Replace the state by ``x`` (coordinates, *sizes); with a monitor, the energy level e becomes −H(x).
+
+        Raises `BackendError` if x is not finite.
+        """
         if not np.isfinite(x).all():
             raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())
         if hasattr(self._sites, "level"):
@@ -161,7 +168,7 @@ class NumpyLatticeSession:
 
     def density(self) -> Floats:
         """Return the density of H at the sites (*sizes)."""
-        with np.errstate(all="ignore"):  # non-finite values are part of the result, without warnings
+        with np.errstate(all="ignore"):  # the result may contain NaN or infinity, without warnings
             return np.asarray(self._module._energy(self._sites.parameters, self._x, self._sites)[0])
 
     def casimirs(self) -> Floats:
@@ -189,7 +196,7 @@ class NumpyLatticeSession:
 
 
 class NumpyLattice:
-    """Back end over the text of a generated NumPy module: a `phigen.runtime.lattice.LatticeBackend`."""
+    """Loaded solver of a lattice in NumPy (`phigen.runtime.lattice.LatticeBackend`), made from the text of a module."""
 
     target = "numpy"
 

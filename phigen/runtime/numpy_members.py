@@ -1,4 +1,7 @@
-"""Ensembles in NumPy: a generated module steps all members together, as rows of arrays. Failed members are removed."""
+"""Ensembles in NumPy: a generated module makes the steps of all members together, on arrays with one row per member.
+
+Members that fail are removed from the arrays.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,11 @@ from phigen.runtime.members import Members
 
 
 def ensemble(module: Any, members: Members, gauge: Floats | None, attitudes: Floats | None = None) -> Floats:
-    """Return final states or frames, as `phigen.runtime.backend.Backend.ensemble` does.
+    """Return the final states (members, DIM) or all frames (rows, members, DIM) of an ensemble.
 
-    ``gauge`` is (members, Casimirs of the gauge), None without a gauge.
+    ``gauge`` (members, Casimirs) has the multiples of Casimirs that are subtracted from H, None if there are none. If
+    ``attitudes`` is passed, its first row has the initial attitudes, and the computed attitudes are written into the
+    other rows.
     """
     frames = members.frames() if members.stride else None
     if not len(members):
@@ -37,8 +42,11 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, attitudes: Flo
 
 
 def _refused(module: Any, members: Members) -> list[int]:
-    """Return the members for which no step is possible, because of their parameters or of the monitor at their
-    start."""
+    """Return the numbers of members for which no step is possible: parameters are not admissible, or g ≤ 0 at the
+    start.
+
+    g is the monitor of the spec, the rescaling of time dt = g dτ.
+    """
     values = module._values(dict(members.parameters))
     refused = set(map(int, module._refused(values, members.x0))) if hasattr(module, "_refused") else set()
     if not module._admissible(values):
@@ -48,11 +56,12 @@ def _refused(module: Any, members: Members) -> list[int]:
 
 
 class MemberBatch:
-    """The members that have not failed, with the variables of the loop of the module's ``integrate``.
+    """The members that have not failed, and the variables of the loop that steps them.
 
     ``who`` are the numbers of these members and ``x`` their states. ``final`` and ``turned`` have the last state and
-    the last attitude of all members. ``failures`` maps failed members to their status; ``failed_at`` is the number of
-    steps before the first failure. ``first`` (members, numbers) are initial attitudes, None if the spec has none.
+    the last attitude of all members, failed ones included. ``failures`` maps failed members to their status;
+    ``failed_at`` is the number of steps before the first failure. ``first`` (members, numbers) are initial attitudes,
+    None if the spec has none.
     """
 
     def __init__(self, module: Any, members: Members, gauge: Floats | None, first: Floats | None) -> None:
@@ -74,7 +83,9 @@ class MemberBatch:
             self._leave(dict.fromkeys(refused, "BAD_ARGUMENT"))
 
     def advance(self, steps: int) -> None:
-        """Make ``steps`` steps. A step in which members fail is repeated without them."""
+        """Make ``steps`` steps. If members fail in a step, they are removed, and the step is repeated for the remaining
+        members.
+        """
         with np.errstate(all="ignore"):
             self._begin_run(steps)
             while steps and len(self.who):
@@ -87,16 +98,16 @@ class MemberBatch:
         self._report()
 
     def _begin_run(self, steps: int) -> None:
-        """Apply the flows of a corrector before a sequence of steps."""
+        """Apply the corrector, a map at the start of a sequence of steps, if the method has one."""
         if hasattr(self._module, "_followed") and steps and len(self.who):
             self._before = self.x
             self.x, self._carry = self._module._followed(self._module.BEGIN, self._stages[0], self.x, self._carry)
             self._running = True
 
     def _end_run(self) -> None:
-        """Apply the inverse corrector after a sequence of steps.
+        """Apply the inverse of the corrector, the map that was applied before a sequence of steps.
 
-        Members for which a flow has no solution fail; they keep their state before the sequence.
+        Members whose result is not finite fail, and get back their states from before the sequence.
         """
         if not self._running:
             return
@@ -107,9 +118,9 @@ class MemberBatch:
             self._leave(dict.fromkeys(failed_members.tolist(), "NOT_FINITE"))
 
     def _state(self) -> tuple[Floats, Floats]:
-        """Return the states of the remaining members and their compensation terms.
+        """Return the states of the remaining members, and the compensation terms of these states.
 
-        Inside a sequence with corrector, these are the states of its inner steps.
+        Between a corrector and its inverse, the inverse is applied to the states that are returned.
         """
         if not self._running:
             return self.x, self._carry
@@ -126,21 +137,23 @@ class MemberBatch:
             self.turned[self.who] = self._module._attitude(self._first, self._turned[0], self._rate, elapsed)
 
     def _select_settings(self) -> None:
-        """Select the step sizes, initial times and random numbers of the remaining members."""
+        """Store the step sizes, initial times and random numbers of the remaining members."""
         left, draws = self._members.part(self.who), self._members.draws
         self._h, self._t0 = left.h[()], left.t0[()]
         if hasattr(self._module, "_drawing"):
             self._drawn = self._module._drawing(self._h, len(left), draws.seed, left.paths, draws.step)
 
     def _of_step(self) -> tuple[Any, ...]:
-        """Return the arguments of the stages of the next step other than the state: time, step size and noise."""
+        """Return the arguments, besides the state, of the stages of the next step: time, step size, and increments of
+        noise.
+        """
         time_and_step = self._t0 + self._done * self._h, self._h
         return (*time_and_step, self._drawn(self._done)) if hasattr(self._module, "_drawing") else time_and_step
 
     def _step(self) -> dict[int, str]:
-        """Make one step of all members. If some fail, no member is advanced.
+        """Make one step of all remaining members. If some members fail, no member is advanced.
 
-        Returns the status of the failed members, by their index in ``who``.
+        Returns the status of each failed member, by its index in ``who``.
         """
         module, memory = self._module, list(self._memory)
         x, carry, attitudes = self.x, self._carry, self._turned
@@ -162,14 +175,16 @@ class MemberBatch:
         return {}
 
     def _leave(self, failed: dict[int, str]) -> None:
-        """Remove failed members. The predictors of the other members are retained, so their bits do not change."""
+        """Remove failed members. The predictors of the remaining members do not change, so neither do the bits of their
+        states.
+        """
         remaining = np.delete(np.arange(len(self.who)), list(failed))
         self._report()
         self.failures |= {int(self.who[m]): status for m, status in failed.items()}
         self.failed_at = self._done if self.failed_at < 0 else self.failed_at
         self.who, self.x, self._carry = self.who[remaining], self.x[remaining], self._carry[remaining]
         self._before = self._before[remaining]
-        # Members are the second axis from the end: arrays of Gauss methods are (unknowns, members, stages).
+        # The axis of members is the last but one: arrays of Gauss methods are (unknowns, members, stages).
         self._memory = [
             (np.take(a, remaining, max(a.ndim - 2, 0)), np.take(b, remaining, max(b.ndim - 2, 0)))
             for a, b in self._memory

@@ -1,9 +1,9 @@
-"""Back end and sessions over a generated NumPy module, loaded from its source text.
+"""Solver and sessions in NumPy, which call the functions of a generated module.
 
 Sessions call the functions that the module's ``integrate`` consists of: ``_values``, ``_admissible``,
 ``_coefficients``, ``_advance``; ``_renewed`` if the Hamiltonian depends on the time, ``_tangent_stage`` for tangents,
-``_time_of`` with a monitor, and those of ``reconstruct`` for attitudes. Ensembles (`phigen.runtime.numpy_members`) call
-the same functions.
+``_time_of`` with a monitor, and further ones for attitudes. Ensembles (`phigen.runtime.numpy_members`) call the same
+functions.
 """
 
 from __future__ import annotations
@@ -29,18 +29,21 @@ from phigen.runtime.numpy_lattice import NumpyLattice
 from phigen.runtime.numpy_members import ensemble
 
 Pair = tuple[Floats, Floats]
-#: Coefficients, parameters and step of a stage, and its time if there is one. Only the generated module reads them.
+#: Data of a stage of a step, as the generated module makes and reads them: coefficients, parameters, step size, and the
+#: time if H depends on it.
 Stage = tuple[Any, ...]
 
-#: A completed stage: the stage, the state and the compensation term at its start, and the solution of its equation.
+#: A completed stage of a step: its data, the state and the compensation term at its start, and the solution of its
+#: equation.
 CompletedStage = tuple[Stage, Floats, Floats, Floats]
 
 
 class AttitudeState(NamedTuple):
-    """Attitude of a session.
+    """Attitude of a session, as a product of group elements.
 
     ``first`` is the group element at the time ``begun``. ``element`` is the product of the increments of all steps
-    since then, ``lost`` its compensation term. ``rate`` is the rotation per unit of time that the gauge adds.
+    since then, ``lost`` its compensation term. ``rate`` is the rotation per unit of time that the Casimirs of the gauge
+    add.
     """
 
     first: Floats
@@ -50,24 +53,24 @@ class AttitudeState(NamedTuple):
     rate: Floats | None
 
     def arrays(self) -> dict[str, Any]:
-        """Return the arrays by which a session is saved."""
+        """Return the arrays, by name, with which a saved session stores this attitude."""
         rate = np.empty(0) if self.rate is None else self.rate
         return {"first": self.first, "begun": self.begun, "element": self.element, "lost": self.lost, "rate": rate}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Any]) -> AttitudeState:
-        """Return the attitude that `arrays` stored."""
+        """Return the attitude from the arrays, by name, of a saved session."""
         rate = arrays["rate"] if arrays["rate"].size else None
         return cls(arrays["first"], float(arrays["begun"]), arrays["element"], arrays["lost"], rate)
 
 
 def _memory_name(stage: int, part: int) -> str:
-    """Return the name of an array in a saved session, for a stage and a part of its memory."""
+    """Return the name, in a saved session, of one of the two arrays from which a stage predicts its next solution."""
     return f"memory_{stage}_{part}"
 
 
 class NumpySession:
-    """A session with the variables of the module's ``integrate``: a `phigen.runtime.session.Session`."""
+    """A `phigen.runtime.session.Session` that makes its steps by calling functions of a generated NumPy module."""
 
     def __init__(
         self,
@@ -80,13 +83,13 @@ class NumpySession:
         draws: Draws = FIRST_DRAWS,
     ) -> None:
         self.steps, self._draws = 0, draws
-        # Time and number of steps at the last change of the step size. Later times are multiples of h after it, so
-        # rounding errors do not accumulate.
+        # Time and number of steps at the last change of the step size. Later times are this time plus a multiple of h,
+        # so rounding errors do not accumulate.
         self._t, self._counted = t0, 0
         self._module, self._parameters, self._gauge = module, parameters, gauge
         self._renewed = hasattr(module, "_renewed")
         self._x, self._carry = x, carry
-        self._passed = (np.zeros(len(x)),) * 2  # for steps equal in tau: physical time and its compensation term
+        self._passed = (np.zeros(len(x)),) * 2  # with a monitor: time since the start, and its compensation term
         self._h = np.nan
         self._stages: list[Stage] = []
         self._memory: list[Pair] = []
@@ -114,17 +117,18 @@ class NumpySession:
 
     def kick(self, change: Floats) -> None:
         self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
-        if hasattr(self._module, "_with_new_step"):  # the last step does not lead to the state, but predicts the next
+        if hasattr(self._module, "_with_new_step"):  # the last step still predicts the next, from another state
             self._memory = [self._module._with_new_step(pair, 1.0) for pair in self._memory]
 
     def _stand(self, x: Floats, carry: Floats) -> None:
-        """Replace the state and its compensation term. Predictors are offsets from the state, and are not changed."""
+        """Replace the state and its compensation term. Predictors are differences from the state, and are not
+        changed."""
         monitored = hasattr(self._module, "_refused")
         if not np.isfinite(x).all() or (monitored and len(self._module._refused(self._values(), x))):
             raise BackendError("BAD_ARGUMENT", self.steps, self._x.copy())
         element = None if self._turned is None else self.element()
         self._x, self._carry = x, carry
-        if monitored:  # e = -H
+        if monitored:  # the gauge is the energy level e = -H
             self._gauge = self._module.gauge(x[0], **self._parameters)
             if np.isfinite(self._h):
                 self._stages = self._new_stages()
@@ -141,7 +145,7 @@ class NumpySession:
         element = None if self._turned is None else self.element()
         self._t, self._counted = self._now(), self.steps
         self._parameters = dict(parameters)
-        if monitored:  # e = -H
+        if monitored:  # the gauge is the energy level e = -H
             self._gauge = self._module.gauge(self._x[0], **self._parameters)
         self._h, self._stages, self._memory = np.nan, [], []
         if element is not None:
@@ -158,7 +162,7 @@ class NumpySession:
         return np.array(self._module._attitude(attitude.first, attitude.element, attitude.rate, elapsed)[0])
 
     def turn_from(self, first: Floats | None) -> None:
-        """Set the attitude at the present state to a group element; None for the identity."""
+        """Continue the attitude from the group element ``first`` at the present state; None stands for the identity."""
         values, identity = self._values(), self._module._identity(1)
         gauge = None if self._gauge is None else np.broadcast_to(self._gauge, (1, len(self._module.GAUGE)))
         rate = self._module._rates(values, self._x, gauge)
@@ -178,7 +182,7 @@ class NumpySession:
             self._commit(*self._attempted_step())
 
     def _run_corrected(self, steps: int) -> None:
-        """Make a sequence of steps between corrector and inverse corrector.
+        """Make steps between a corrector, a map at the start of the run, and its inverse at the end.
 
         If no step succeeds, or a corrector fails, the state is unchanged.
         """
@@ -200,7 +204,7 @@ class NumpySession:
             raise BackendError(status, self.steps, self._x.copy())
 
     def _follow(self, flows: str) -> None:
-        """Apply the flows of a corrector that the module's function ``flows`` makes."""
+        """Apply a corrector to the state: the flows that the attribute of the module with the name ``flows`` lists."""
         x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
         if not np.isfinite(x).all():
             raise BackendError("NOT_FINITE", self.steps, self._x.copy())
@@ -225,7 +229,7 @@ class NumpySession:
                     raise BackendError("NO_CONVERGENCE", self.steps, self._x.copy())
                 tangent = stage[0] @ tangent
         if hasattr(self._module, "_followed"):
-            self.advance(h, 1)  # the derivative is that of the run from the state before it
+            self.advance(h, 1)  # repeats the step with the corrector before it and its inverse after it
         else:
             self._commit(x, carry, memory, stages)
         return tangent
@@ -261,7 +265,7 @@ class NumpySession:
 
     @classmethod
     def from_bytes(cls, module: Any, parameters: Mapping[str, float], saved: bytes) -> NumpySession:
-        """Return the session that `saved` stored as these bytes."""
+        """Return the session from the bytes that `saved` returned."""
         with np.load(io.BytesIO(saved)) as archive:
             gauge = archive["gauge"] if archive["gauge"].size else None
             draws = Draws(*archive["draws"].tolist())
@@ -278,7 +282,7 @@ class NumpySession:
         return session
 
     def _now(self) -> float:
-        """Return the time of the state."""
+        """Return the physical time of the present state; not used with a monitor."""
         return self._t + (self.steps - self._counted) * self._h if self.steps > self._counted else self._t
 
     def _prepare(self, h: float) -> None:
@@ -297,8 +301,10 @@ class NumpySession:
             return stages
 
     def _of_step(self, increments: Floats | None) -> tuple[Any, ...]:
-        """Return the arguments of the stages of the next step: time, step size and noise (``increments``, else
-        random)."""
+        """Return the arguments, besides the state, of the stages of the next step: time, step size and noise.
+
+        The noise is ``increments`` or, if these are None, random numbers.
+        """
         if not hasattr(self._module, "_drawing"):
             return self._now(), self._h
         draws, prescribed = self._draws, None if increments is None else increments[np.newaxis]
@@ -308,9 +314,10 @@ class NumpySession:
     def _attempted_step(
         self, increments: Floats | None = None
     ) -> tuple[Floats, Floats, list[Pair], list[CompletedStage]]:
-        """Return state, compensation term and predictors after one step, and its completed stages.
+        """Compute one step without changing the session: return state, compensation term, predictors, and completed
+        stages.
 
-        The session is not changed. Raises `BackendError`.
+        Raises `BackendError`.
         """
         x, carry, memory, stages = self._x, self._carry, list(self._memory), []
         of_step = self._of_step(increments) if self._renewed else ()
@@ -342,7 +349,7 @@ class NumpySession:
 
 
 class NumpySolver:
-    """Back end over a generated module, loaded from its text: a `phigen.runtime.backend.Backend`.
+    """Loaded solver in NumPy, made from the text of a generated module: a `phigen.runtime.backend.Backend`.
 
     It needs no compiler, and makes the steps of all members of an ensemble together.
     """
@@ -386,7 +393,7 @@ class NumpySolver:
         return NumpySession.from_bytes(self.module, parameters, saved)
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`. One thread is used."""
+        """Integrate an ensemble as `phigen.runtime.backend.Backend.ensemble` says, in one thread."""
         return ensemble(self.module, members, self._gauges(members.x0, members.parameters), attitudes)
 
     @property
@@ -419,7 +426,8 @@ class NumpySolver:
             raise BackendError("BAD_ARGUMENT", 0, x0, tuple(refused) or tuple(range(len(x0))))
 
     def _gauges(self, x0: Floats, parameters: Mapping[str, Any]) -> Floats | None:
-        """Return the gauge of each member (members, Casimirs of the gauge); None if there is no gauge."""
+        """Return, for each member, the multiples of Casimirs that are subtracted from H (members, Casimirs); None if
+        there are none."""
         if not self.module.GAUGE:
             return None
         gauges = self.module.gauge(x0, **parameters) if self._gauge is None else self._gauge
@@ -452,7 +460,7 @@ class NumpySolver:
 
 
 def load(files: Mapping[str, str], interface: Interface) -> NumpySolver | NumpyLattice:
-    """Return the back end of generated files, as `phigen.registry` requires."""
+    """Return the solver that runs generated NumPy code; ``files`` maps file names to texts."""
     if isinstance(interface, LatticeInterface):
         return NumpyLattice(files, interface)
     return NumpySolver(files[f"{interface.name}.py"], interface)

@@ -1,7 +1,7 @@
-"""Named runs of a spec from Python: `Solver.run` and `LatticeSolver.run`.
+"""Runs that a spec names, for `Solver.run` and `LatticeSolver.run`: their settings, ends and rows.
 
 `changed` returns a run of a spec with other settings. `rows_of` makes the rows of a run of an ordinary system that
-`Solver.integrate` cannot make: runs that stop at a zero of a function, and rows at equal distances in time.
+`Solver.integrate` cannot make: runs that stop at a zero of a function, and rows at given times.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from phigen.spec.runs import with_step
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a run that replace those of the spec; None keeps the setting of the spec."""
+    """Settings of a run that replace settings of the spec; where a field is None, the setting of the spec applies."""
 
     step: float | None = None
     steps: int | None = None
@@ -36,9 +36,9 @@ class Settings:
 
 
 def run_named(spec: Spec | None, name: str | None) -> Run:
-    """Return the run of that name, the first by default.
+    """Return the run of the spec with the given name, by default the first run.
 
-    Raises `ValueError` if there is none, or the solver was made without a spec.
+    Raises `ValueError` if there is no run of that name, or if the solver was made without a spec.
     """
     if spec is None or not spec.runs:
         raise ValueError("the spec of this solver has no runs; solver.integrate takes a start and a step")
@@ -52,7 +52,10 @@ def run_named(spec: Spec | None, name: str | None) -> Run:
 
 
 def changed(spec: Spec, run: Run, settings: Settings) -> Run:
-    """Return the run with the settings of the caller. Raises `ValueError` and `TypeError` for invalid settings."""
+    """Return the run with those settings that are not None in place of the settings of the spec.
+
+    Raises `ValueError` for invalid settings, and `TypeError` for settings that exclude each other.
+    """
     if settings.steps is not None and settings.until is not None:
         raise TypeError("a run takes either steps or until, not both")
     rows = [n for n in ("stride", "every", "at") if getattr(settings, n) is not None]
@@ -82,9 +85,9 @@ def changed(spec: Spec, run: Run, settings: Settings) -> Run:
 
 
 def _row_times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fraction, ...]:
-    """Return the times of rows in the order of the run, without repetitions.
+    """Return the times at which rows are requested, without repetitions, ascending or, for a negative step, descending.
 
-    Raises `ValueError` for times before the start, or after the end if that is known, and if there are no times.
+    Raises `ValueError` if there are no times, or if a time is before the start or, with ``known_end``, after the end.
     """
     forwards = run.step > 0
     ordered = sorted((_number(t, "at") for t in times), reverse=not forwards)
@@ -100,7 +103,7 @@ def _row_times(run: Run, times: Sequence[float], *, known_end: bool) -> tuple[Fr
 
 
 def _resized(spec: Spec, run: Run, sizes: Sequence[int] | None) -> Run:
-    """Return the run of a lattice at other sizes."""
+    """Return the run of a lattice with other ``sizes`` (numbers of sites along the axes); None changes nothing."""
     if sizes is None or run.lattice is None or spec.lattice is None:
         return run
     if spec.lattice.graph:
@@ -118,7 +121,7 @@ def _number(value: float, name: str) -> Fraction:
 
 
 def end_of(session: Followed, run: Run, stop: Function | None, *, timed: bool) -> End:
-    """Return the end of a run; the session is at its start, and is not changed.
+    """Return the end of a run, for a session at the start of the run; the session is not changed.
 
     ``stop`` is a function of states whose first zero ends the run. If ``timed``, it also receives the time.
     """
@@ -136,14 +139,17 @@ def end_of(session: Followed, run: Run, stop: Function | None, *, timed: bool) -
 
 
 def spans_of(interval: float, span: float) -> list[float]:
-    """Return the multiples of ``interval``, from 0 on, that are less than the ``span`` of time of a run."""
+    """Return the multiples of ``interval`` strictly between 0 and ``span``, with the sign of ``span``."""
     count = math.ceil(abs(span / interval) * (1 - EQUAL))
     return [k * math.copysign(interval, span) for k in range(1, count)]
 
 
 def spans_of_run(run: Run, span: float) -> list[float]:
-    """Return the times after the start of the rows of a run with ``every`` or ``at``, without the end of the
-    ``span``."""
+    """Return the times after the start at which a run with ``every`` or ``at`` has rows, strictly between 0 and
+    ``span``.
+
+    ``span`` is the time from the start to the end of the run.
+    """
     if run.every is not None:
         return spans_of(float(run.every), span)
     requested = [float(time - run.start) for time in run.at]
@@ -151,10 +157,11 @@ def spans_of_run(run: Run, span: float) -> list[float]:
 
 
 def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield a session at each row of a run, the start first, with its number of steps; the last step may be a part.
+    """Yield, for each row of a run, a session at the row and its number of steps; the first row is the start.
 
-    Rows are ``run.every`` apart in time, or at every ``run.stride``-th step. The caller must read a session before it
-    asks for the next. Raises `BackendError`.
+    Rows are at the times that ``run.every`` or ``run.at`` gives, else at every ``run.stride``-th step. The last row is
+    the end, which may lie inside a step: its number of steps then has a fraction. The caller must read a session before
+    it asks for the next one. Raises `BackendError`.
     """
     yield session, 0.0
     yield from _timed_rows(session, run, end) if run.is_timed else _strided_rows(session, run, end)
@@ -170,10 +177,10 @@ def _strided_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Sessio
 
 
 def _timed_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
-    """Yield sessions at the multiples of ``every``, or at the times of ``at``, before the end, with their numbers of
-    steps.
+    """Yield, for each row at a given time before the end, a session at that time and its number of steps.
 
-    Each is reached by a part of a step from the last whole step before it.
+    The times are the multiples of ``run.every`` or the times ``run.at``. A time between two steps is reached by a
+    shorter step from the last whole step before it, and its number of steps has a fraction.
     """
     h = float(run.step)
     for span in spans_of_run(run, end.span):

@@ -9,14 +9,14 @@ import numpy as np
 
 from phigen.runtime.interface import BackendError, Floats, Progress, row_steps
 
-#: Largest number of progress reports of `rows_along`: their cost is then negligible.
+#: Largest number of calls of ``progress`` in a run, so that their cost is negligible.
 _REPORTS = 200
 
 
 class Course(Protocol):
-    """A trajectory being computed by any method: its state, and all other data that the next step depends on.
+    """A trajectory being computed by any method: its state, and all further data that the next step depends on.
 
-    A failing step raises `BackendError` and leaves the state before it.
+    If a step fails, `BackendError` is raised, and the state before the step remains.
     """
 
     @property
@@ -33,12 +33,13 @@ class Course(Protocol):
         ...
 
     def branch(self) -> Self:
-        """Return an independent copy."""
+        """Return an independent copy, which continues with the same steps."""
         ...
 
 
 class Followed(Course, Protocol):
-    """A `Course` of a generated solver, which additionally has a time and an attitude."""
+    """A `Course` of a generated solver: a trajectory that also has a time and, if the spec reconstructs one, an
+    attitude."""
 
     @property
     def rounding(self) -> float:
@@ -46,7 +47,10 @@ class Followed(Course, Protocol):
         ...
 
     def time(self) -> float:
-        """Return the physical time since the start for steps equal in τ, which the solver sums up; else NaN."""
+        """Return the physical time since the start, if a monitor (dt = g dτ) makes steps equal in τ; else NaN.
+
+        Without a monitor, the time follows from the number of steps.
+        """
         ...
 
     def element(self) -> Floats:
@@ -57,13 +61,14 @@ class Followed(Course, Protocol):
 class Session(Followed, Protocol):
     """A trajectory being computed by a generated solver.
 
-    The states have the same bits for every division of the steps into calls.
+    The states have the same bits, however the steps are divided into calls.
     """
 
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
         """Replace all parameters; state, time, attitude and random numbers are unchanged.
 
-        With a monitor, the energy level becomes −H. Raises `BackendError` for values that are not admissible.
+        With a monitor (dt = g dτ), the energy level e becomes −H. Raises `BackendError` for values that are not
+        admissible.
         """
         ...
 
@@ -75,24 +80,30 @@ class Session(Followed, Protocol):
     def advance_tangent(self, h: float) -> Floats:
         """Make one step, and return its derivative (DIM, DIM).
 
-        Raises `MissingExtraError` without the extra ``tangent``.
+        Raises `MissingExtraError` if the solver was compiled without ``tangent``.
         """
         ...
 
     def interpolated(self, fractions: Sequence[float]) -> Floats | None:
-        """Return states (fractions, DIM) at fractions of the last step, from its collocation polynomial.
+        """Return states (fractions, DIM) inside the last step, from the polynomial of a collocation method.
 
-        Fraction 0 is the start of the step. The states are far less accurate than steps, and serve to locate events.
-        None if the method has no polynomial, or the last step does not lead to the present state.
+        Fraction 0 is the start of the step, fraction 1 its end. The states are far less accurate than steps, and serve
+        to locate events. Returns None if the method has no polynomial, or if the state was changed after the last step.
         """
         ...
 
     def placed(self, x: Floats) -> Self:
-        """Return a copy of a session at its start, with the state replaced by ``x`` (DIM,) and the same gauge."""
+        """Return a copy of a session that has made no step, with the state ``x`` (DIM,).
+
+        The gauge, the multiples of Casimirs that are subtracted from H, is not chosen again for x.
+        """
         ...
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (DIM,); nothing else changes. Raises `BackendError` if ``x`` is not admissible."""
+        """Replace the state by ``x`` (DIM,); time, step number and parameters are unchanged.
+
+        With a monitor, the energy level e becomes −H(x). Raises `BackendError` if ``x`` is not admissible.
+        """
         ...
 
     def kick(self, change: Floats) -> None:
@@ -100,14 +111,15 @@ class Session(Followed, Protocol):
         ...
 
     def saved(self) -> bytes:
-        """Return the session as bytes, for `Backend.restored`."""
+        """Return the session as bytes, from which `Backend.restored` makes the session again."""
         ...
 
 
 def rows_along(
     session: Course, h: float, steps: int, stride: int, progress: Progress | None, see: Callable[[int], object] = id
 ) -> Floats:
-    """Return the states (rows, DIM) after 0, stride, 2·stride, … steps and the last, of a session at its start.
+    """Advance a session from its start, and return the states (rows, DIM) after 0, stride, 2·stride, … steps and the
+    last.
 
     ``see`` is called with the number of each row while the session is at that row. Raises `BackendError`, whose rows
     end with the state before the failing step.
@@ -124,7 +136,8 @@ def rows_along(
         except BackendError as error:
             good_steps = session.steps
             complete_rows = states[: len(row_steps(good_steps, stride))].copy()
-            # The last row of a trajectory is its last state, whether or not a stride ends there.
+            # The last row is the state before the failing step, even if this step does not follow a multiple of the
+            # stride.
             complete_rows[-1] = session.state()
             see(len(complete_rows) - 1)
             raise BackendError(error.status, good_steps, complete_rows) from error

@@ -1,4 +1,4 @@
-"""Stack of generated C: the longest chain of calls in the call graph that gcc writes (``-fcallgraph-info=su``)."""
+"""Upper bound for the stack that generated C uses, from the call graph that gcc writes with ``-fcallgraph-info=su``."""
 
 from __future__ import annotations
 
@@ -25,9 +25,11 @@ _TIMEOUT = 300.0  # seconds
 
 @dataclass(frozen=True)
 class CallGraph:
-    """Functions of a solver, with the bytes of stack and the callees of each; functions of libraries have no bytes.
+    """Call graph of a solver: the ``stack`` of each function in bytes, and the names of the functions that it
+    ``calls``.
 
-    ``kinds`` are those of gcc: ``static``; ``dynamic,bounded``, if the bytes are an upper bound; and ``dynamic``.
+    The stack of library functions is unknown. ``kinds`` has gcc's word for each function: ``static`` if the number of
+    bytes is exact, ``dynamic,bounded`` if it is an upper bound, and ``dynamic`` if there is no bound.
     """
 
     stack: Mapping[str, int]
@@ -35,9 +37,10 @@ class CallGraph:
     kinds: Mapping[str, str]
 
     def deepest(self, function: str, above: tuple[str, ...] = ()) -> int:
-        """Return the bytes of stack of a call of a function, without those of libraries.
+        """Return the largest stack, in bytes, of a call of ``function`` with all calls below it, library functions
+        excluded.
 
-        Raises `ToolchainError` if the function can call itself.
+        ``above`` are the functions that lead to this call. Raises `ToolchainError` if a function can call itself.
         """
         if function in above:
             raise ToolchainError(f"{function} can call itself: {' → '.join((*above, function))}")
@@ -46,12 +49,13 @@ class CallGraph:
 
     @property
     def external(self) -> set[str]:
-        """Names of functions that are called and not defined."""
+        """Names of functions that the solver calls and does not define, such as those of libm."""
         return {callee for callees in self.calls.values() for callee in callees} - self.stack.keys()
 
 
 def stack_bound(files: Mapping[str, str], name: str, flags: str) -> StackBound:
-    """Return the bound for the stack of a solver in C, compiled with these flags by the compiler named in CC, else gcc.
+    """Return a bound for the stack of a solver in C, compiled with ``flags`` by the compiler named in CC, or else by
+    gcc.
 
     Raises `ToolchainError` if the compiler writes no call graph, or if the stack has no bound.
     """
@@ -95,7 +99,8 @@ def _command() -> list[str]:
 
 
 def _output(command: Sequence[str], folder: Path | None = None) -> str:
-    """Return the output of a command. Raises `ToolchainError` with its messages if it fails."""
+    """Return the output of a command. If the command fails, raises `ToolchainError` with the messages of the
+    command."""
     try:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=_TIMEOUT, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -107,8 +112,8 @@ def _output(command: Sequence[str], folder: Path | None = None) -> str:
 
 
 def _plain(title: str) -> str:
-    """Return the name of a function without the file name that gcc adds for static functions.
+    """Return the name of a function from its title in gcc's call graph, which begins with a file name if it is static.
 
-    Parts and copies of functions that gcc makes keep their own names.
+    Names such as ``f.part.0``, which gcc gives to parts and copies of a function f, remain.
     """
     return title.rpartition(":")[2]

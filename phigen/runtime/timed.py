@@ -1,7 +1,7 @@
-"""States at given times, each reached by a further step of the same method from a nearby state.
+"""States at given times, each reached by one shorter step of the same method from a nearby state.
 
-A step of any size is a Poisson map and stays on its leaf. With a monitor, steps have a given size in τ; the size for a
-given time is found by the secant method, up to rounding.
+A step of any size is a Poisson map and keeps the Casimirs. With a monitor (dt = g dτ), steps have a given size in τ;
+the secant method finds the size in τ of the step that ends at a given time t, up to rounding.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from phigen.runtime.session import Session
 
 
 class Clocked(Protocol):
-    """Interface of sessions that this module needs; see `phigen.runtime.session.Followed`."""
+    """Interface of sessions that this module needs; `phigen.runtime.session.Followed` documents the methods."""
 
     @property
     def steps(self) -> int: ...
@@ -30,17 +30,18 @@ class Clocked(Protocol):
 
 C = TypeVar("C", bound=Clocked)
 
-#: Largest number of secant iterations; four to seven are usual.
+#: Largest number of iterations of the secant method for a step size; four to seven are usual.
 MAX_SECANTS = 30
-#: Largest difference of times that count as equal, in units of rounding relative to their size.
+#: Two times count as equal if they differ by at most this number of machine epsilons, relative to their size.
 _ROUNDINGS = 8
 EQUAL = float(_ROUNDINGS * np.finfo(float).eps)
 
 
 def reached(session: C, h: float, span: float) -> tuple[C, float]:
-    """Return a copy of a session after a further step that takes the time ``span``, and the size of this step.
+    """Return a copy of a session, advanced by one step that takes the time ``span``, and the size of this step.
 
-    ``h`` is the size of a whole step. Raises `BackendError`.
+    The size is in τ if a monitor rescales the time. ``h`` is the size of a usual step, with which the search for the
+    size begins. Raises `BackendError`.
     """
     if not np.isfinite(session.time()):
         return _moved(session, span), span
@@ -48,7 +49,7 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
     target = begin + span
     rounded = _ROUNDINGS * session.rounding * max(abs(begin), abs(span))
     size, lower_size, missed_before = h, 0.0, -span
-    while True:  # the first step is halved until it succeeds
+    while True:  # the step is halved until it succeeds
         try:
             copy = _moved(session, size)
             break
@@ -78,9 +79,9 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
 
 
 def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
-    """Return the number of whole steps in a span of time, and the rest of the span.
+    """Return the number of whole steps of size h that fit into the time ``span``, and the time that is then left.
 
-    If a step fails within the span, it is counted too, so that the same step fails for the caller.
+    If a step within the span fails, it is included in the number, so that it also fails for the caller.
     """
     if not np.isfinite(session.time()):
         whole_count = whole_steps(h, span)
@@ -105,9 +106,10 @@ def steps_until(session: Clocked, h: float, span: float) -> tuple[int, float]:
 
 
 def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C, float], object]) -> None:
-    """Advance a session by a span of time; the last step is shortened.
+    """Advance a session by the time ``span``, in steps of size h of which the last is shortened.
 
-    ``see`` receives the session and its τ at every stride-th step and at the end. Raises `BackendError`.
+    ``see`` receives the session and h times its number of steps: at the start, at every stride-th step, and at the end.
+    Raises `BackendError`.
     """
     see(session, 0.0)
     steps_done = 0
@@ -143,10 +145,11 @@ def along_until(session: C, h: float, span: float, stride: int, see: Callable[[C
 
 
 def states_at(session_at: Callable[[int], Session], t: Floats, x: Floats, h: float, times: Floats) -> Floats:
-    """Return the states (times, DIM) at given times of a trajectory with rows ``t`` and ``x``.
+    """Return the states (times, DIM) at given times of a trajectory with the times ``t`` and the states ``x`` of its
+    rows.
 
-    Each state is reached from the nearest row by steps of size h or −h and a part of a step. ``session_at`` returns a
-    session at the row of that number. Raises `BackendError`.
+    Each state is computed from the nearest row, by steps of size h or −h and a shorter last step. ``session_at(k)``
+    returns a session at row k. Raises `BackendError`.
     """
     states = np.empty((len(times), x.shape[1]))
     for k, time in enumerate(np.asarray(times, dtype=np.float64).tolist()):
@@ -159,8 +162,9 @@ def states_at(session_at: Callable[[int], Session], t: Floats, x: Floats, h: flo
 
 
 def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -> None:
-    """Make steps for the time ``span``: whole steps of size h, then a part of a step. The steps must be equal in
-    time."""
+    """Make steps over the time ``span``: whole steps of size h, then a shorter step. Only for steps that are equal in
+    time.
+    """
     step = float(np.copysign(h, span))
     whole_count = whole_steps(step, span)
     advance(step, whole_count)
@@ -170,7 +174,10 @@ def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -
 
 
 def moved_on(session: C, h: float, span: float) -> C:
-    """Return the session after the time ``span``, by whole steps and a part of a step. Raises `BackendError`."""
+    """Return a session at the time ``span`` after the state of ``session``: whole steps, then a shorter step.
+
+    Raises `BackendError`.
+    """
     step = np.copysign(h, span)
     if not np.isfinite(session.time()):
         advance_by(span, h, session.advance)
@@ -189,8 +196,8 @@ def moved_on(session: C, h: float, span: float) -> C:
 
 
 def whole_steps(h: float, span: float) -> int:
-    """Return the number of whole steps in a span of time. A last step that exceeds the span only by rounding is
-    counted."""
+    """Return the number of whole steps in a span of time. A last step that ends after the span only by rounding
+    counts."""
     ratio = span / h
     return round(ratio) if abs(ratio - round(ratio)) <= 1e-12 * max(1.0, abs(ratio)) else max(0, int(np.floor(ratio)))
 

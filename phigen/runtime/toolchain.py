@@ -1,6 +1,6 @@
-"""The C compiler of this machine: search for it, and compilation of generated code into shared libraries.
+"""The C compiler of this machine: the search for it, and the compilation of generated code into shared libraries.
 
-The flags are for libraries that are used on this machine only. The generated code itself needs C99 and libm.
+The compiler flags suit libraries that run on this machine only. The generated code itself needs only C99 and libm.
 """
 
 from __future__ import annotations
@@ -27,21 +27,20 @@ from phigen.errors import ToolchainError
 #: Flags that gcc, clang and zig all accept.
 BASE_FLAGS = ("-std=c99", "-O3", "-fPIC", "-shared")
 
-#: Flags for this processor, each used if the compiler accepts it. Fused multiply-adds change results by round-off only:
-#: the compensated sums of the generated code contain no product that could be fused. The generated code does not read
-#: floating-point exceptions. Without traps gcc may divide by 0 in a SIMD lane whose value is not used, and so
-#: vectorises loops over pairs without AVX-512 too.
+#: Flags for this processor; a flag that the compiler does not accept is left out. Fused multiply-adds change results by
+#: round-off only: the compensated sums of the generated code contain no product that could be fused. The generated code
+#: does not read floating-point exceptions, so traps are off. Without traps gcc may divide by 0 in a SIMD lane whose
+#: value is not used; only then does it vectorise loops over pairs on processors without AVX-512.
 TUNING_FLAGS = ("-march=native", "-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math")
 
-#: Flag for threads, which only lattices use.
+#: Flag of compilers for code with OpenMP threads, which only solvers of lattices use.
 OPENMP = "-fopenmp"
 
 #: Time limit of a compilation in seconds.
 TIMEOUT = 300.0
 
 _CANDIDATES = ("cc", "gcc", "clang")
-#: Python package with a C compiler, and the time limit of its trial in seconds: on its first run it compiles its
-#: runtime.
+#: Python package with a C compiler, and the time limit in seconds for its first use, in which it compiles its runtime.
 _PACKAGE, _FIRST_TRIAL = "ziglang", 120.0
 _HINT = (
     "install gcc or clang, or the compiler of the package ziglang (pip install ziglang), or name one in the "
@@ -50,7 +49,7 @@ _HINT = (
 _MESSAGE_LINES = 8
 _MESSAGE_BYTES = 1 << 16
 _TRIAL_TIMEOUT = 20.0  # seconds for --version, and for the compilation of a one-line library
-_GRACE = 1.0  # seconds that processes started by a compiler may outlive it
+_GRACE = 1.0  # seconds that child processes of a compiler may run after the compiler has ended
 _TRIAL = "#include <math.h>\ndouble trial(double x);\ndouble trial(double x) { return sin(x); }\n"
 _TRIAL_OF_THREADS = "#include <omp.h>\nint trial(void);\nint trial(void) { return omp_get_max_threads(); }\n"
 
@@ -62,7 +61,8 @@ _ELF_SHARED = 3
 
 @dataclass(frozen=True)
 class Compiler:
-    """A working C compiler: its command, the first line of its ``--version``, and the TUNING_FLAGS that it accepts."""
+    """A working C compiler: its command, the first line of its ``--version``, and those of `TUNING_FLAGS` that it
+    accepts."""
 
     command: tuple[str, ...]
     version: str
@@ -70,7 +70,7 @@ class Compiler:
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """All flags for a library that is used on this machine only."""
+        """All flags for compiling a library that is used on this machine only."""
         return BASE_FLAGS + self.tuning
 
     def __str__(self) -> str:
@@ -78,14 +78,14 @@ class Compiler:
 
 
 class NoCompilerError(ToolchainError):
-    """CC names no compiler, and none of the usual compilers works."""
+    """No C compiler was found: the variable CC is not set, and none of the usual compilers works."""
 
 
 def find() -> Compiler:
-    """Return the compiler named in CC, else the first of cc, gcc, clang and zig that compiles a one-line library.
+    """Return the compiler named in CC, or else the first of cc, gcc, clang and zig that compiles a one-line library.
 
-    zig is that of the Python package ziglang. Raises `ToolchainError` if the compiler named in CC does not work, and
-    `NoCompilerError` if none of the others works; the messages give the reasons.
+    zig is called through the Python package ziglang. Raises `ToolchainError` if the compiler named in CC does not work,
+    and `NoCompilerError` if CC is not set and no compiler works; the messages give the reasons.
     """
     configured = os.environ.get("CC", "").strip()
     if configured:
@@ -121,7 +121,7 @@ def available() -> bool:
 
 @cache
 def threaded(compiler: Compiler) -> Compiler:
-    """Return the compiler with the flag of OpenMP if it has OpenMP, else unchanged."""
+    """Return the compiler with the flag ``-fopenmp`` added, if it has OpenMP; else the compiler unchanged."""
     with tempfile.TemporaryDirectory(prefix="phigen-") as folder:
         source, library = Path(folder) / "trial.c", Path(folder) / "trial.so"
         source.write_text(_TRIAL_OF_THREADS, encoding="utf-8")
@@ -136,9 +136,9 @@ def threaded(compiler: Compiler) -> Compiler:
 def compile_library(
     sources: Sequence[Path], output: Path, compiler: Compiler | None = None, timeout: float = TIMEOUT
 ) -> None:
-    """Compile C files into one shared library; headers lie beside the sources.
+    """Compile C files into one shared library; the headers must be in the folders of the C files.
 
-    Raises `ToolchainError` with the first lines of the compiler's messages if it fails, if it takes more than
+    Raises `ToolchainError` with the first lines of the compiler's messages if the compiler fails, if it takes more than
     ``timeout`` seconds, or if it reports success but wrote no library.
     """
     compiler = compiler or find()
@@ -169,8 +169,10 @@ def _command(configured: str) -> tuple[str, ...]:
 
 
 def _examined(command: tuple[str, ...]) -> Compiler | str:
-    """Return the compiler of a command, or the reason why it does not work, as the end of a sentence about the
-    compiler."""
+    """Return the compiler that a command names, or the reason why it does not work.
+
+    The reason is the end of a sentence about the compiler, such as "is not a program".
+    """
     path = shutil.which(command[0])
     if path is None:
         return "is not a program" if shutil.which(command[0], os.F_OK) else _NOT_FOUND
@@ -195,9 +197,9 @@ def _responding_compilers(command: tuple[str, ...]) -> Compiler | str:
 
 
 def _with_tuning_flags(command: tuple[str, ...], version: str, folder: Path) -> Compiler | str:
-    """Return the compiler with the tuning flags that it accepts, or the reason why it compiles no library.
+    """Return the compiler with those tuning flags that it accepts, or the reason why it compiles no library.
 
-    All flags are tried together, and one by one if that fails.
+    All flags are tried together first and, if the compiler refuses them, one by one.
     """
     patience = _FIRST_TRIAL if _PACKAGE in command else _TRIAL_TIMEOUT
     source, library = folder / "trial.c", folder / "trial.so"
@@ -207,7 +209,7 @@ def _with_tuning_flags(command: tuple[str, ...], version: str, folder: Path) -> 
         library.unlink(missing_ok=True)
         return _compile_library(command, (*BASE_FLAGS, *by_keyword), [source], library, patience)
 
-    # -Werror turns clang's warning about an unused flag into a refusal.
+    # clang only warns about flags that it does not use; -Werror makes it refuse them.
     if not failure("-Werror", *TUNING_FLAGS):
         return Compiler(command, version, TUNING_FLAGS)
     reason = failure()
@@ -219,7 +221,8 @@ def _with_tuning_flags(command: tuple[str, ...], version: str, folder: Path) -> 
 def _compile_library(
     command: Sequence[str], flags: Sequence[str], sources: Sequence[Path], output: Path, timeout: float
 ) -> str:
-    """Compile a library. Return "" or the reason of the failure, as the end of a sentence about the compiler."""
+    """Compile a library, and return "". If this fails, return the reason as the end of a sentence about the
+    compiler."""
     code, messages = _run([*command, *flags, *map(str, sources), "-o", str(output), "-lm"], timeout)
     if code:
         return _failure_text(code, messages)
@@ -242,7 +245,8 @@ def _head(path: Path) -> bytes | None:
 
 
 def _failure_text(code: int, messages: str) -> str:
-    """Return the failure of a compiler as the end of a sentence, with the first lines of its messages."""
+    """Return a message about a failed compiler, as the end of a sentence, with the first lines of the compiler's
+    output."""
     ending = f"failed with exit code {code}" if code > 0 else f"was ended by {signal.Signals(-code).name}"
     lines = messages.strip().splitlines()
     if not lines:
@@ -253,9 +257,9 @@ def _failure_text(code: int, messages: str) -> str:
 
 
 def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tuple[int, str]:
-    """Return the exit code of a compiler and the beginning of its output, with stderr if ``errors``.
+    """Run a compiler, and return its exit code and the beginning of its output, with stderr if ``errors``.
 
-    At the time limit, all processes that the compiler started are killed too.
+    At the time limit, all processes that the compiler started are killed, and `subprocess.TimeoutExpired` is raised.
     """
     heard = bytearray()
 
@@ -272,8 +276,8 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
         return 126, f"it could not be started: {error.strerror or error}"
     with process:
         listener = threading.Thread(target=listen, args=(process.stdout,), daemon=True)
-        # The waiting thread returns as soon as the process ends, whereas `wait(timeout)` polls every twentieth of a
-        # second.
+        # join(timeout) of a thread that waits returns as soon as the process ends; `process.wait(timeout)` would poll
+        # the process every twentieth of a second.
         waiter = threading.Thread(target=process.wait, daemon=True)
         listener.start()
         waiter.start()
@@ -282,7 +286,7 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
             if waiter.is_alive():
                 raise subprocess.TimeoutExpired(command, timeout)
             listener.join(_GRACE)
-        # also after a keyboard interrupt: processes of the new session do not receive the signals of the terminal
+        # also after Ctrl-C, whose signal does not reach the compiler, since it runs in a session of its own
         finally:
             if waiter.is_alive() or listener.is_alive():
                 with contextlib.suppress(ProcessLookupError):

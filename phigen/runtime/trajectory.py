@@ -1,4 +1,4 @@
-"""Trajectories: the results of integrations."""
+"""Results of integrations: the class `Trajectory`, and the columns of the tables in which trajectories are saved."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Trajectory:
 
     ``t`` (rows,) are the times, ``x`` (rows, DIM) the states, ``energy`` (rows,) the values of H; ``casimirs`` and
     ``observables`` map names to values (rows,). There is a row for every stride-th of the ``steps`` steps of size
-    ``h``, and for the last step. With a monitor, h is a step in τ, and ``tau`` (rows,) are the values of τ; otherwise
-    ``tau`` is ``t``. ``retried`` are the numbers of steps that were made in parts. If the spec says ``reconstruct``,
-    ``attitude`` is a quaternion (w, x, y, z) in each row (rows, 4), or a matrix (rows, n, n), and ``position`` is
-    (rows, 3).
+    ``h``, and for the last step. If the spec has a monitor, which rescales time by dt = g dτ, h is a step in τ, and
+    ``tau`` (rows,) are the values of τ; otherwise ``tau`` is ``t``. ``retried`` are the numbers of those steps that
+    failed and were repeated as several smaller steps. If the spec says ``reconstruct``, ``attitude`` is a quaternion
+    (w, x, y, z) in each row (rows, 4), or a matrix (rows, n, n), and ``position`` is (rows, 3).
     """
 
     t: Floats
@@ -76,16 +76,16 @@ class Trajectory:
         return cast("Figure", display("figure of runs")({"phigen": self}, {}))
 
     def to_xarray(self) -> xr.Dataset:
-        """Return an `xarray.Dataset`: ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and observables (t).
+        """Return an `xarray.Dataset`: ``x`` (t, coordinate), and ``energy``, ``casimir_NAME``, each observable (t,).
 
-        Step and parameters are attributes. Raises `MissingPackageError` without xarray.
+        The step size and the parameters are attributes. Raises `MissingPackageError` without xarray.
         """
         from phigen.runtime.exchange import to_xarray
 
         return to_xarray(self)
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return a `pandas.DataFrame` with the columns of a ``.csv``, indexed by t.
+        """Return a `pandas.DataFrame` indexed by t, with the columns of the ``.csv`` file that `save` writes.
 
         Raises `MissingPackageError` without pandas.
         """
@@ -100,37 +100,40 @@ class Trajectory:
         return self.x[:, self.coordinates.index(coordinate)]
 
     def at(self, times: ArrayLike) -> Floats:
-        """Return the states (times, DIM) at given times, by steps of the same method from the nearest row.
+        """Return the states (times, DIM) at given times, computed by steps of the same method from the nearest row.
 
-        States are not interpolated. The last step to each has the size that takes the remaining time, so the state lies
-        on the leaf. With noise, times must be those of rows. Raises `ValueError` for other times and for times outside
-        of the range of t, and `StepError`.
+        States are not interpolated: the last step to a time is as long as the time that remains, so the Casimirs keep
+        their values. With noise, the times must be times of rows. Raises `ValueError` for other times and for times
+        outside of the range of t, and `StepError` if a step fails.
         """
         if self.solver is None:
             raise TypeError("this trajectory was not made by a solver of phigen")
         return self.solver.states_at(self, arguments.times_within(times, self.t))
 
     def save(self, path: str | Path) -> None:
-        """Write a file whose format is the suffix of the path. Raises `ValueError` for other suffixes.
+        """Write a file in the format that the suffix of the path names. Raises `ValueError` for other suffixes.
 
-        ``.csv``: ``t,x1,…,energy,C…``, one line per row; every float reads back as the same float. ``.npz``: the arrays
-        t, x, energy, casimir_NAME, observable_NAME, coordinates, and steps, h, parameter_NAME as scalars. With a
-        monitor tau comes after t.
+        A ``.csv`` has the columns ``t,x1,…,energy,C…`` and one line per row; every float reads back as the same float.
+        A ``.npz`` has the arrays t, x, energy, casimir_NAME, observable_NAME, coordinates, and steps, h, parameter_NAME
+        as scalars. With a monitor (dt = g dτ), a column or array ``tau`` follows t.
         """
         write(path, self.columns(), self.rows(), self.scalars())
 
     @property
     def monitored(self) -> bool:
-        """Whether steps are equal in τ, not in t."""
+        """Whether a monitor rescales the time by dt = g dτ, so that steps have equal size in τ, not in t."""
         return self.tau is not self.t
 
     @property
     def moving(self) -> frozenset[str]:
-        """The names among energy and Casimirs that time or forces change; their changes are not errors."""
+        """The names (``energy``, names of Casimirs) of quantities that explicit time or forces change.
+
+        Figures show their values instead of errors, since their changes are not errors.
+        """
         return self.solver.interface.moving if self.solver else frozenset()
 
     def columns(self) -> list[Column]:
-        """Return the columns of `rows`."""
+        """Return the columns of the table of this trajectory, in the order of the array that `rows` returns."""
         shape = () if self.attitude is None else self.attitude.shape[1:]
         attitude_columns = element_columns(shape, position=self.position is not None)
         observed = tuple(self.observables)
@@ -154,7 +157,7 @@ class Trajectory:
 
 
 class Turned(NamedTuple):
-    """Result of `Solver.attitudes`: states, attitudes, and positions (None if the spec has none)."""
+    """Result of `Solver.attitudes`: states, attitudes, and positions (None if the spec reconstructs no position)."""
 
     x: Floats
     attitude: Floats
@@ -162,8 +165,10 @@ class Turned(NamedTuple):
 
 
 def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, Floats | None]:
-    """Split ``elements`` (…, numbers) into attitudes (…, *shape) and positions (…, 3); None for what the system
-    lacks."""
+    """Split arrays ``elements`` (…, numbers) into attitudes (…, *shape) and positions (…, 3).
+
+    An attitude or a position that the system does not have is returned as None.
+    """
     if not interface.attitude:
         return None, None
     size = math.prod(interface.attitude)
@@ -172,7 +177,8 @@ def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, 
 
 
 def element_columns(shape: tuple[int, ...], *, position: bool) -> list[Column]:
-    """Return the columns of attitudes of the given shape, none for (), and of positions."""
+    """Return the columns for attitudes of the given shape, and for positions if ``position``; no columns for shape
+    ()."""
     if not shape:
         return []
     rows = range(1, shape[0] + 1)
@@ -191,7 +197,7 @@ def trajectory_columns(
 ) -> list[Column]:
     """Return the columns of a table of states, the observables last.
 
-    Names are distinct: a coordinate ``t`` is in the column ``t_``.
+    Names of columns are distinct: a coordinate with the name ``t`` gets the column ``t_``.
     """
     times = [Column(name, (name,), flat=True) for name in (["t", "tau"] if monitored else ["t"])]
     reserved_names = [name for column in [*times, *attitude_columns] for name in column.names]
