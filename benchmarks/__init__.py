@@ -1,1 +1,1 @@
-"""phigen's solvers beside the methods that people would otherwise use; see docs/benchmarks.md."""
+"""Benchmarks: phigen's solvers compared with the methods that people would otherwise use; see docs/benchmarks.md."""

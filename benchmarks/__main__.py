@@ -1,4 +1,5 @@
-"""``python -m benchmarks``: tables of docs/benchmarks.md, docs/gradients.md and docs/devices.md."""
+"""Command line ``python -m benchmarks``: makes the tables of docs/benchmarks.md, docs/gradients.md and
+docs/devices.md."""
 
 from __future__ import annotations
 
@@ -24,15 +25,15 @@ TABLES = (
     "work", "steps", "ensembles", "growth", "build", "lattices", "eccentric", "planets",
     "pullbacks", "gradients", "sharing", "devices",
 )  # fmt: skip
-#: Of a graphics card, made if it is named: other tables need none.
+#: Tables that need a graphics card. They are made only if ``--only`` names them.
 CARDS = ("devices",)
-#: Of a table that is made alone, in a process of its own: what it imports reads variables of the environment.
+#: Tables that are made in a separate process, since packages that they import read environment variables at the start.
 ALONE = ("gradients", "sharing")
 
 
 @dataclass(frozen=True)
 class Session:
-    """What the command line asked for."""
+    """Settings from the command line."""
 
     problems: Sequence[Problem]
     effort: Effort
@@ -42,7 +43,7 @@ class Session:
     say: Callable[[str], None]
 
     def save(self, name: str, data: object, text: str) -> None:
-        """A table and its data in the folder of results, and in the docs if they are to be written."""
+        """Write a table and its data to the folder of results, and with ``--write-docs`` to its page in docs/."""
         (self.folder / f"{name}.json").write_text(json.dumps(data, indent=1), encoding="utf-8")
         (self.folder / f"{name}.md").write_text(text, encoding="utf-8")
         if self.docs:
@@ -80,21 +81,25 @@ def main() -> int:
 
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="less of everything, for a trial")
+    parser.add_argument("--quick", action="store_true", help="fewer and shorter measurements, to try the program")
     parser.add_argument("--only", nargs="+", choices=TABLES, help="tables; by default all but devices",
                         default=[t for t in TABLES if t not in CARDS])  # fmt: skip
-    parser.add_argument("--target", choices=("cuda", "opencl"), help="of the table devices; by default that of a card")
+    parser.add_argument(
+        "--target", choices=("cuda", "opencl"), help="target of the table devices (default: that of a card)"
+    )
     names = [p.name for p in PROBLEMS]
-    parser.add_argument("--problem", nargs="+", choices=names, default=names, help="problems of work and steps")
+    parser.add_argument(
+        "--problem", nargs="+", choices=names, default=names, help="problems of the tables work and steps"
+    )
     parser.add_argument("--output", type=Path, default=Path("benchmark-results"), help="folder for tables and data")
-    parser.add_argument("--prepare", action="store_true", help="compile the solvers of work and steps, no more")
-    parser.add_argument("--publish", action="store_true", help="put the tables of the folder into the docs, no more")
+    parser.add_argument("--prepare", action="store_true", help="only compile the solvers of the tables work and steps")
+    parser.add_argument("--publish", action="store_true", help="only put the tables of the folder into docs/")
     parser.add_argument("--write-docs", action="store_true", help="put the tables into the pages of docs/")
     return parser.parse_args()
 
 
 def prepare(problems: Sequence[Problem], say: Callable[[str], None]) -> None:
-    """Fill the cache of compiled solvers, two at a time: nothing is timed."""
+    """Compile the solvers of all problems into the cache. Nothing is timed, so two processes work at once."""
     with ProcessPoolExecutor(max_workers=2) as pool:
         for name, notes in zip([p.name for p in problems], pool.map(built, problems), strict=True):
             say("; ".join([name, *notes]))
@@ -106,7 +111,7 @@ def built(problem: Problem) -> list[str]:
 
 @contextmanager
 def empty_cache() -> Iterator[None]:
-    """Where compilers are timed, nothing has been compiled before."""
+    """Context with an empty cache of compiled solvers, for the measurement of compile times."""
     before = os.environ["PHIGEN_CACHE_DIR"]
     with tempfile.TemporaryDirectory() as empty:
         os.environ["PHIGEN_CACHE_DIR"] = empty
@@ -115,7 +120,11 @@ def empty_cache() -> Iterator[None]:
 
 
 def work(session: Session) -> list[str]:
-    """A table for each problem and horizon; the summary is made of those of all problems, of earlier calls too."""
+    """Make the table of work against precision for each problem and horizon, and the summary; return failed scans as
+    notes.
+
+    The summary covers all problems whose results are in the folder, including those of earlier calls.
+    """
     failures = []
     for problem in session.problems:
         measured = studies.work_precision(problem, session.effort, session.say)
@@ -175,14 +184,15 @@ def bodies(session: Session) -> list[str]:
 
 
 def passes(session: Session) -> list[str]:
-    """The tables of docs/gradients.md."""
+    """Make the tables of docs/gradients.md. Returns no failures."""
     for name, text in pullbacks.measured(session.effort.quick, session.say).items():
         session.save(name, {}, text)
     return []
 
 
 def cards(session: Session) -> list[str]:
-    """The tables of docs/devices.md; each is saved at once, as a card may fail."""
+    """Make the tables of docs/devices.md, and return failures. Each part is saved at once, since a card may fail
+    later."""
     parts: list[str] = []
     try:
         for part in devices.measured(session.target, session.effort.quick, session.say):
@@ -194,7 +204,7 @@ def cards(session: Session) -> list[str]:
 
 
 def alone(name: str) -> Callable[[Session], list[str]]:
-    """A table by the module of its name, in another process."""
+    """Return the function that makes a table by running the module ``benchmarks.NAME`` in another process."""
 
     def make(session: Session) -> list[str]:
         import subprocess

@@ -1,11 +1,13 @@
-"""A graphics card beside one core: ensembles, spins on a cube, and diffrax on the same card.
+"""Benchmark of a graphics card against one processor core: ensembles, spins on a cubic lattice, and diffrax.
 
-``python -m benchmarks --only devices`` takes the card that CuPy finds, else the first device of OpenCL; ``--target``
-and the variable PHIGEN_DEVICE choose another. A processor with an OpenCL driver runs all of it too, with fewer members.
+``python -m benchmarks --only devices`` uses the card that CuPy finds, or else the first device of OpenCL; ``--target``
+and the variable PHIGEN_DEVICE choose another. A processor with an OpenCL driver can run everything too, with fewer
+members.
 
-Times are those of `ensemble` and `integrate` in Python. A time for each step is the difference of a long and a short
-run over that of their steps, so that copies and launches which both have do not count; that of a whole run is beside
-it. Nothing is timed before some members, or spins, have been compared with those of C.
+Calls of `ensemble` and `integrate` in Python are timed. The time of a step is the difference between a long and a short
+run, divided by the difference of their numbers of steps. So copies and launches, which occur in every run, do not
+count. The tables also state the time of the long run, divided by its number of steps. Before anything is timed, states
+are compared with those of the solver in C.
 """
 
 from __future__ import annotations
@@ -32,32 +34,35 @@ OSCILLATORS = (
     "phigen: 1\nname: bench\ncoordinates: [x, y, px, py]\npoisson: {canonical: {q: [x, y], p: [px, py]}}\n"
     "hamiltonian: (px**2 + py**2 + x**2 + y**2)/2 + x**2*y - y**3/3\norder: 4\nscheme: splitting\n"
 )
-#: Least and largest numbers of steps of a short run; a long one has three times as many.
+#: Least and largest number of steps of a short run, and the factor by which a long run has more steps.
 STEPS, MOST_STEPS, LONGER = 200, 51_200, 3
 #: Largest number of members: a card has its full throughput with fewer.
 MOST_MEMBERS = 10_000_000
-#: Numbers of blocks that a multiprocessor of CUDA shall run at once; 1 leaves all registers to a thread.
+#: Numbers of blocks that a CUDA multiprocessor is asked to run at once; with 1, a thread may use most registers.
 BLOCKS = (1, 3, 4, 5)
 
 Run = Callable[[int, int], float]
-"""Seconds of a run, from a number of members and one of steps."""
+"""Function that makes a run with a number of members and a number of steps, and returns its seconds."""
 
 
 def bodies(members: int) -> np.ndarray:
-    """Random points of a sphere, on which the energy of a rigid body varies by a factor of three."""
+    """Return random momenta (members, 3) of rigid bodies on the sphere |x|² = 3, whose energies vary by a factor of
+    three."""
     x = np.random.default_rng(1).normal(size=(members, 3))
     return np.asarray(x * np.sqrt(3 / (x**2).sum(1, keepdims=True)))
 
 
 def oscillators(members: int) -> np.ndarray:
-    """Random states of Hénon and Heiles with energies from 0 to 1/10, which stay bounded."""
+    """Return random states (members, 4) of the Hénon–Heiles system, whose energies are below 1/10, so that orbits
+    are bounded."""
     x = np.random.default_rng(1).uniform(-1, 1, size=(members, 4))
     return np.asarray(0.2 * x)
 
 
 @dataclass(frozen=True)
 class Case:
-    """An ensemble: its title, its spec, its starts, and the picoseconds for a member and step expected of an H200."""
+    """Ensemble to measure: title, spec, function that makes initial states, and ``expected``, the picoseconds for a
+    member and step that were predicted for an H200 card."""
 
     title: str
     spec: str
@@ -78,7 +83,8 @@ CASES = (
 
 @dataclass(frozen=True)
 class Effort:
-    """Seconds that a long run shall take beyond a short one, rounds of both, and sites on an edge of the cube."""
+    """Amount of work: seconds by which a long run should exceed a short run, number of repetitions, and sites along
+    an edge of the cubic lattice."""
 
     seconds: float
     rounds: int
@@ -86,7 +92,8 @@ class Effort:
 
 
 def measured(target: str | None, quick: bool, say: Callable[[str], None]) -> Iterator[str]:
-    """The parts of the page, one by one. Raises `DeviceError` or `MissingPackageError` where there is no device."""
+    """Yield the parts of the page, one after the other. Raises `DeviceError` or `MissingPackageError` without a
+    device."""
     target = target or default_target()
     device = device_of(target)
     effort = Effort(0.1, 1, 16) if quick else Effort(1.0, 3, 128 if device.is_card else 32)
@@ -97,7 +104,7 @@ def measured(target: str | None, quick: bool, say: Callable[[str], None]) -> Ite
 
 
 def default_target() -> str:
-    """The target of the first card: cuda if CuPy has one, else opencl."""
+    """Return the target of the first card: cuda if CuPy finds a card, else opencl."""
     try:
         device_of("cuda")
     except (DeviceError, MissingPackageError):
@@ -109,9 +116,10 @@ def default_target() -> str:
 
 
 def members_of(run: Run, seconds: float) -> int:
-    """A number of members, up to `MOST_MEMBERS`, whose short run takes about the given time."""
+    """Return a number of members, at most `MOST_MEMBERS`, for which a run of `STEPS` steps takes about the given
+    time."""
     members = 1024
-    run(members, 1)  # compiles
+    run(members, 1)  # the first run compiles, and is not timed
     while members < MOST_MEMBERS:
         spent = run(members, STEPS)
         if spent > seconds / 2:
@@ -121,7 +129,10 @@ def members_of(run: Run, seconds: float) -> int:
 
 
 def steps_of(run: Run, members: int, seconds: float) -> int:
-    """Steps of a short run that a long one exceeds by the given time: copies of many members take a second too."""
+    """Return a number of steps of short runs such that the long run takes at least ``seconds`` more than the short run.
+
+    The difference must be that large, since copies of many members can take a second as well.
+    """
     steps = STEPS
     while steps < MOST_STEPS and run(members, LONGER * steps) - run(members, steps) < seconds:
         steps *= 2
@@ -129,7 +140,11 @@ def steps_of(run: Run, members: int, seconds: float) -> int:
 
 
 def per_step(run: Run, members: int, effort: Effort) -> tuple[float, float]:
-    """Picoseconds for a member and step, medians: by the difference of two runs, and in all of the longer one."""
+    """Return two times in picoseconds for a member and step, both medians over the repetitions.
+
+    The first is the difference of a long and a short run, divided by the additional steps. The second is the whole time
+    of the long run, divided by its steps.
+    """
     short_steps, differences, whole = steps_of(run, members, effort.seconds), [], []
     long_steps = LONGER * short_steps
     for _ in range(effort.rounds):
@@ -140,7 +155,7 @@ def per_step(run: Run, members: int, effort: Effort) -> tuple[float, float]:
 
 
 def ensemble_run(solver: Any, starts: Callable[[int], np.ndarray], **more: Any) -> Run:
-    """Runs of an ensemble."""
+    """Return the function that times a run of an ensemble, for a number of members and a number of steps."""
     prepared: dict[int, np.ndarray] = {}
 
     def run(members: int, steps: int) -> float:
@@ -187,9 +202,10 @@ def _rows(case: Case, target: str, effort: Effort, say: Callable[[str], None]) -
 
 
 def difference(solver: Any, compilation: Any, x0: np.ndarray) -> float:
-    """The largest difference after 100 steps from C of the profile small, which may contract products and sums.
+    """Return the largest difference after 100 steps between states of the device and states of C of profile small.
 
-    Raises `DifferentStepsError` if it is more than roundings make: then no time means anything.
+    C compilers may fuse products and sums, so states differ by rounding errors. Raises `DifferentStepsError` for larger
+    differences, since a comparison of times would be meaningless.
     """
     exact = phigen.compile(compilation_of(compilation.spec, profile="small"), "c", profile="small")
     largest = float(np.abs(solver.ensemble(x0, STEP, 100) - exact.ensemble(x0, STEP, 100)).max())
@@ -197,7 +213,7 @@ def difference(solver: Any, compilation: Any, x0: np.ndarray) -> float:
 
 
 class DifferentStepsError(PhigenError):
-    """A device makes other steps than C."""
+    """The device computes other states than C, beyond rounding errors."""
 
 
 def checked(difference: float, bound: float) -> float:
@@ -214,7 +230,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _spins(target: str, effort: Effort, say: Callable[[str], None]) -> str:
-    """Steps of spins a second on a cube, with fields that stay on the device between the ends of a run."""
+    """Return the table of spin updates per second on a cubic lattice. States stay on the device during a run."""
     head = ("order", "spins", "steps of spins a second", "expected of an H200", "one core", "device / core",
             "difference from C")  # fmt: skip
     rows = []
@@ -232,7 +248,8 @@ def _spins(target: str, effort: Effort, say: Callable[[str], None]) -> str:
 
 
 def _spin_rates(target: str, order: int, effort: Effort) -> tuple[list[float], float]:
-    """The rates of the device and of one core, and the difference of their states after ten steps."""
+    """Return the spin updates per second of the device and of one core, and the difference of their states after ten
+    steps."""
     x, compilation = CUBE.start(effort.edge), compilation_of(specs.loads(_cube(order), "bench.yaml"))
     solvers = [phigen.compile(compilation, name) for name in (target, "c")]
     ours, theirs = (s.integrate(x, STEP, 10, 10).x[-1] for s in solvers)
@@ -262,7 +279,10 @@ def _spin_rate(solver: Any, x: np.ndarray, effort: Effort) -> float:
 
 
 def _peers(target: str, effort: Effort, say: Callable[[str], None]) -> str:
-    """diffrax on the device that JAX has, beside the splitting; steps are equal, errors of the energy are not."""
+    """Return the table that compares diffrax with phigen's splitting on the same device.
+
+    Both make steps of the same size, so their energy errors differ.
+    """
     title = "### diffrax"
     try:
         import diffrax
@@ -292,7 +312,7 @@ def _peers(target: str, effort: Effort, say: Callable[[str], None]) -> str:
 
 
 def energy_error(starts: np.ndarray, ends: np.ndarray) -> float:
-    """The largest error of the energy of Hénon and Heiles, relative to its largest value."""
+    """Return the largest energy error of the Hénon–Heiles system, relative to the largest initial energy."""
 
     def energy(x: np.ndarray) -> np.ndarray:
         q, p, px, py = x.T
@@ -302,7 +322,8 @@ def energy_error(starts: np.ndarray, ends: np.ndarray) -> float:
 
 
 def diffrax_run(diffrax: Any, jax: Any) -> Callable[[np.ndarray, int], tuple[np.ndarray, float]]:
-    """A function of starts and steps, with the ends and the seconds that they take without their compilation."""
+    """Return a function of initial states and a number of steps. It returns the final states and the seconds without
+    compilation."""
 
     def field(t: Any, x: Any, args: Any) -> Any:
         q, p, px, py = x
@@ -321,7 +342,7 @@ def diffrax_run(diffrax: Any, jax: Any) -> Callable[[np.ndarray, int], tuple[np.
         return jax.vmap(one)(x0)
 
     def run(x0: np.ndarray, steps: int) -> tuple[np.ndarray, float]:
-        solve(x0, STEP).block_until_ready()  # compiles for this number of members
+        solve(x0, STEP).block_until_ready()  # JAX compiles for each number of members
         begun = time.perf_counter()
         ends = np.asarray(solve(x0, STEP * steps))
         return ends, time.perf_counter() - begun

@@ -1,4 +1,4 @@
-"""Tables of the docs: each stands between two markers with its name, on one page, and is replaced alone."""
+"""Replacement of tables in pages of docs/. Each table stands on one page between two markers with its name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 DOCUMENT = DOCS / "benchmarks.md"
 FIGURES = DOCS / "figures"
-#: Pages with tables, beside the one of the benchmarks.
+#: Pages with tables other than docs/benchmarks.md, by the first word of the name of the table.
 PAGES = {"pullbacks": DOCS / "gradients.md", "devices": DOCS / "devices.md"}
 
 
@@ -17,7 +17,8 @@ def markers(name: str) -> tuple[str, str]:
 
 
 def replaced(text: str, name: str, table: str) -> str:
-    """The text with another table between the markers of this name; raises `LookupError` where there are none."""
+    """Return the text of a page with another table between the markers of ``name``; raises `LookupError` without
+    markers."""
     begin, end = markers(name)
     if text.count(begin) != 1 or text.count(end) != 1:
         raise LookupError(f"{page(name)} has no place for {name}: the lines {begin} and {end}")
@@ -27,19 +28,20 @@ def replaced(text: str, name: str, table: str) -> str:
 
 
 def publish(folder: Path, names: list[str]) -> None:
-    """Put tables that were saved in a folder into the document, and its figures beside it."""
+    """Put the named tables from a folder of results into their pages, and copy the figures of the folder to
+    docs/figures."""
     write({name: (folder / f"{name}.md").read_text(encoding="utf-8") for name in names})
     for figure in (folder / "figures").glob("*.svg"):
         shutil.copy(figure, FIGURES / figure.name)
 
 
 def page(name: str) -> Path:
-    """The page of a table: that of the first word of its name, or the one of the benchmarks."""
+    """Return the page of a table: the page of `PAGES` for the first word of its name, or docs/benchmarks.md."""
     return PAGES.get(name.partition("-")[0], DOCUMENT)
 
 
 def write(tables: dict[str, str]) -> None:
-    """Put these tables into their pages."""
+    """Put tables (name → Markdown) into their pages."""
     for name, table in tables.items():
         document = page(name)
         document.write_text(replaced(document.read_text(encoding="utf-8"), name, table), encoding="utf-8")

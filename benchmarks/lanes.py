@@ -1,4 +1,4 @@
-"""Gauss collocation with its stages in vector lanes: coefficients, predictors, and a library for each order."""
+"""Gauss collocation in C with the stages in SIMD lanes: coefficients, predictors, and a library for each order."""
 
 from __future__ import annotations
 
@@ -19,25 +19,26 @@ from phigen.runtime import cache
 ORDERS = (4, 8, 12, 16)
 ROW = "Gauss, SIMD, in C"
 
-#: Steps of the last ones that the predictor uses, as in c/gauss_lanes.h.
+#: Number of past steps that the predictor uses, the same as in c/gauss_lanes.h.
 HISTORY = 2
 
-#: Angles by which the fastest oscillation of L turns in a step; one predictor is made for each.
+#: Largest phase in radians by which an oscillation of the stage values L_j may advance in a step; each value gives one
+#: predictor.
 BANDS = (0.25, 0.5, 1.0, 2.0, 4.0)
 
-#: Relative size of the errors in past L_j that the predictor allows for, larger than their rounding errors: what it
-#: amplifies stays below the other errors of the guess.
+#: Relative error of past L_j that the predictor assumes. It is larger than their rounding errors, so that the predictor
+#: does not amplify these much.
 NOISE = "1e-13"
 
-#: Steps of the trial run that chooses the predictor.
+#: Number of steps of the trial run that chooses the predictor.
 TRIAL = 200
 
-#: The largest error left by the sweeps, relative to the state: less than what shows as a drift over 10⁷ steps.
+#: Error, relative to the state, at which fixed-point sweeps end: too small to show as a drift over 10⁷ steps.
 TOLERANCE = "2e-18"
 
 
 def lanes_methods(problem: Problem) -> list[Method]:
-    """Direct Gauss methods, applied to the equations as they are; all orders share one row of a table."""
+    """Return the Gauss methods of all `ORDERS` for the vector field of a problem; they share one row of a table."""
     return [lanes_method(problem, order) for order in ORDERS]
 
 
@@ -47,7 +48,10 @@ def lanes_method(problem: Problem, order: int) -> Method:
 
 
 def tuned(source: str, stages: int) -> Runner:
-    """The method of a C source with the predictor that takes the fewest sweeps in a trial run, which is not timed."""
+    """Return the method in a C source as a function that makes runs.
+
+    For each step size, it uses the predictor that needs the fewest sweeps in a trial run, which is not timed.
+    """
     library = cache.load({"main.c": source, **texts()})
     run, set_predictor = runner_of(library, 0), library.set_predictor
     set_predictor.argtypes = (ctypes.c_void_p,)
@@ -71,7 +75,8 @@ def tuned(source: str, stages: int) -> Runner:
 
 
 def lanes_source(field: str, order: int) -> str:
-    """C of the method for equations in C: DIM, and a function `field` of vectors."""
+    """Return the C source of a Gauss method. ``field`` is C that defines DIM and the vector field as a function
+    `field`."""
     stages = order // 2
     _, a, b = collocation(stages)
     mu = [a[i][j] / b[j] for i in range(stages) for j in range(stages)]
@@ -96,14 +101,14 @@ def _table(name: str, values: Sequence[Any]) -> str:
 
 @cached
 def collocation(stages: int) -> tuple[list[Any], list[list[Any]], list[Any]]:
-    """Nodes, matrix and weights of Gauss' method in 50 digits."""
+    """Return nodes, matrix and weights of a Gauss method with 50 digits."""
     with mpmath.workdps(70):
         t = sympy.Symbol("t")
         legendre = sympy.Poly(sympy.legendre(stages, 2 * t - 1), t)
         found = mpmath.polyroots([int(v) for v in legendre.all_coeffs()], maxsteps=300, extraprec=300)
         nodes = sorted(mpmath.re(root) for root in found)
         powers = mpmath.matrix([[c**k for k in range(stages)] for c in nodes])
-        basis = powers**-1  # column j: the coefficients of the polynomial that is 1 at node j and 0 at the others
+        basis = powers**-1  # column j: coefficients of the polynomial that is 1 at node j and 0 at all other nodes
 
         def integral(j: int, end: Any) -> Any:
             return mpmath.fsum(basis[k, j] * end ** (k + 1) / (k + 1) for k in range(stages))
@@ -114,13 +119,17 @@ def collocation(stages: int) -> tuple[list[Any], list[list[Any]], list[Any]]:
 
 @cached
 def predictors(stages: int) -> list[np.ndarray]:
-    """Arrays [HISTORY, stage to guess, past stage] of the weights for past L_j/b_j, one array for each of `BANDS`."""
+    """Return arrays [HISTORY, predicted stage, past stage] of the weights of past L_j/b_j, one array for each of
+    `BANDS`."""
     return [_predictor(stages, band) for band in BANDS]
 
 
 def _predictor(stages: int, band: float) -> np.ndarray:
-    """The best linear prediction of a random signal with all angular frequencies up to ``band`` alike, given its noisy
-    values at the stages of the last steps."""
+    """Return the weights of the best linear prediction of a random signal from noisy values at the stages of past
+    steps.
+
+    The spectrum of the signal is flat up to the angular frequency ``band``, in radians per step.
+    """
     with mpmath.workdps(60):
         nodes, _, _ = collocation(stages)
         past = [c - back for back in range(1, HISTORY + 1) for c in nodes]

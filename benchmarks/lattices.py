@@ -1,4 +1,4 @@
-"""Lattices: generated code beside kernels written by hand, and rings of 1,024 sites beside Runge–Kutta methods."""
+"""Benchmark of lattices: generated splittings against kernels written by hand, and against Runge–Kutta methods."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from benchmarks.tables import table
 from phigen import spec as specs
 from phigen.runtime import cache
 
-os.environ["OMP_NUM_THREADS"] = "1"  # kernels by hand have one thread
+os.environ["OMP_NUM_THREADS"] = "1"  # the kernels written by hand use one thread
 
 _SPINS = "coordinates: [x, y, z]\npoisson: {lie_algebra: {name: so(3)}}\ncasimirs: {C: x**2 + y**2 + z**2}\n"
 _PAIRS = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
@@ -29,7 +29,7 @@ _NEXT = "x*x[{0}+1] + y*y[{0}+1] + {1}*z*z[{0}+1]"
 
 @dataclass(frozen=True)
 class Sites:
-    """A lattice of like sites: the spec without its order, and the constants of the C that is compared with it."""
+    """Lattice of identical sites: its spec without the order, and the constants of the hand-written C for it."""
 
     name: str
     title: str
@@ -43,7 +43,7 @@ class Sites:
         return phigen.compile(specs.loads(text, "bench.yaml"), target="c")
 
     def start(self, size: int) -> np.ndarray:
-        """Random unit spins; waves of some unlike lengths otherwise."""
+        """Return an initial state: random unit spins if a site has three coordinates, else sums of waves."""
         if self.fields == 3:
             found = np.random.default_rng(1).normal(size=(3, *[size] * self.axes))
             return found / np.linalg.norm(found, axis=0)
@@ -82,12 +82,12 @@ CUBE = Sites(
 )
 
 Advance = Callable[[np.ndarray, float, int], tuple[np.ndarray, float]]
-"""From a state by steps of size h: the state, and CPU seconds."""
+"""Function of a state, a step size and a number of steps, which returns the final state and the CPU seconds."""
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """A library with methods that are written by hand, for one size."""
+    """Library of hand-written methods for a lattice of one size: splittings, or else Runge–Kutta methods."""
 
     sites: Sites
     size: int
@@ -120,7 +120,7 @@ class Kernel:
 
 
 def ours(solver: Any) -> Advance:
-    """The same for a phigen solver, from Python: some microseconds a call are part of the time."""
+    """Return the function that runs a phigen solver from Python; its time includes some microseconds for each call."""
 
     def advance(x: np.ndarray, h: float, steps: int) -> tuple[np.ndarray, float]:
         began = time.thread_time()
@@ -134,7 +134,10 @@ def ours(solver: Any) -> Advance:
 
 
 def kernels(quick: bool) -> list[dict[str, Any]]:
-    """Nanoseconds for a site and step, the least of alternating runs, of generated and hand-written splittings."""
+    """Return rows with the times of generated and hand-written splittings, in nanoseconds for a site and step.
+
+    Each time is the least of several runs, in which both alternate.
+    """
     rows = []
     for sites, size, order in ((XXZ, 1024, 2), (XXZ, 1024, 4), (CUBE, 32, 2), (CUBE, 96, 2)):
         if quick and size > 32 and sites is CUBE:
@@ -156,7 +159,8 @@ def kernels(quick: bool) -> list[dict[str, Any]]:
 
 
 def expect_same(one: Advance, other: Advance, x: np.ndarray) -> None:
-    """Both make the same step, or the comparison means nothing."""
+    """Raise `AssertionError` if two methods make different steps, since a comparison of their times would be
+    meaningless."""
     difference = np.abs(one(x, 0.05, 10)[0] - other(x, 0.05, 10)[0]).max()
     if not difference < 1e-12:
         raise AssertionError(f"the kernels make different steps: {difference:.1e}")
@@ -164,13 +168,14 @@ def expect_same(one: Advance, other: Advance, x: np.ndarray) -> None:
 
 # rings -------------------------------------------------------------------------------------------------------------
 
-#: Methods with their step sizes.
+#: Step sizes of phigen's methods by order, and of the Runge–Kutta methods by name.
 _SIZES = {2: (0.1, 0.05, 0.02), 4: (0.2, 0.1, 0.05), 6: (0.25, 0.125), 8: (0.4, 0.2)}
 _PEERS = {"RK4": (0.1, 0.05, 0.025), "DOP853": (0.4, 0.2, 0.1)}
 
 
 def rings(quick: bool) -> list[dict[str, Any]]:
-    """Rings of 1,024 sites over a long time: cost for a site and unit of time, errors of H and of the Casimirs."""
+    """Return rows for rings of 1,024 sites over a long time: cost for a site and unit of time, errors of H and
+    Casimirs."""
     rows = []
     for sites in (XXZ, FPUT, DNLS):
         size, horizon = (128, 40.0) if quick else (1024, 1e4)
@@ -188,7 +193,11 @@ def rings(quick: bool) -> list[dict[str, Any]]:
 
 
 def followed(judge: Any, advance: Advance, x: np.ndarray, h: float, horizon: float, chunks: int = 50) -> dict[str, Any]:
-    """One run over a horizon, looked at after each of some chunks."""
+    """Return the measurements of one run: cost, largest energy error, its growth, and the change of the spins' lengths.
+
+    The energy is computed after each of ``chunks`` parts of the run. The growth is the mean error in the last fifth
+    over that in the first.
+    """
     steps = max(1, round(horizon / h / chunks))
     scale = float(np.abs(judge.density(x)).sum())
     energies, seconds, state = [judge.hamiltonian(x)], 0.0, x
@@ -209,7 +218,7 @@ def followed(judge: Any, advance: Advance, x: np.ndarray, h: float, horizon: flo
 
 
 def shown(found: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
-    """Both tables."""
+    """Return the Markdown of the table of kernels and of the tables of rings."""
     head = ("", "order", "by hand, ns", "generated, ns", "generated / by hand")
     first = [
         (r["title"], str(r["order"]), f"{r['by hand']:.3g}", f"{r['generated']:.3g}",

@@ -1,4 +1,7 @@
-"""Errors and times: a scan finds the cheapest setting of each method for each target, interleaved rounds time these."""
+"""Measurement of errors and times: a scan finds the fastest setting of each method for each target.
+
+Afterwards the fastest settings of all methods are timed in turn.
+"""
 
 from __future__ import annotations
 
@@ -13,24 +16,26 @@ import sympy
 from benchmarks.problems import Problem
 from benchmarks.solvers import Method
 
-#: Sampling times of one run. Between two samples phigen makes multiples of 8 steps, as its solvers work in blocks.
+#: Number of times at which states of a run are sampled, by horizon. Between two samples phigen makes a multiple of
+#: BLOCK = 8 steps, since its solvers make steps in blocks of 8.
 SAMPLES = {"short": 125, "long": 500}
 BLOCK = 8
 
-#: Steps and tolerances of one grid: 2^(1/3) apart, and ten times. A scan begins at ``Problem.first`` or here.
+#: Factor between neighbouring step sizes of a scan; tolerances differ by a factor of ten. Scans of step sizes begin at
+#: ``Problem.first``, scans of tolerances at FIRST_TOLERANCE.
 FINER = 2 ** (1 / 3)
 FIRST_TOLERANCE, SMALLEST_TOLERANCE = 1e-4, 2.3e-16
 
-#: More than the finest step that a scan can afford.
+#: Number of the finest step size of a grid; time limits end every scan before it is reached.
 FINEST = 60
 
-#: Runs over the long horizon for one method and target.
+#: Largest number of runs over the long horizon for one method and target.
 MOST_LONG_RUNS = 6
 
-#: A solve that keeps Casimirs this well is a converged one.
+#: Largest Casimir error of phigen's runs; a larger error means that Newton's method did not converge.
 CONVERGED = 1e-10
 
-#: What takes more seconds than this is timed once.
+#: Runs that take more seconds than this are timed only once.
 ONCE = 2.0
 
 Target = tuple[str, float]
@@ -40,9 +45,11 @@ ORBIT: tuple[Target, ...] = (("orbit", 1e-4), ("orbit", 1e-8), ("orbit", 1e-10))
 
 @dataclass(frozen=True)
 class Result:
-    """One run: maxima over the samples of relative energy error, distance from the reference, Casimir error.
+    """Result of one run. ``setting`` is a step size or a tolerance.
 
-    ``drift`` is the energy error of the last tenth over that of the first; ``setting`` a step size or a tolerance.
+    ``energy``, ``orbit`` and ``casimir`` are maxima over the samples: relative energy error, distance from the
+    reference, Casimir error. ``drift`` is the largest energy error in the last tenth of the samples over that in the
+    first tenth.
     """
 
     method: str
@@ -73,7 +80,7 @@ class Result:
 
 @dataclass
 class Cell:
-    """The cheapest setting of one method for one target; ``times`` are seconds, one for each round."""
+    """Cell of a table: the fastest setting of a method for a target; ``times`` are its seconds in each round."""
 
     method: str
     family: str
@@ -84,7 +91,7 @@ class Cell:
 
 @dataclass
 class Study:
-    """What was measured on one problem over one horizon."""
+    """Measurements of one problem over one horizon."""
 
     problem: str
     title: str
@@ -95,7 +102,7 @@ class Study:
 
 
 class Judge:
-    """Evaluates H and the Casimirs on states, independently of the generated code."""
+    """Evaluation of H and Casimirs on states, independent of the generated code."""
 
     def __init__(self, problem: Problem, reference: np.ndarray | None = None) -> None:
         def function(text: str) -> sympy.FunctionClass:
@@ -120,7 +127,7 @@ class Judge:
 
 
 def run(method: Method, setting: float, horizon: float, samples: int, judge: Judge, limit: float) -> Result:
-    """One integration and its errors; phigen's runs are failures if they lose Casimirs."""
+    """Return the result of one run with its errors. Runs of phigen fail if they do not conserve Casimirs."""
     span = horizon / samples
     chunk = steps_of_sample(method, setting, span) if method.step_based else span
     if method.step_based:
@@ -142,14 +149,16 @@ def run(method: Method, setting: float, horizon: float, samples: int, judge: Jud
 
 
 def steps_of_sample(method: Method, setting: float, span: float) -> int:
-    """Steps between two samples; those of phigen fill blocks where a sample has some of them."""
+    """Return the number of steps between two samples. For phigen it is a multiple of `BLOCK`, if steps are small
+    enough."""
     block = BLOCK if method.family == "phigen" and span / setting >= 4 * BLOCK else 1
     return max(1, round(span / setting / block)) * block
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Numbered settings of a method: 0 is where a scan begins, the next is a finer step, or a smaller tolerance."""
+    """Numbered settings of a method: the scan begins at number 0; larger numbers are smaller steps or smaller
+    tolerances."""
 
     method: Method
     problem: Problem
@@ -160,7 +169,10 @@ class Grid:
         return max(FIRST_TOLERANCE / 10.0**index, SMALLEST_TOLERANCE)
 
     def indices(self) -> range:
-        """All that there is: a sample has at least one step, and tolerances end at the precision of numbers."""
+        """Return all numbers of settings.
+
+        The largest step is the time between two samples; the smallest tolerance is about the precision of numbers.
+        """
         if self.method.step_based:
             longest = self.problem.short / SAMPLES["short"]
             return range(-math.floor(math.log(longest / self.problem.first, FINER)), FINEST)
@@ -169,7 +181,7 @@ class Grid:
 
 @dataclass
 class Scan:
-    """Results of one method over the short horizon, by their number on its grid."""
+    """Results of one method over the short horizon, by the numbers of their settings in the `Grid`."""
 
     grid: Grid
     judge: Judge
@@ -178,7 +190,7 @@ class Scan:
     results: dict[int, Result] = field(default_factory=dict)
 
     def try_at(self, index: int) -> Result:
-        """The result of a setting; of two that amount to the same steps a sample, that of the first."""
+        """Return the result of a setting. Settings that give the same number of steps between samples share one run."""
         grid, horizon = self.grid, self.grid.problem.short
         setting, span = grid.setting(index), horizon / SAMPLES["short"]
         if grid.method.step_based:
@@ -189,7 +201,7 @@ class Scan:
         return result
 
     def extend_finer(self) -> None:
-        """From number 0 on, until every target is met, or a run would be too slow."""
+        """Try settings 0, 1, 2, … until every target is met, or a run takes too long."""
         for index in self.grid.indices():
             if index < 0:
                 continue
@@ -199,7 +211,7 @@ class Scan:
                 break
 
     def extend_coarser(self) -> None:
-        """Below number 0, as long as a coarsest setting is the cheapest for some target."""
+        """Try settings −1, −2, … as long as the coarsest tried setting is the fastest for some target."""
         while self.best_at_coarse_end():
             index = min(self.results) - 1
             if index not in self.grid.indices():
@@ -207,19 +219,24 @@ class Scan:
             self.try_at(index)
 
     def best_at_coarse_end(self) -> list[Target]:
-        """The targets for which no setting has been tried that is coarser than the cheapest."""
+        """Return the targets for which the coarsest tried setting is the fastest, so that a coarser one might be
+        faster."""
         first = self.results[min(self.results)]
         return [t for t in self.targets if cheapest(list(self.results.values()), t) is first]
 
     def failure(self) -> str:
-        """Why the cheapest settings are not known: a coarser one than the coarsest of all might be cheaper."""
+        """Return a message if the coarsest possible setting is the fastest for some target, else "".
+
+        In this case the fastest setting is unknown, since a still coarser one might be faster.
+        """
         ends = [f"{name} {bound:.0e}" for name, bound in self.best_at_coarse_end()]
         coarsest = self.results[min(self.results)].setting
         return f"{self.grid.method.name}: {coarsest:.3g} is the best for {', '.join(ends)}" if ends else ""
 
 
 def scan(method: Method, problem: Problem, judge: Judge, targets: Sequence[Target], limit: float) -> Scan:
-    """Settings from coarse to fine until all targets are met, then coarser ones while these are better still."""
+    """Return the scan of a method: settings from coarse to fine until all targets are met, then coarser ones if
+    these help."""
     scanned = Scan(Grid(method, problem), judge, targets, limit)
     scanned.extend_finer()
     scanned.extend_coarser()
@@ -227,8 +244,12 @@ def scan(method: Method, problem: Problem, judge: Judge, targets: Sequence[Targe
 
 
 def reach(scanned: Scan, judge: Judge, target: Target, limit: float, results: dict[int, Result]) -> None:
-    """Runs over the long horizon, added to ``results``: from the setting that the short one promises on, finer until
-    the target is met, or coarser as long as it is. Runs that would take longer than ``limit`` are not begun."""
+    """Run a method over the long horizon, and add the runs to ``results`` by the numbers of their settings.
+
+    The first setting is the coarsest that should meet the target according to the runs over the short horizon. Finer
+    settings follow until the target is met, or coarser settings as long as it is met. Runs that are expected to take
+    more seconds than ``limit`` are not started.
+    """
     grid, growth = scanned.grid, scanned.grid.problem.long / scanned.grid.problem.short
     usable = {k: r for k, r in scanned.results.items() if r.status == "ok"}
     if not usable:
@@ -260,7 +281,8 @@ def cheapest(results: Sequence[Result], target: Target) -> Result | None:
 def time_cells(
     cells: Sequence[Cell], methods: dict[str, Method], horizon: float, samples: int, judge: Judge, rounds: int
 ) -> None:
-    """Every chosen setting in turn, round after round: A B C A B C …, so that a disturbance meets all alike."""
+    """Time the settings of all cells in turn, round after round: A B C A B C …, so that a disturbance affects all
+    methods."""
     chosen: dict[tuple[str, float], list[Cell]] = {}
     for cell in cells:
         if cell.result:
@@ -275,6 +297,6 @@ def time_cells(
 
 
 def ratios(numerator: Sequence[float], denominator: Sequence[float]) -> tuple[float, float, float]:
-    """Median, least and largest of the ratios of times measured in the same round."""
+    """Return median, least and largest ratio of times that were measured in the same round."""
     each = [a / b for a, b in zip(numerator, denominator, strict=False)]
     return median(each), min(each), max(each)

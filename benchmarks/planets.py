@@ -1,9 +1,9 @@
-"""The eight planets about the Sun: methods for near-integrable systems beside those of REBOUND, where it is installed.
+"""Benchmark of the eight planets: phigen's methods for near-integrable systems against REBOUND, if it is installed.
 
-All solve for the same nine bodies from the same Cartesian state about the centre of mass, in astronomical units and
-days (WHFast512 in units with G = 1), and hand over the state of all bodies every ten years, from which one function
-computes the energy. Steps between two outputs are one call. CPU time of one core, the least of all chunks of ten years;
-the methods take turns.
+All methods start from the same Cartesian state of the nine bodies about their centre of mass, in astronomical units and
+days (WHFast512 in units with G = 1). They return the state of all bodies every ten years, and one function computes the
+energy of these states. The steps between two outputs are one call. Times are CPU times of one core, the least over all
+intervals of ten years; the methods take turns.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DECADE = 3650.0
 AXES = "xyz"
 Bodies = tuple[NDArray[np.float64], NDArray[np.float64]]
 
-#: phigen's method, order and step in days, in Jacobi coordinates and in those of the spec `planets`.
+#: Methods of phigen: relative coordinates (``coordinates_from``), composition, order, and step in days.
 PHIGEN = (
     ("jacobi", "wisdom-holman-17", 2, 5.0),
     ("jacobi", "wisdom-holman-17", 2, 2.5),
@@ -37,7 +37,8 @@ PHIGEN = (
     ("jacobi", "aba-10-6-4", 4, 20.0),
     ("democratic_heliocentric", "wisdom-holman-17", 2, 5.0),
 )
-#: REBOUND's integrators: name, options and step in days. Steps are synchronised at outputs only.
+#: Integrators of REBOUND: name, options and step in days. With safe_mode 0, positions and velocities are synchronised
+#: at outputs only.
 REBOUND = (
     ("whfast", {"corrector": 17, "safe_mode": 0}, 5.0),
     ("whfast", {"corrector": 17, "safe_mode": 0}, 2.5),
@@ -49,7 +50,7 @@ REBOUND = (
 
 @dataclass(frozen=True)
 class Contestant:
-    """A method at a step in days; ``advance`` makes steps, and returns positions and velocities (9, 3)."""
+    """Method with a step in days; ``advance`` makes a number of steps, and returns positions and velocities (9, 3)."""
 
     name: str
     step: float
@@ -57,7 +58,8 @@ class Contestant:
 
 
 def measured(quick: bool, say: Callable[[str], None]) -> str:
-    """Return the table: time for a planet and step, time for a planet and day, largest energy error."""
+    """Return the table: nanoseconds for a planet and step, nanoseconds for a planet and day, largest relative energy
+    error."""
     masses, q, v, gm = planets()
     contestants = [*phigen_methods(masses, q, v), *rebound_methods(masses, q, v, gm, say)]
     first = energy(masses, q, v, gm)
@@ -85,7 +87,7 @@ def measured(quick: bool, say: Callable[[str], None]) -> str:
 
 
 def planets() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
-    """Return masses, positions and velocities of the Sun and the planets about their centre of mass, and GM."""
+    """Return masses (9,), positions and velocities (9, 3) about the centre of mass, and the constant GM of the Sun."""
     source = spec.load(resources.bundled()["planets"])
     values = {p.name: float(p.value) for p in source.parameters}
     masses = np.array([1.0, *(values[f"m{i}"] for i in range(1, PLANETS + 1))])
@@ -103,7 +105,7 @@ def energy(masses: NDArray[np.float64], q: NDArray[np.float64], v: NDArray[np.fl
 
 
 def spec_text(change: str, composition: str, order: int) -> str:
-    """Return the spec of all nine bodies in Cartesian coordinates."""
+    """Return the spec of all nine bodies in Cartesian coordinates; ``change`` is its value of ``coordinates_from``."""
     source = spec.load(resources.bundled()["planets"])
     bodies = range(PLANETS + 1)
     values = {p.name: float(p.value) for p in source.parameters} | {"m0": 1.0}
@@ -123,7 +125,7 @@ def spec_text(change: str, composition: str, order: int) -> str:
 
 
 def phigen_methods(masses: NDArray[np.float64], q: NDArray[np.float64], v: NDArray[np.float64]) -> Iterator[Contestant]:
-    """Yield phigen's methods, compiled once for each composition."""
+    """Yield phigen's methods, compiled once for each spec."""
     solvers: dict[str, Solver] = {}
     momenta = masses[:, np.newaxis] * v
     start = np.concatenate([q.ravel(), momenta.ravel()])
@@ -149,14 +151,14 @@ def rebound_methods(
     gm: float,
     say: Callable[[str], None],
 ) -> Iterator[Contestant]:
-    """Yield the methods of REBOUND; none where it is not installed."""
+    """Yield the methods of REBOUND; none if it is not installed."""
     try:
         import rebound
     except ImportError:
         say("rebound is not installed")
         return
     for name, options, step in REBOUND:
-        unit = np.sqrt(gm) if name == "whfast512" else 1.0  # of time: G = 1 there
+        unit = np.sqrt(gm) if name == "whfast512" else 1.0  # number of time units in a day; WHFast512 requires G = 1
         simulation = rebound.Simulation()
         simulation.G = 1.0 if name == "whfast512" else gm
         for m, at, velocity in zip(masses, q, v / unit, strict=True):

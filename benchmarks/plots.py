@@ -1,4 +1,4 @@
-"""Work against precision as figures: every run of a scan that ended well, not only the cheapest for a target."""
+"""Figures of error against time: all successful runs of a scan, not only the fastest for a target."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from benchmarks.measure import Result, Study
 from phigen.drawing.palette import SERIES, save_for_pages, styled
 
-#: Peers that are drawn, with line styles; the rest is in the tables. phigen's methods are drawn as full lines.
+#: Other methods that are drawn, with their line styles; tables show more methods. phigen's methods have solid lines.
 PEERS = {
     "DOP853 in C": "-.",
     "heyoka": ":",
@@ -21,7 +21,8 @@ PEERS = {
 
 @styled
 def work_figure(study: Study) -> Any:
-    """Energy and orbit errors against milliseconds; for phigen the best of all orders."""
+    """Return a figure of energy errors and orbit errors against milliseconds, with one curve for each row of the
+    table."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(7.2, 3.4), layout="constrained")
@@ -51,7 +52,7 @@ def _curves(study: Study) -> list[tuple[str, list[Result], Any]]:
 
 
 def _front(results: Sequence[Result], what: str) -> list[Result]:
-    """From fast to slow, those that are more accurate than all that are faster."""
+    """Return the results that are more accurate than all faster results, from fast to slow."""
     front: list[Result] = []
     for r in sorted(results, key=lambda r: r.seconds):
         if not front or getattr(r, what) < getattr(front[-1], what):
@@ -60,7 +61,8 @@ def _front(results: Sequence[Result], what: str) -> list[Result]:
 
 
 def draw(studies: Sequence[Study], folder: Path) -> dict[str, str]:
-    """A file for each study over the short horizon; Markdown that shows it, by title and horizon."""
+    """Write a figure for each study over the short horizon; return the Markdown that shows it, by the name of the
+    problem."""
     shown = {}
     for study in studies:
         if any(r.orbit == r.orbit for r in study.scans):

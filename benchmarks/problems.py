@@ -1,4 +1,4 @@
-"""The systems, each given once, by π and H: specs for phigen and vector fields for the others come from here."""
+"""Systems of the benchmarks. Each is given by π and H, from which specs and vector fields are derived."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from functools import cached_property
 
 import sympy
 
-#: Orders of phigen's methods; those of the series are told by each problem.
+#: Orders of phigen's methods that are measured. For the series, each problem states the orders.
 ORDERS = {"splitting": (2, 4, 6, 8, 10), "gauss": (4, 8, 12, 16), "gauss to truncation": (4, 8, 12, 16)}
 
 
 @dataclass(frozen=True)
 class Problem:
-    """A system with its data.
+    """System with the data of its benchmark.
 
-    ``short`` and ``long`` are the horizons, ``first`` is the step at which scans begin, ``typical`` that at which steps
-    are compared; ``splitting`` names the C file with an explicit Poisson splitting, ``constants`` go to it.
+    ``short`` and ``long`` are the times of integration. ``first`` is the step size at which scans begin, ``typical``
+    the step size at which the cost of steps is measured. ``splitting`` names the C file with an explicit Poisson
+    splitting, ``constants`` are defined in that file.
     """
 
     name: str
@@ -39,7 +40,7 @@ class Problem:
     constants: Mapping[str, float] = field(default_factory=dict)
 
     def orders_of(self, method: str) -> tuple[int, ...]:
-        """The orders that a method of phigen is tried at."""
+        """Return the orders of a method of phigen that are measured."""
         return ORDERS.get(method, self.orders)
 
     @property
@@ -56,15 +57,19 @@ class Problem:
 
     @cached_property
     def field(self) -> list[sympy.Expr]:
-        """The right-hand side, as short as a careful user would write it."""
+        """The components of π∇H, simplified as a careful user would write them."""
         H = self.parse(self.hamiltonian)
         gradient = sympy.Matrix([sympy.diff(H, s) for s in self.symbols])
         pi = sympy.Matrix([[self.parse(e) for e in row] for row in self.poisson])
         return [sympy.factor_terms(sympy.expand(e)) for e in pi * gradient]
 
     def spec(self, order: int, method: str = "gauge none") -> str:
-        """A spec of the system, named ``bench``. ``method`` is ``gauge none`` or ``gauge auto``, by the series to the
-        order itself, ``splitting``, which is composed, ``gauss``, exactly Poisson, or ``gauss to truncation``."""
+        """Return a spec of the system, named ``bench``, of the given order.
+
+        ``method`` is ``gauge none`` or ``gauge auto`` for the series without composition, ``splitting``, ``gauss`` for
+        Gauss collocation that is exactly Poisson, or ``gauss to truncation`` for Gauss collocation that is Poisson up
+        to its error.
+        """
         schemes = {
             "splitting": "scheme: splitting",
             "gauss": "scheme: gauss",
@@ -135,7 +140,7 @@ def _so4() -> tuple[tuple[str, ...], ...]:
 
 
 def volterra(n: int) -> Problem:
-    """The periodic Volterra lattice of n species."""
+    """Return the periodic Volterra lattice of n species."""
     v = [f"v{i}" for i in range(1, n + 1)]
     rows = [["0"] * n for _ in v]
     for i in range(n):

@@ -1,7 +1,7 @@
-"""Cost of gradients in runs: the tables of docs/gradients.md, for single runs, ensembles and lattices.
+"""Cost of gradients of runs: the tables of docs/gradients.md, for single runs, ensembles and lattices.
 
-Each row is the CPU time of one step, without and with the gradient along the state and all parameters, the least of
-some repetitions in turn. Solvers are compiled as a user of Python gets them: C of profile ``fast``.
+A row has the CPU time of a step without gradient, and with the gradient with respect to the state and all parameters.
+Times are the least of repetitions in turn. Solvers are compiled as for users of Python: C of profile ``fast``.
 """
 
 from __future__ import annotations
@@ -20,13 +20,16 @@ from benchmarks.tables import table
 os.environ["OMP_NUM_THREADS"] = "1"
 
 MEMBERS, MEMBER_STEPS = 64, 1000
-#: CPU seconds that one timed call should take, so that clocks and calls from Python do not count.
+#: Least CPU seconds of a timed call, so that the resolution of the clock and the cost of a Python call do not matter.
 CALL_SECONDS = 0.03
 
 
 @dataclass(frozen=True)
 class Row:
-    """A system of the corpus with a method, that of the spec where there is none; ``sizes`` of lattices."""
+    """Row of a table: a system of the corpus, its scheme and order, and for lattices the sizes.
+
+    An empty scheme or the order None means that of the spec.
+    """
 
     label: str
     spec: str
@@ -115,13 +118,13 @@ def seconds(work: Callable[[], object]) -> float:
 
 
 def least(works: Sequence[Callable[[], object]], repetitions: int) -> list[float]:
-    """CPU seconds of each call, the least of some repetitions in turn."""
+    """Return the CPU seconds of each call, the least of several repetitions in which the calls take turns."""
     times = [[seconds(work) for work in works] for _ in range(repetitions)]
     return [min(column) for column in zip(*times, strict=True)]
 
 
 def enough_steps(run: Callable[[int], object], most: int) -> int:
-    """Steps of a call that takes about `CALL_SECONDS`."""
+    """Return a number of steps for which a call takes at least `CALL_SECONDS`, at most ``most``."""
     for steps in (2**k for k in range(most.bit_length())):
         begun = time.process_time()
         run(steps)
@@ -135,7 +138,7 @@ def _nanoseconds(value: float) -> str:
 
 
 def single(row: Row, repetitions: int) -> list[str]:
-    """A row of the table of single runs: the step, the step with the gradient, their ratio."""
+    """Return a row of the table of single runs: times of a step without and with the gradient, and their ratio."""
     solver = row.solver(adjoint=True)
     start = solver.run(steps=1)
     x0, h = start.x[0], start.h
@@ -153,7 +156,11 @@ def single(row: Row, repetitions: int) -> list[str]:
 
 
 def in_lanes(row: Row, repetitions: int) -> list[str]:
-    """A row of the table of ensembles: members forwards, with gradients one by one, and side by side."""
+    """Return a row of the table of ensembles, with times for a member and step.
+
+    The times are those without gradient, with the gradients of the members one by one, and with those of several
+    members at once in SIMD lanes.
+    """
     solver = row.solver(adjoint=True)
     start = solver.run(steps=1)
     h = start.h
@@ -178,12 +185,13 @@ def in_lanes(row: Row, repetitions: int) -> list[str]:
 
 
 def lattice(row: Row, repetitions: int) -> list[str]:
-    """A row of the table of lattices: nanoseconds of a site and step."""
+    """Return a row of the table of lattices: nanoseconds for a site and step without and with the gradient, and
+    their ratio."""
     solver = row.solver(adjoint=True)
     start = solver.run(steps=1, **({"sizes": row.sizes} if row.sizes else {}))
     x0, h, parameters = start.x[0], start.h, start.parameters
     weights = np.random.default_rng(1).normal(size=x0.shape)
-    # Reversible adjoints store one state in 32 steps.
+    # The reverse pass of a reversible method stores every 32nd state, so the number of steps is a multiple of 64.
     steps = 64 * -(-enough_steps(lambda n: solver.integrate(x0, h, n, stride=n, parameters=parameters), 1024) // 64)
     forwards, both = least(
         [
@@ -198,7 +206,7 @@ def lattice(row: Row, repetitions: int) -> list[str]:
 
 
 def measured(quick: bool, say: Callable[[str], None]) -> dict[str, str]:
-    """The three tables, by the names of their places in docs/gradients.md."""
+    """Return the three tables by their names, which are those of the markers in docs/gradients.md."""
     repetitions = 1 if quick else 7
     tables = {
         "pullbacks": (single, SINGLE, ["", "a step, ns", "with the gradient", "ratio"]),

@@ -1,4 +1,4 @@
-"""Peers that Python users would pick, where they are installed: heyoka and numba (``pip install -e '.[bench]'``)."""
+"""Methods that Python users would choose: heyoka and numba, if ``pip install -e '.[bench]'`` has installed them."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from benchmarks.solvers import Method, Run
 
 
 def available(problem: Problem) -> tuple[list[Method], list[str]]:
-    """The methods, and a line for each package that is missing or failed."""
+    """Return the methods, and a message for each package that is missing or failed."""
     methods, missing = [], []
     for name, build in (("numba", _numba), ("heyoka", _heyoka)):
         try:
             methods += build(problem)
         except ImportError:
             missing.append(f"{name} is not installed")
-        except Exception as error:  # a peer that breaks is reported; the others still run
+        except Exception as error:  # a failure of one package is reported, and does not stop the benchmark
             missing.append(f"{name} failed: {error!r}"[:200])
     return methods, missing
 
 
 def _numba(problem: Problem) -> list[Method]:
-    """RK4 with numbers in place of arrays, and with products and sums contracted, as in C."""
+    """Return RK4 compiled by numba, with scalars instead of arrays, and with contraction of products and sums as in
+    C."""
     import numba
 
     space: dict[str, Any] = {"math": __import__("math")}
@@ -54,7 +55,7 @@ def _numba(problem: Problem) -> list[Method]:
 
 
 def _rk4_source(problem: Problem) -> str:
-    """RK4 in Python, all loops over coordinates written out."""
+    """Return the Python source of RK4, with all loops over coordinates written out."""
     names, body = problem.coordinates, []
     for stage, (before, part) in enumerate((("", 0.0), ("a", 0.5), ("b", 0.5), ("c", 1.0))):
         k = "abcd"[stage]
@@ -72,7 +73,7 @@ def _rk4_source(problem: Problem) -> str:
 
 
 def _heyoka(problem: Problem) -> list[Method]:
-    """Taylor's method, with plain and with compensated sums."""
+    """Return heyoka's Taylor method, with plain and with compensated sums."""
     import heyoka
 
     variables = heyoka.make_vars(*problem.coordinates)

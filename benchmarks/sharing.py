@@ -1,8 +1,8 @@
-"""What a second core brings: ``python -m benchmarks.sharing``, on a machine with two quiet cores.
+"""Benchmark of a second core: ``python -m benchmarks.sharing``, on a machine with two idle cores.
 
-Runs of 1,000 steps of the rigid body with random starts: by a plain loop over `ensemble`, with one thread and with two,
-and by a sweep with one worker and with two. Elapsed times; those of a sweep are beyond what a very small one takes,
-which is the start of its processes. Two should be worth 1.8 of one.
+Many rigid bodies with random initial values make 1,000 steps, once by a loop over `ensemble` with one thread and with
+two, and once by a sweep with one worker and with two. Elapsed times are measured. The start of a sweep's processes,
+measured by a very small sweep, is subtracted. With two cores, runs should be at least 1.8 times as fast.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ STEP, STEPS, CHUNK, FEW = 0.1, 1000, 50_000, 100
 
 
 def looped(solver: phigen.Solver, starts: np.ndarray, threads: int) -> float:
-    """Seconds that all members take, a chunk at a time."""
+    """Return the seconds in which an ensemble integrates all members, `CHUNK` members at a time."""
     begun = time.perf_counter()
     for first in range(0, len(starts), CHUNK):
         solver.ensemble(starts[first : first + CHUNK], STEP, STEPS, threads=threads)
@@ -27,7 +27,7 @@ def looped(solver: phigen.Solver, starts: np.ndarray, threads: int) -> float:
 
 
 def swept(members: int, workers: int) -> float:
-    """Seconds of a sweep in all."""
+    """Return the seconds of a whole sweep, including the start of its processes."""
     begun = time.perf_counter()
     between = {"from": 0.2, "to": 1.0}
     phigen.sweep(
@@ -44,14 +44,14 @@ def main() -> None:
     head = f"{members:,} members, {STEPS} steps, {os.cpu_count()} cores"
     print(f"| {head} | one, s | two, s | one / two |\n|---|---|---|---|")
     said("threads of one process", *(looped(solver, starts, threads) for threads in (1, 2)))
-    swept(FEW, 2)  # files of packages and the compiled solver are in memory from here on
+    swept(FEW, 2)  # not timed: it brings the files of packages and the compiled solver into memory
     starting = [swept(FEW, workers) for workers in (1, 2)]
     said("workers of a sweep", *(swept(members, k) - begun for k, begun in zip((1, 2), starting, strict=True)))
     said("starting these", *starting)
 
 
 def said(what: str, one: float, two: float) -> None:
-    """A row of the table."""
+    """Print a row of the table: seconds with one and with two threads or workers, and their ratio."""
     print(f"| {what} | {one:.2f} | {two:.2f} | {one / two:.2f} |", flush=True)
 
 

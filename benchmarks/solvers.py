@@ -1,4 +1,4 @@
-"""Compiling: phigen's solvers and the C peers become shared libraries with one function `measure_run` each."""
+"""Compilation of phigen's solvers and of other methods in C to shared libraries, each with a function `measure_run`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from phigen.runtime import cache
 
 C_FILES = Path(__file__).parent / "c"
 
-#: Solvers with more lines of C are not compiled: it would take minutes.
+#: Solvers with more lines of C are not compiled, since that would take minutes.
 LINES = 12_000
 
 STATUSES = {0: "ok", 1: "no convergence", 2: "singular", 3: "not finite", 4: "bad argument", 100: "too slow"}
@@ -38,7 +38,8 @@ KAHAN_LI = (*_HALF, 1 - 2 * sum(_HALF), *reversed(_HALF))
 
 @dataclass(frozen=True)
 class Run:
-    """One integration: the states at the ends of all chunks, what it cost, and how it ended ("ok" or why not)."""
+    """Result of one integration: the states at the ends of all chunks, its cost, and "ok" or the reason of the
+    failure."""
 
     states: np.ndarray
     seconds: float
@@ -47,13 +48,16 @@ class Run:
     status: str
 
 
-#: start, step, steps of a chunk (for adaptive methods: tolerance, time of a chunk), chunks, seconds to give up after
+#: Function of the initial state, the step size, the number of steps of a chunk, the number of chunks, and the seconds
+#: after which the run ends. Adaptive methods receive a tolerance and the time of a chunk in place of the second and
+#: third argument.
 Runner = Callable[[Sequence[float], float, Any, int, float], Run]
 
 
 @dataclass(frozen=True)
 class Method:
-    """``step_based`` methods take a step size; the others (heyoka, scipy) a tolerance in its place."""
+    """Method of integration. If it is ``step_based``, its setting is a step size, else (heyoka, step control) a
+    tolerance."""
 
     name: str
     run: Runner
@@ -62,9 +66,9 @@ class Method:
     step_based: bool = True
     note: str = ""
     row: str = ""
-    """The row of the tables; the name by default."""
+    """The row of tables in which the method appears; by default its name."""
     variant: str = ""
-    """What tells the method from others of its row, of which the best is shown."""
+    """A label that distinguishes methods in the same row, which shows the fastest of them."""
 
 
 # phigen ------------------------------------------------------------------------------------------------------------
@@ -72,7 +76,7 @@ class Method:
 
 @dataclass(frozen=True)
 class Built:
-    """A phigen solver: its library, the seconds that phigen and the C compiler took, its header lines.
+    """Compiled solver of phigen: its library, the seconds that phigen and the C compiler took, lines of its header.
 
     ``exact`` says whether a step is the exact flow of H.
     """
@@ -86,7 +90,7 @@ class Built:
 
 @cached
 def build_phigen(text: str) -> Built:
-    """Raises `PhigenError`s: what phigen refuses is reported, not hidden."""
+    """Return the compiled solver for the text of a spec. Raises `PhigenError` if phigen or `LINES` refuses it."""
     start = time.perf_counter()
     program = compile_proved(specs.loads(text, "bench.yaml")).program
     schedule = program.step.flow_schedule
@@ -123,7 +127,7 @@ def phigen_method(problem: Problem, order: int, method: str) -> Method:
 
 
 def peer_names(problem: Problem) -> dict[str, tuple[str, int]]:
-    """The C functions of all peers that apply, with their titles and orders."""
+    """Return the C functions of all other methods that apply to a problem: name → title and order."""
     names = {
         "rk4": ("RK4 in C", 4),
         "dop853": ("DOP853 in C", 8),
@@ -148,7 +152,7 @@ def c_peers(problem: Problem) -> list[Method]:
 
 
 def dop853_in_vectors(problem: Problem) -> Method:
-    """DOP853 for some more dimensions, its stages combined in vectors."""
+    """Return DOP853 in C with the sums over its stages computed by SIMD, for problems with more coordinates."""
     lines = [
         "#define _POSIX_C_SOURCE 199309L",
         '#include "common.h"',
@@ -164,7 +168,11 @@ def dop853_in_vectors(problem: Problem) -> Method:
 
 
 def reference(problem: Problem, horizon: float, chunks: int) -> tuple[np.ndarray, float]:
-    """States at the ends of the chunks by Gauss' method of order 16 in long double, and their uncertainty."""
+    """Return the states at the ends of the chunks by the Gauss method of order 16 in long double, and their
+    uncertainty.
+
+    The uncertainty is the largest difference from a run with larger steps.
+    """
     library = cache.load({"main.c": _reference_source(problem), **texts()})
     run = runner_of(library, 0)
     chunk = math.ceil(horizon / chunks / problem.typical)
@@ -175,7 +183,8 @@ def reference(problem: Problem, horizon: float, chunks: int) -> tuple[np.ndarray
 
 
 def vector_peers(problem: Problem, width: int = 4) -> ctypes.CDLL:
-    """RK4 and DOP853 for ensembles, ``width`` members at once (polynomial fields only)."""
+    """Return the library of RK4 and DOP853 for ensembles, with ``width`` members at once; only for polynomial vector
+    fields."""
     main = "\n".join(
         [
             f"#define _POSIX_C_SOURCE 199309L\n#define WIDTH {width}",
@@ -229,7 +238,7 @@ def _reference_source(problem: Problem) -> str:
 
 
 def field_source(problem: Problem, *, jacobian: bool) -> str:
-    """`field`, and `jacobian` for Kahan's method, with common subexpressions computed once."""
+    """Return the C of the vector field, and for Kahan's method of its Jacobian, without repeated subexpressions."""
     x = "\n".join(f"    const real {c} = x[{i}];" for i, c in enumerate(problem.coordinates))
     lines = [f"#define DIM {problem.dimension}", "INLINE void field(const real x[DIM], real f[DIM])\n{", x]
     lines += [*_assignments(problem.field, [f"f[{i}]" for i in range(problem.dimension)]), "}"]
@@ -244,7 +253,7 @@ def field_source(problem: Problem, *, jacobian: bool) -> str:
 def _assignments(expressions: Sequence[sympy.Expr], targets: Sequence[str]) -> list[str]:
     shared, left = sympy.cse(expressions, symbols=sympy.numbered_symbols("t"))
     code = [f"    const real {name} = {sympy.ccode(value)};" for name, value in shared]
-    zero = "0 * x[0]" if not all(left) else "0"  # a vector where real is one
+    zero = "0 * x[0]" if not all(left) else "0"  # if the C type real is a SIMD vector, so is this zero
     return [*code, *(f"    {t} = {sympy.ccode(e) if e != 0 else zero};" for t, e in zip(targets, left, strict=True))]
 
 
@@ -263,7 +272,7 @@ def tables(names: Sequence[str]) -> str:
 
 
 Tables = tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]
-"""Matrix, weights, and weights of estimates of the error by name."""
+"""Matrix and weights of a Runge–Kutta method, and weights of its error estimates by name."""
 
 
 def _rk4() -> Tables:
@@ -280,7 +289,10 @@ def _dop853() -> Tables:
 
 
 def _gauss(stages: int) -> dict[str, list[str]]:
-    """Gauss' method in 25 digits, and the extrapolation of its collocation polynomial to the next step."""
+    """Return the coefficients of a Gauss method as C constants with 25 digits.
+
+    ``extrapolation`` evaluates the collocation polynomial at the stages of the next step.
+    """
     with mpmath.workdps(40):
         t = sympy.Symbol("t")
         shifted = sympy.Poly(sympy.legendre(stages, 2 * t - 1), t)
@@ -311,7 +323,7 @@ def texts(*names: str) -> dict[str, str]:
 
 
 def _controlled(library: ctypes.CDLL) -> Method:
-    """DOP853 with step control, of the same library."""
+    """Return DOP853 with step size control, from the same library as the methods without."""
     function = library.measure_controlled
     function.restype = ctypes.c_int
     double, pointer = ctypes.c_double, ctypes.c_void_p

@@ -1,4 +1,4 @@
-"""The questions: work and precision, cost of a step, growth with dimension, time to build."""
+"""Studies of the benchmarks: error against time, cost of a step, growth of the cost with the dimension, build times."""
 
 from __future__ import annotations
 
@@ -37,7 +37,10 @@ from phigen.runtime import toolchain
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is run: rounds of timing, seconds that one run may take over the two horizons (0: not run)."""
+    """Amount of work: rounds of timing, and limits in seconds of a run over the short and the long horizon.
+
+    If ``long_limit`` is 0, the long horizon is left out.
+    """
 
     rounds: int = 5
     limit: float = 0.12
@@ -45,14 +48,14 @@ class Effort:
     quick: bool = False
 
 
-#: How notes begin that make a run a failure.
+#: Beginning of the notes for which the benchmark counts as failed.
 GRID_FAILED = "the grid ends too soon"
 
 QUICK = Effort(rounds=3, limit=0.05, long_limit=0.0, quick=True)
 
 
 def methods_of(problem: Problem, effort: Effort) -> tuple[list[Method], list[str]]:
-    """phigen's solvers and the peers; what could not be built is a note."""
+    """Return phigen's solvers and the other methods for a problem, and notes on methods that could not be built."""
     notes: list[str] = []
     ours: list[Method] = []
     for method in problem.methods:
@@ -75,7 +78,8 @@ def methods_of(problem: Problem, effort: Effort) -> tuple[list[Method], list[str
 
 
 def _is_exact(problem: Problem) -> bool:
-    """Whether a splitting of a problem is the exact flow of H, whose cost no accuracy bounds from below."""
+    """Whether the splitting of a problem gives the exact flow of H. Such a method needs only one step for any
+    accuracy."""
     try:
         return build_phigen(problem.spec(2, "splitting")).exact
     except PhigenError:
@@ -83,7 +87,7 @@ def _is_exact(problem: Problem) -> bool:
 
 
 def work_precision(problem: Problem, effort: Effort, say: Callable[[str], None]) -> list[Study]:
-    """Time to reach each target, over the short and the long horizon."""
+    """Return the studies of the time that each method needs for each target, over the short and the long horizon."""
     say(f"{problem.name}: building")
     methods, notes = methods_of(problem, effort)
     states, uncertainty = reference(problem, problem.short, SAMPLES["short"])
@@ -106,12 +110,16 @@ def work_precision(problem: Problem, effort: Effort, say: Callable[[str], None])
 
 
 def _long(problem: Problem, methods: list[Method], scans: dict[str, Scan], short: list[Cell], effort: Effort) -> Study:
-    """Those that were best over the short horizon, and the classics, over the long one (energy only)."""
+    """Return the study over the long horizon, for targets of the energy error only.
+
+    In each row of the table, phigen's method is the one that was fastest over the short horizon. Slow methods of low
+    order are left out.
+    """
     judge, cells = Judge(problem), []
     runs: dict[str, dict[int, Result]] = {m.name: {} for m in methods}
     for target in ENERGY:
         chosen = {c.result.method for c in short if c.target == target and c.family == "phigen" and c.result}
-        # A target of the short horizon that needs order k may need a neighbour of it here.
+        # For each row, only the order that was fastest for this target over the short horizon is run.
         ours = [m for m in methods if m.family == "phigen" and m.name in chosen]
         peers = [m for m in methods if m.family != "phigen" and not m.name.startswith(("RK4", "Kahan in", "Poisson"))]
         for m in (*ours, *peers):
@@ -124,7 +132,7 @@ def _long(problem: Problem, methods: list[Method], scans: dict[str, Scan], short
 
 
 def _cells(methods: list[Method], scans: dict[str, list[Result]], target: tuple[str, float]) -> list[Cell]:
-    """One cell for each row: the best order, or variant, of a peer or of a method of phigen."""
+    """Return one cell for each row of the table: the fastest result of all methods that share the row."""
     cells = []
     groups: dict[str, list[Method]] = {}
     for m in methods:
@@ -136,7 +144,8 @@ def _cells(methods: list[Method], scans: dict[str, list[Result]], target: tuple[
 
 
 def cost_of_steps(problem: Problem, effort: Effort) -> list[dict[str, Any]]:
-    """Nanoseconds and evaluations per step at the typical step, all methods in interleaved rounds."""
+    """Return rows with the nanoseconds and evaluations of a step of the typical size, measured for all methods in
+    turn."""
     methods, _ = methods_of(problem, Effort(quick=True) if effort.quick else effort)
     judge, h = Judge(problem), problem.typical
     rows: dict[str, dict[str, Any]] = {}
@@ -156,7 +165,7 @@ def cost_of_steps(problem: Problem, effort: Effort) -> list[dict[str, Any]]:
 
 
 def growth(effort: Effort) -> list[dict[str, Any]]:
-    """Volterra lattices: nanoseconds per step and coordinate, operation by operation the same system."""
+    """Return rows with the nanoseconds per step and coordinate for Volterra lattices of several sizes."""
     rows = []
     for n in (3, 5, 9) if effort.quick else (3, 5, 9, 15, 21, 30):
         problem = volterra(n)
@@ -184,7 +193,7 @@ def growth(effort: Effort) -> list[dict[str, Any]]:
 
 
 def build_times(folder: Path, effort: Effort) -> list[dict[str, Any]]:
-    """Seconds that phigen and the C compiler take for each spec of the corpus."""
+    """Return rows with the seconds that phigen and the C compiler take for each spec of the corpus."""
     import tempfile
 
     rows = []

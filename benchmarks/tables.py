@@ -1,4 +1,5 @@
-"""Measurements as Markdown. Times are shown beside ratios within the same run, never alone."""
+"""Tables of measurements in Markdown. Times are shown together with ratios of times from the same run of the
+benchmark."""
 
 from __future__ import annotations
 
@@ -11,12 +12,14 @@ from typing import Any
 from benchmarks.measure import ENERGY, ORBIT, Cell, Study, Target, ratios
 from phigen.runtime import toolchain
 
-#: What processors say of their vectors: solvers that keep eight numbers side by side are faster with wider ones.
+#: Flags of processors with SIMD, widest first, and the text that names them. Solvers in SIMD lanes are faster with
+#: wider registers.
 VECTORS = (("avx512f", ", AVX-512"), ("avx2", ", AVX2"))
 
 
 def machine() -> str:
-    """The processor and its widest vectors, the compiler and its flags."""
+    """Return a line with the processor and its widest SIMD registers, the compiler and its flags, and the Python
+    version."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -35,7 +38,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def work_precision(study: Study) -> str:
-    """One row for each method: time over the time of the best phigen solver, by target."""
+    """Return the table of a study: for each method and target its time over that of phigen's fastest method."""
     targets = list(dict.fromkeys(c.target for c in study.cells))
     best = {t: _best(study.cells, t, "phigen") for t in targets}
     rows = []
@@ -85,7 +88,7 @@ def _best(cells: Sequence[Cell], target: Target, family: str) -> Cell | None:
 
 
 def _failures(study: Study) -> list[str]:
-    """Runs that did not end well, method by method: they count nowhere, but they are told."""
+    """Return a line for each method with failed runs. Such runs are not in the table."""
     failed: dict[tuple[str, str], list[float]] = {}
     for r in study.scans:
         if r.status not in ("ok", "too slow"):
@@ -94,13 +97,14 @@ def _failures(study: Study) -> list[str]:
 
 
 def speed_up_row(study: Study) -> list[str]:
-    """A row of the summary: best peer over phigen, by target."""
+    """Return a row of the summary: for each target the time of the fastest other method over that of phigen's
+    fastest."""
     entries = [_speed_up(study, t, _best(study.cells, t, "phigen")) for t in (*ENERGY, *ORBIT)]
     return [f"{study.title}, T = {study.horizon:g}", *entries]
 
 
 def speed_ups(rows: Sequence[Sequence[str]]) -> str:
-    """The summary of all problems and horizons."""
+    """Return the table that summarises all problems and horizons."""
     return table(["best peer / phigen", *(f"{t[0]} {t[1]:.0e}" for t in (*ENERGY, *ORBIT))], rows) + "\n"
 
 

@@ -85,7 +85,10 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
 
 
 def expect_writable(path: Path, option: str | None = None) -> None:
-    """Raise `click.BadParameter` for a file that cannot be written, as far as this can be known before the work."""
+    """Raise `click.BadParameter` for a path that is a folder, or whose folder is missing or read-only.
+
+    ``option`` is the name of the option in the message.
+    """
     device = path.exists() and not path.is_file() and not path.is_dir()
     if path.is_dir():
         raise click.BadParameter(f"{str(path)!r} is a folder", param_hint=option)

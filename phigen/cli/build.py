@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from phigen.compilation import Compilation
     from phigen.spec.model import Spec
 
-#: Compiler flags in addition to those of every local library: generated C compiles without warnings under them.
+#: Further compiler flags of ``--compile``, which turn warnings into errors: generated C compiles without warnings.
 STRICT = ("-Wall", "-Wextra", "-Werror")
 
 
@@ -153,9 +153,10 @@ def _compile_all(console: Console, spec_files: Sequence[str], options: Options, 
 def _to_build(
     console: Console, specs: Sequence[Spec], spec_files: Sequence[str], directory: Path, checking: bool
 ) -> list[Spec]:
-    """Return the specs to build: those in searched folders without the names in the list of the output folder.
+    """Return the specs to build.
 
-    Specs that the user names are always built. With --check, raises CheckError if the list has names that no spec has.
+    Specs found in a searched folder are left out if ``left_out.txt`` in the output folder has their names. Specs that
+    the user names are always built. With --check, raises CheckError if the list has names that no spec has.
     """
     folders = [file for file in spec_files if Path(spec_path(file)).is_dir()]
     left_out = names_left_out(directory) if folders else {}
@@ -184,7 +185,10 @@ def _plan(
 
 
 def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], options: Options) -> Iterator[Change]:
-    """Yield changes that remove files whose spec no longer exists, which only a build of a whole folder can know."""
+    """Yield changes that remove generated files whose spec no longer exists.
+
+    Nothing is removed unless a whole folder is built: a build of single specs does not know which others exist.
+    """
     from phigen.cli.outputs import orphans
 
     if any(Path(spec_path(file)).is_dir() for file in spec_files):
@@ -193,7 +197,10 @@ def _orphans(spec_files: Sequence[str], compilations: Sequence[Compilation], opt
 
 
 def _compare(planned: Sequence[Change], command: str, diff: bool) -> None:
-    """Raise CheckError that lists the files which differ from what would be written."""
+    """Raise CheckError that lists the files which differ from what ``command`` would write; do nothing if none do.
+
+    With ``diff``, the differences are printed first.
+    """
     outdated = [change for change in planned if change.state != "unchanged"]
     if diff:
         for change in outdated:
@@ -248,7 +255,8 @@ def _write(
 def _certify(console: Console, compilations: Sequence[Compilation], options: Options) -> None:
     """Verify the written solvers, and write a certificate for each system that meets all bounds.
 
-    Earlier certificates are removed. Raises the errors of the other systems.
+    A certificate of an earlier build is removed first. Systems that miss a bound get none; their errors are raised
+    together at the end.
     """
     from phigen.cli import certificate
     from phigen.cli.verify import missed_bounds, verified, verified_lattice
@@ -274,7 +282,10 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
 
 
 def _expect_certificates(planned: Sequence[tuple[Compilation, list[Change]]], options: Options) -> None:
-    """Raise CheckError for a certificate on disk that belongs to other files; a certificate may be absent."""
+    """Raise CheckError if a certificate on disk belongs to files other than the planned ones.
+
+    Systems without a certificate on disk pass.
+    """
     from phigen.cli import certificate
 
     complaints = []

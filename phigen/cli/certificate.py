@@ -24,8 +24,11 @@ def path_of(folder: Path, name: str) -> Path:
 
 
 def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, Any]:
-    """Return the part of a certificate that ties it to a build: version, hash of the spec, and checksums of the files'
-    bodies."""
+    """Return the part of a certificate that ties it to a build.
+
+    It has the version of phigen, the name of the system, the hash of the spec, and for each file the checksum of the
+    text below its header.
+    """
     return {
         "phigen": __version__,
         "name": compilation.spec.name,

@@ -21,7 +21,8 @@ from phigen.errors import CheckError
 if TYPE_CHECKING:
     from phigen.spec.model import Spec
 
-#: Default half-width of the box, relative to the size of a coordinate at the start, or absolute for sizes below 1.
+#: Half-width of the default interval of a coordinate: relative to its value at the start, or absolute if that value is
+#: below 1.
 WIDTH = 0.01
 
 
@@ -40,7 +41,7 @@ WIDTH = 0.01
     help="Range of a coordinate.  [default: box of the run, else its start ± 1 %, or ± 0.01 if it is below 1]",
 )
 @click.option(
-    "--time", "times", metavar="LOW:HIGH", help="Range of the time, if H depends on it.  [default: of the run]"
+    "--time", "times", metavar="LOW:HIGH", help="Range of the time t, if H depends on t.  [default: times of the run]"
 )
 @click.option(
     "--ulps",
@@ -56,7 +57,7 @@ WIDTH = 0.01
     metavar="N",
     default=1000.0,
     show_default=True,
-    help="Divide boxes whose bound exceeds N units in the last place.",
+    help="Divide a box if its bound exceeds N units in the last place.",
 )
 @click.option(
     "--boxes",
@@ -65,7 +66,7 @@ WIDTH = 0.01
     metavar="N",
     default=1000,
     show_default=True,
-    help="Most boxes into which the box is divided.",
+    help="Largest number of boxes into which the box may be divided.",
 )
 @click.option(
     "--samples",
@@ -98,12 +99,13 @@ def command(
     folder: str,
     as_json: bool,
 ) -> None:
-    """Bound the distance of the steps of the C of profile small from the exact Poisson map, for a box of states.
+    """Prove a bound for the distance between a step of the generated C and the exact Poisson map.
 
-    Ball arithmetic proves the bound. It covers each rounding of each operation, the stopping criterion of Newton's
-    method, and the errors of libm. The equation of an implicit step is shown to have one solution. DIR/NAME receives
-    the C, the certificate NAME.bounds.json, and a checker that replays it without phigen. Exit code 5 if there is no
-    certificate for the box; the message says what to try.
+    The bound holds for all steps that begin in a box of states, for C of profile small. Ball arithmetic proves it. It
+    covers the rounding of every operation, the stopping criterion of Newton's method, and the errors of libm. For an
+    implicit step, the proof shows that its equation has exactly one solution near the computed one. DIR/NAME receives
+    the C, the certificate NAME.bounds.json, and a checker that verifies the certificate without phigen. Exit code 5 if
+    there is no certificate for the box; the message says what to try.
     """
     from phigen.certify.checker import RefusedError
     from phigen.certify.problem import problem_of
@@ -144,7 +146,7 @@ def command(
 
 
 def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[list[float]]:
-    """Return the interval of each coordinate: around the start of the run, or from the options."""
+    """Return the interval of each coordinate: from ``--box``, else from ``box:`` of the run, else around its start."""
     domain = {
         name: [value - WIDTH * max(1.0, abs(value)), value + WIDTH * max(1.0, abs(value))]
         for name, value in zip(spec.coordinates, experiment.initial, strict=True)
@@ -160,7 +162,10 @@ def _domain(spec: Spec, experiment: Experiment, boxes: Sequence[str]) -> list[li
 
 
 def _time(spec: Spec, experiment: Experiment, times: str | None) -> list[float]:
-    """Return the interval of times at which steps begin."""
+    """Return the interval of times for which the bound holds: from ``--time``, else the times of the run.
+
+    If H does not depend on the time, both ends are the start of the run.
+    """
     if times and not spec.time:
         raise click.UsageError("--time: H does not depend on the time")
     if times:
@@ -183,9 +188,9 @@ def _range(text: str, option: str) -> list[float]:
 def _observed(
     certificate: dict[str, Any], exact: dict[str, Any], files: dict[str, str], samples: int, console: Console
 ) -> list[float]:
-    """Return the largest distance of each coordinate in sampled steps of the C; [] without a compiler.
+    """Return for each coordinate the largest distance between sampled steps of the compiled C and the exact map.
 
-    Raises `CheckError` if a distance exceeds its bound.
+    The list is empty without samples or without a C compiler. Raises `CheckError` if a distance exceeds its bound.
     """
     from phigen.certify.samples import observed
     from phigen.errors import ToolchainError
@@ -206,7 +211,7 @@ def _observed(
     ]
     if exceeding:
         message = f"steps of the compiled C are farther from the exact map than the bound: {', '.join(exceeding)}"
-        raise CheckError(f"{certificate['name']}: {message}\n  hint: if your libm is less accurate, --ulps 4")
+        raise CheckError(f"{certificate['name']}: {message}\n  hint: try --ulps 4, in case your libm is less accurate")
     return worst
 
 
@@ -249,5 +254,8 @@ def _lines(summary: dict[str, Any]) -> list[str]:
 
 
 def _two_digits(value: float) -> str:
-    """Return a number with two digits; "0" for subnormal numbers, the bounds of coordinates that do not move."""
+    """Return a bound as text with two digits.
+
+    Bounds below 1e-300 become "0": they belong to coordinates that do not change.
+    """
     return f"{value:.2g}" if value > 1e-300 else "0"

@@ -102,7 +102,10 @@ def _compared(
     *,
     shown: bool,
 ) -> list[Agreement]:
-    """Compare the compilation with a second derivation by sympy; each comparison is printed when it is complete."""
+    """Compare S_i, α and β of the compilation with those that sympy derives, and return the comparisons.
+
+    If ``shown``, each comparison is printed as soon as it is complete. Refutations go to the collector.
+    """
     from phigen.proofs.independent import SECONDS, compare
     from phigen.symbolic.verdict import REFUTED
 
@@ -155,7 +158,7 @@ def _say_unexamined(collector: Collector, console: Console) -> None:
 
 
 def _expect_starts(spec: Spec, collector: Collector, console: Console) -> None:
-    """Collect the errors of runs of a lattice, such as arrays of initial values or parameters of other sizes."""
+    """Collect the errors of the starts of a lattice's runs, such as a list of initial values of the wrong length."""
     from phigen.lattice.states import start_of
 
     refused: dict[str, Diagnostic] = {}
@@ -172,7 +175,7 @@ def _expect_starts(spec: Spec, collector: Collector, console: Console) -> None:
 
 
 def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) -> None:
-    """Collect the errors with which targets in the spec refuse the system."""
+    """Collect the errors of those targets of the spec that cannot generate code for the system."""
     from phigen import registry
 
     for name in spec.targets:

@@ -129,7 +129,7 @@ def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> list[s
 
 
 def indented(lines: Sequence[str]) -> list[str]:
-    """Return the lines of a message, after its first, with their indentation."""
+    """Return the lines, each indented by two spaces, as the lines below the first line of a message are."""
     return [f"  {line}" for line in lines]
 
 

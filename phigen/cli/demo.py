@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 SPEC, RUN = "lotka_volterra", "blow_up"
 
-#: Orders that are compared: that of the paper, and a higher one.
+#: Orders of the two solvers that are compared: order 2, which the paper uses, and order 8.
 ORDERS = (2, 8)
 CLASSICAL = "rk2"
 
@@ -49,7 +49,7 @@ def command(console: Console, target: str) -> None:
     for order in ORDERS:
         compilation = compilation_of(source, order=order)
         solver = loaded(compilation, target, console)
-        target = solver.target  # The fallback from C to NumPy is reported once.
+        target = solver.target  # after a fallback from C to NumPy, later solvers are NumPy too, without another report
         run = experiment.run
         trajectory = solver.integrate(experiment.initial, experiment.h, run.steps, run.stride)
         solutions[f"phigen {order}"] = trajectory.x
@@ -78,7 +78,7 @@ def _print(
         rows.append([f"{t[row]:.3f}", f"{exact[row, 0]:.4f}", *cells])
     for line in table(rows, right=range(len(head))):
         out(f"  {line}")
-    out(f"\n  phigen K: Poisson Hamiltonian integrator of order K, {ORDERS[0]} being the paper's. Errors: relative.")
+    out(f"\n  phigen K: Poisson Hamiltonian integrator of order K (in the paper {ORDERS[0]}). Errors are relative.")
     out("  The Casimir stays at round-off to the end; RK2 leaves its level set, and loses the solution.")
 
 
@@ -89,7 +89,7 @@ def singularity(experiment: Experiment) -> float:
 
 
 def _errors(system: System, experiment: Experiment, t: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the relative errors (rows,) of the state and of the Casimir, and the exact states."""
+    """Return the relative errors (rows,) of the state and of the Casimir, and the exact states (rows, DIM)."""
     import numpy as np
 
     from phigen.study.summary import exact_solution

@@ -17,7 +17,7 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 
-#: Largest number of times at which states may be stored.
+#: Largest number of states that ``--every`` may store: the list of 10⁷ times alone takes 0.3 GB.
 _MOST_TIMES = 10_000_000
 
 #: An experiment of an ordinary system or of a lattice.
@@ -26,7 +26,11 @@ AnySolver = Solver | LatticeSolver
 
 
 def ended(experiment: E, solver: AnySolver, console: Console) -> E:
-    """Return the experiment with its end, if this is a time (``until``) or a zero of the expression ``stop``."""
+    """Return the experiment with its field ``end`` and its number of steps set by the keys ``until`` and ``stop``.
+
+    ``until`` is a time; ``stop`` is an expression, at whose first zero the run ends. Runs without these keys are
+    returned unchanged.
+    """
     run, h = experiment.run, experiment.h
     end: End | None = None
     if run.until is not None:
@@ -51,13 +55,13 @@ def _stopped(experiment: Experiment, solver: AnySolver, console: Console, end: E
     max_steps = end.steps + 1 if end else run.steps
     zero = where_zero(experiment.begun(solver), h, max_steps, g, experiment.begin, timed=bool(names.time))
     if zero is None:
-        console.note("stop: is not met")
+        console.note("the expression of stop: has no zero on the run")
         return None
     if end is None or zero.steps < end.steps:
         return zero
     try:
         last = _count(experiment, solver, end)
-    except BackendError:  # The partial last step up to ``until`` fails, but the run stops before it.
+    except BackendError:  # The partial step up to ``until`` fails, but the run stops before it reaches ``until``.
         return zero
     return zero if _count(experiment, solver, zero) < last else None
 
@@ -72,7 +76,10 @@ def _count(experiment: Experiment, solver: AnySolver, end: End) -> float:
 
 
 def length(experiment: Experiment, solver: AnySolver) -> float:
-    """Return the length of a run up to its end, in τ with a monitor, else in t. Raises `StepError`."""
+    """Return the length of a run up to its end: in the time t, or with a monitor in the new time τ.
+
+    Raises `StepError`.
+    """
     if experiment.end is None:
         return abs(experiment.h) * experiment.run.steps
     try:

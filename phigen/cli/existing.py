@@ -47,7 +47,8 @@ def expect_replaceable(path: Path, option: str | None = None) -> None:
 def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, continued: bool = False) -> None:
     """Raise `click.BadParameter` if a file was written by another run, unless ``--force`` was given.
 
-    ``files`` maps options to their files. The file of a run to be ``continued`` may lack an origin.
+    ``files`` maps options to their files. If the run is ``continued``, ``--force`` does not apply, and a file that does
+    not state its origin is accepted.
     """
     from phigen.runtime.lattice_frames import is_store
     from phigen.runtime.origin import companion, read_origin
@@ -62,9 +63,9 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
         if path is None or force or not path.exists() or not (path.is_dir() or path.is_file()):
             continue
         if path.with_name(f"{path.name}.checkpoint").exists() or (path.is_file() and path.stat().st_size == 0):
-            continue  # file of an interrupted run
+            continue  # an empty file, or a file of an interrupted run, whose checkpoint states the origin
         if path.is_dir() and not is_store(path):
-            continue  # no option allows to replace such a file
+            continue  # a folder that is not a Zarr store is refused elsewhere, even with --force
         file_origin = read_origin(path)
         hint = "" if continued else "; --force replaces it"
         if file_origin is None and not continued:
@@ -77,14 +78,17 @@ def expect_same_origin(files: Mapping[str, Path | None], origin: Origin, *, cont
 
 
 def wrote(path: Path) -> str:
-    """Return the message that a file was written or replaced; "" if the run continues it."""
+    """Return the message that a file was written, or that it replaced an existing file.
+
+    A run that continues its file, by --resume or --extend, has "wrote" it.
+    """
     ctx: Any = click.get_current_context()
     continued = ctx.params.get("resume") or ctx.params.get("extend")
     return f"{'replaced' if path in ctx.meta.get(_REPLACED, ()) and not continued else 'wrote'} {path}"
 
 
 def _is_of_phigen(path: Path) -> bool:
-    """Whether a file looks like one of phigen: a table has a column of the time, a figure or a page names phigen."""
+    """Whether phigen seems to have written a file: a table has the column t, other files contain the word phigen."""
     match path.suffix.lower():
         case ".csv":
             with path.open("rb") as file:

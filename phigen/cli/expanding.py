@@ -101,7 +101,10 @@ def _expansion(spec: Spec, cell: Cell, choice: str) -> Expansion:
 
 
 def _run(spec: Spec, expansion: Expansion, run: Run) -> Run | None:
-    """Return a run of the lattice as one of the expanded spec; None if it cannot start at these sizes."""
+    """Return a run of the lattice as a run of the expanded spec.
+
+    Returns None if the initial values of the run do not fit the sizes of the expansion.
+    """
     from phigen.lattice.expansion import run_of
     from phigen.lattice.states import start_of
 

@@ -29,9 +29,10 @@ if TYPE_CHECKING:
 class Experiment:
     """Run with the changes of the command line.
 
-    ``end`` is an end within a step. ``times`` are the times of stored states, which replace the stride; the first and
-    the last state are stored too. ``past`` is a finished run (`phigen.cli.past.StoredRows`) that this run continues.
-    ``first`` is the attitude at the start, if it is not the identity.
+    ``end`` is set if the run ends at a time or at a zero of an expression, possibly by a partial last step. ``times``
+    are the times of stored states, which replace the stride; the first and the last state are stored too. ``past``
+    consists of the rows of a finished run (`phigen.cli.past.StoredRows`) that this run continues. ``first`` is the
+    attitude at the start, if it is not the identity.
     """
 
     run: Run
@@ -44,7 +45,7 @@ class Experiment:
 
     @property
     def h(self) -> float:
-        """The step size, in t or τ."""
+        """The step size, in the time t, or with a monitor in the new time τ."""
         return float(self.run.step)
 
     @property
@@ -54,12 +55,15 @@ class Experiment:
 
     @property
     def begin(self) -> float:
-        """The time at which the steps start: the start of the run, or the end of the past run."""
+        """The time at which the steps start: the start of the run, or the end of the finished run ``past``."""
         return self.past.t if self.past else self.t0
 
     @property
     def made(self) -> int:
-        """Number of steps of noise that the past run has used; a partial step counts as one."""
+        """Number of steps of the finished run ``past``, each of which has used the random numbers of one step.
+
+        A partial step counts as a whole one.
+        """
         steps = (self.begin - self.t0) / self.h
         return math.ceil(steps - 1e-9 * max(1.0, steps))
 
@@ -82,12 +86,15 @@ class Experiment:
 
     @property
     def until(self) -> float:
-        """The time at which the run ends; only for steps that are equal in t, or with an ``end``."""
+        """The time t at which the run ends.
+
+        With a monitor, steps are not equal in t, so ``end`` must be set.
+        """
         return self.begin + (self.end.span if self.end else self.h * self.run.steps)
 
     @property
     def rows(self) -> int:
-        """Number of states to be stored, with the rows of the past run, the first and the last state."""
+        """Number of states to be stored, including the first and the last state and the rows of ``past``."""
         first_rows = len(self.past.rows) if self.past else 1
         if self.times is not None:
             last = self.times[-1] if self.times else self.begin
@@ -96,7 +103,7 @@ class Experiment:
 
     @property
     def has_part(self) -> bool:
-        """Whether the run ends with a partial step."""
+        """Whether the last step of the run is shorter than the others."""
         return bool(self.end and self.end.part)
 
 

@@ -75,7 +75,7 @@ class Options:
         return compilation.including(part)
 
     def _measured(self, compilation: Compilation, flags: str) -> Compilation:
-        """Return the compilation whose header states the stack use of its C, measured under some compiler flags."""
+        """Return the compilation whose header states how much stack its C uses, as gcc with these flags measures it."""
         from phigen.compiler import emit
         from phigen.runtime.stack import stack_bound
 
@@ -150,8 +150,10 @@ def output_options(command: F) -> F:
 
 
 def generate(compilation: Compilation, target: str, options: Options) -> dict[str, str]:
-    """Return the files of one target (name → text). Their header has a command that writes the same bytes on any
-    machine."""
+    """Return the files of one target (name → text).
+
+    The header of each file states a command that writes the same bytes on any machine.
+    """
     from phigen.compiler import emit
 
     spec, single = compilation.spec.written or compilation.spec, options.single_file and TARGETS[target].single_file
@@ -175,7 +177,8 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
 
 
 def _expect_steps(compilation: Compilation, target: str) -> None:
-    """Raise `SpecError`, located at the key, for a target without steps in relative coordinates."""
+    """Raise `SpecError` at the key ``coordinates_from`` if the target is ``device``, since it cannot make steps in
+    relative coordinates."""
     swept = compilation.program.step.swept
     if target == "device" and swept and swept.relative:
         message, hint = "coordinates_from: devices have no such steps", "another target, or remove coordinates_from"

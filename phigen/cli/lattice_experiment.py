@@ -27,16 +27,16 @@ if TYPE_CHECKING:
     from phigen.spec.model import Run
     from phigen.symbolic.expression import Expression
 
-#: Errors of reading a file that is not of a run.
+#: Errors that may occur on reading a file that is not the file of a run.
 _UNREADABLE = (OSError, ValueError, KeyError, EOFError, IndexError, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)
 class LatticeExperiment(Experiment):
-    """`Experiment` of a lattice.
+    """Run of a lattice with the changes of the command line.
 
-    ``start`` has the initial state, ``past`` is a `phigen.runtime.lattice_rows.Past`, and ``origin`` is the provenance
-    text for output files.
+    ``start`` has the initial state and the parameters. ``past`` is here a `phigen.runtime.lattice_rows.Past`.
+    ``origin`` is the text on provenance that output files contain.
     """
 
     start: Start | None = None
@@ -44,11 +44,14 @@ class LatticeExperiment(Experiment):
 
     @property
     def begin(self) -> float:
-        """The time at which the steps start: the start of the run, or the end of the past run."""
+        """The time at which the steps start: the start of the run, or the end of the finished run ``past``."""
         return float(self.past.t[-1]) if self.past else self.t0
 
     def beginning(self, solver: LatticeSolver) -> Beginning:
-        """Return the state at which the steps start, with everything else on which they depend."""
+        """Return everything on which the steps depend: initial state, step size, parameters, time, random numbers.
+
+        With a monitor, a continued run also has the energy level e = −H of the start of the finished run.
+        """
         assert self.start is not None
         state = solver.state(self.start.state if self.past is None else self.past.last, "x0")
         values = solver.values(self.parameters, {}, state.shape[1:])
@@ -82,9 +85,10 @@ class LatticeExperiment(Experiment):
 
 
 def started_from(run: Run, start: Start, source: Path, solver: LatticeSolver) -> tuple[Run, Start]:
-    """Return the run from the last state in a file of another run; its time becomes the start if H depends on the time.
+    """Return the run and its start, changed so that the run starts at the last state in the file of another run.
 
-    Raises `click.BadParameter` for files of other kinds, and for states of another shape.
+    If H depends on the time, the run also starts at the time of that state. Raises `click.BadParameter` for files of
+    other kinds, and for states of another shape.
     """
     try:
         state, t = _last_of(source, solver.interface, start.state.shape)
@@ -124,7 +128,8 @@ def extended(experiment: LatticeExperiment, path: Path, solver: LatticeSolver) -
         complaint = f"its first row, at t = {float(earlier_run.t[0])!r}, is not the start of the run {run.name}"
         raise click.BadParameter(f"{path} is of another run: {complaint}", param_hint="--extend")
     steps = earlier_run.steps or round((float(earlier_run.t[-1]) - experiment.t0) / experiment.h)
-    steps = earlier_run.steps if solver.interface.monitored else steps  # A .csv has times but no steps.
+    # With a monitor, steps are not equal in t, so times do not tell their number. It is 0 for a .csv.
+    steps = earlier_run.steps if solver.interface.monitored else steps
     return replace(experiment, past=replace(earlier_run, steps=steps))
 
 

@@ -162,7 +162,10 @@ def _integrated(
     *,
     resume: bool,
 ) -> tuple[LatticeTrajectory | LatticeSeries, StepError | None]:
-    """Return the frames, or the recorded numbers, of a run, and the failure if a step failed."""
+    """Integrate a run; return its result, and the `StepError` if a step failed, else None.
+
+    The result has all frames (states of all sites), or only the numbers that the run lists under ``record``.
+    """
     from phigen.runtime.checkpoint import MismatchError, objection
 
     run, first = experiment.run, output or section
@@ -244,7 +247,7 @@ def _draw(
 def exponents_of(
     console: Console, spec: Spec, run: Run, solver: LatticeSolver, start: Start, parameters: Mapping[str, Any]
 ) -> Spectrum:
-    """Return the largest Lyapunov exponent of a run. Raises `StepError`."""
+    """Return the spectrum of a run with one Lyapunov exponent, the largest. Raises `StepError`."""
     from phigen.study.lyapunov import lattice_spectrum
 
     t0, draws = float(run.start) if spec.time else None, {"seed": run.seed} if spec.noise else {}
@@ -268,7 +271,7 @@ def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str
 
 
 def steps_text(trajectory: LatticeTrajectory) -> str:
-    """Return the number of steps in words, such as "60 steps of 0.1 and a part of one"."""
+    """Return the number of steps in words: "60 steps of 0.1", then "and a part of one" after a shorter last step."""
     whole_time, monitored = trajectory.steps * trajectory.h, trajectory.solver.interface.monitored
     elapsed = trajectory.t[-1] - trajectory.t[0]
     if monitored:

@@ -109,8 +109,11 @@ def _of_npz(path: Path, names: Interface) -> StoredRows:
 
 
 def started_from(experiment: Experiment, rows: StoredRows, solver: Solver) -> Experiment:
-    """Return the experiment that starts at the last state in ``rows``, with the attitude there, and with the time if H
-    has one."""
+    """Return the experiment that starts at the last state in ``rows``.
+
+    If ``rows`` has an attitude, the experiment starts with it. If H depends on the time, it starts at the time of that
+    state.
+    """
     names = solver.interface
     _, *columns = columns_of(names)
     state = next(rows.last(column.names) for column in columns if column.key == "x")
@@ -123,9 +126,10 @@ def started_from(experiment: Experiment, rows: StoredRows, solver: Solver) -> Ex
 
 
 def begun(solver: Solver, experiment: Experiment) -> Session:
-    """Return a session at the start of the steps of an experiment.
+    """Return a session of the solver at the state at which the steps of an experiment start.
 
-    If the experiment continues a finished run, the session has the gauge, or the energy level e, of that run's start.
+    If the experiment continues a finished run, the session is at the last state of that run, but keeps what was fixed
+    at its first state: the gauge, or with a monitor the energy level e = −H.
     """
     backend, stored_rows, names = solver.backend, experiment.past, solver.interface
     initial = np.array(experiment.initial)

@@ -41,7 +41,7 @@ _NO_FILES = "--resume continues the files of an interrupted run: name them by --
 
 #: Least time between two checkpoints, in seconds.
 CHECKPOINT_SECONDS = 2.0
-#: Number of rows of a finished run that are read at once.
+#: Number of rows of a finished run that are recorded at once, so that temporary arrays stay small.
 _ROWS = 1 << 14
 
 
@@ -103,7 +103,7 @@ class Recorder:
         }
         self.session: Session
         self.number = 0.0  # number of the last row, in steps since the steps began
-        self._whole: int | None = None  # number of whole steps, once a partial step was made
+        self._whole: int | None = None  # number of whole steps; None until the partial last step has been made
         self._tables: dict[str, TableFile] = {}
         self._saved = time.monotonic()
 
@@ -408,14 +408,18 @@ def _at_times(recorder: Recorder, session: Session, see_tangent: Callable[[Float
 
 @dataclass(frozen=True)
 class _Rows:
-    """Rows at which a classical method is compared, as numbers of steps; numbers with a fraction are within a step."""
+    """Rows at which a classical method is compared with the solver.
+
+    ``numbers`` are the numbers of steps from the start to each row; a fraction means a time within a step. ``count`` is
+    the number of rows.
+    """
 
     numbers: Iterable[float]
     count: int
 
 
 def _compared_rows(experiment: Experiment, h: float) -> _Rows:
-    """Return the rows of the run in units of steps of size h, equal in t."""
+    """Return the rows of the run for a classical method that makes steps of size h in t."""
     run, end = experiment.run, experiment.end
     last = end.span / h if end else float(run.steps)
     if experiment.times is not None:

@@ -63,7 +63,7 @@ def gathered(
 
 
 def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, console: Console) -> Live:
-    """Return the solver that runs in the page, with its start."""
+    """Return the panel of the page that runs the solver in the browser, from the start of the experiment."""
     from phigen.report import live
 
     console.note(f"{compilation.spec.name}: compiling for the page")

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from phigen.runtime.interface import Floats
     from phigen.study.precision import Study
 
-#: Number of repetitions when times are measured; the second number applies with --quick.
+#: Number of repetitions of each time measurement, by default and with --quick.
 _ROUNDS, _FEW_ROUNDS = 5, 2
-#: Number of steps over which precision is studied with --quick.
+#: Largest number of steps over which --quick measures errors; without it, all steps of the run are made.
 _FEW_STEPS = 256
 #: File in which Linux names the processor.
 _PROCESSOR = Path("/proc/cpuinfo")
@@ -75,7 +75,11 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
 
 
 def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
-    """Return a function of a state, the largest error of a Casimir in its unit; None without Casimirs."""
+    """Return a function that maps a state to the largest error of its Casimirs, relative to their values at x0.
+
+    The error of each Casimir is divided by the size that `phigen.geometry.conservation.units` gives for it. The result
+    is None for systems without Casimirs.
+    """
     from phigen.geometry.conservation import units
     from phigen.study.precision import ROUNDING
     from phigen.symbolic.arrays import evaluate

@@ -49,7 +49,7 @@ _TABLES = (".csv", ".npz")
     "--step",
     metavar="H",
     type=float,
-    help="Step size; overrides that of the run, whose duration stays.",
+    help="Step size; overrides that of the run. The duration of the run does not change.",
 )
 @click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps; overrides that of the run.")
 @sizes_option

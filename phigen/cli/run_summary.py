@@ -58,7 +58,8 @@ def counted_crossings(run: Run, count: int, section: str) -> str:
 
 
 def steps_text(recorder: Recorder) -> str:
-    """Return the number of steps in words, such as "60 steps of 0.1 in τ and a part of one"."""
+    """Return the number of steps in words: "60 steps of 0.1", "in τ" with a monitor, "and a part of one" if the last
+    step was shorter."""
     unit = " in τ" if recorder.solver.interface.monitored else ""
     part = " and a part of one" if recorder.number > recorder.steps else ""
     return f"{recorder.steps} steps of {recorder.experiment.h:.9g}{unit}{part}"
@@ -77,7 +78,7 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
     rows.append([energy, *(_formatted_value(s.energy) for s in summaries), first.energy.unit.kind])
     if driven:
         rows.append(["  the integral, work done", *(f"{s.work:.4g}" for s in summaries), ""])
-        rows.append(["  its integral may be off by", *(f"{s.off:.1e}" for s in summaries), ""])
+        rows.append(["  estimated error of the integral", *(f"{s.off:.1e}" for s in summaries), ""])
     if any(math.isfinite(s.energy.growth) for s in summaries) and not noisy:
         growth = [f"{s.energy.growth:.3g}" if math.isfinite(s.energy.growth) else "–" for s in summaries]
         rows.append(["  last tenth/first", *growth, "1 is no drift"])
@@ -96,7 +97,7 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
 def print_averages(names: Sequence[str], averages: Averages, observables: Sequence[str] = ()) -> None:
     """Print the time averages of observables over the rows of a run; ``observables`` selects some, by default all."""
     if not averages.count:
-        out("\n  observables have no means: no stored row is in the time that average: says")
+        out("\n  observables have no means: no row is stored within the times of average:")
         return
     first, last = averages.times
     out(f"\n  observables, means over {counted(averages.count, 'row')} from t = {first:.9g} to {last:.9g}")
@@ -114,7 +115,10 @@ def print_averages(names: Sequence[str], averages: Averages, observables: Sequen
 
 
 def _time_shown(average: Average) -> str:
-    """Return the correlation time of an average as text, with ">" if the estimate is too small."""
+    """Return the correlation time of an average as text.
+
+    If blocks of rows are too short for an estimate, the number is only a lower bound, and begins with ">".
+    """
     return "> " * (not average.resolved and math.isfinite(average.error)) + f"{average.correlation_time:.2g}"
 
 

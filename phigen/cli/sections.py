@@ -22,5 +22,5 @@ def assignments(pairs: Sequence[tuple[str, str]]) -> list[str]:
 
 
 def _width(name: str) -> int:
-    """Return the number of columns on a terminal; the combining tilde of H̃ takes none."""
+    """Return the number of columns that a name takes on a terminal; the tilde in H̃ is a character without width."""
     return sum(not unicodedata.combining(c) for c in name)

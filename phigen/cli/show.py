@@ -144,7 +144,7 @@ def _print_collocation(compilation: CompiledGauss) -> None:
 
 
 def _unfamiliar(lines: Sequence[str]) -> list[str]:
-    """Return the definitions of functions in these lines that have no standard name."""
+    """Return a line that defines those functions in ``lines`` whose names are not standard; [] if there are none."""
     from phigen.symbolic.readable import UNFAMILIAR
 
     met = [
@@ -162,14 +162,15 @@ def _noise(system: System, max_terms: int | None) -> list[tuple[str, str]]:
 
 
 def _forces(system: System, max_terms: int | None) -> list[tuple[str, str]]:
-    """Return the covector ζ without damping, the vector f, and the damping, as pairs of name and text."""
+    """Return the forces of ẋ = π(∇H + ζ) + f as pairs of name and text.
+
+    The pairs are the components of ζ and f in the spec, and the damping coefficient λ, which adds λ π∇H to ζ.
+    """
     from phigen.spec.model import SpecForces
 
     forces = system.spec.forces if system.spec else SpecForces()
     terms = {f"ζ_{c}": e for c, e in forces.covector.items()} | {f"f_{c}": e for c, e in forces.vector.items()}
-    damping = (
-        [("λ", f"{readable_one(forces.damping, max_terms)}, and ζ has λ π∇H beside that")] if forces.damping else []
-    )
+    damping = [("λ", f"{readable_one(forces.damping, max_terms)}; it adds λ π∇H to ζ")] if forces.damping else []
     return [*_named(terms, max_terms), *damping]
 
 
@@ -208,8 +209,10 @@ def _named(formulas: Any, max_terms: int | None) -> list[tuple[str, str]]:
 
 
 def _casimirs(system: System, max_terms: int | None) -> list[tuple[str, str]]:
-    """Return the Casimirs as pairs of name and text; those of log-canonical structures as logarithms of products of
-    powers."""
+    """Return the Casimirs as pairs of name and text.
+
+    A sum of logarithms, as for log-canonical structures, is written as the logarithm of a product of powers.
+    """
     from phigen.notation.powers import as_powers
 
     return [(name, as_powers(e) or readable_one(e, max_terms)) for name, e in system.casimirs.items()]
@@ -218,7 +221,8 @@ def _casimirs(system: System, max_terms: int | None) -> list[tuple[str, str]]:
 def _maps(compilation: CompiledSeries, max_terms: int | None) -> list[tuple[str, str]]:
     """Return α and β as pairs of name and text.
 
-    For a symmetric pair, β is shown as α(x, −p). For a path, both are series, of which the first terms are shown.
+    For a symmetric bi-realisation, β is shown as α(x, −p). Where α and β are defined by series along a path, the first
+    terms of each are shown.
     """
     from phigen.notation.named_parts import texts
 
@@ -241,7 +245,7 @@ def _modified(compilation: Compilation, count: int, max_terms: int | None) -> li
 
 
 def _gauged(compilation: CompiledSeries) -> list[str]:
-    """Return lines with the Hamiltonian that is discretised; [] if no Casimirs are subtracted from H."""
+    """Return a line with H minus multiples of Casimirs, from which the S_i are derived; [] if nothing is subtracted."""
     gauge = compilation.gauge
     subtracted = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
     return [f"of H - {' - '.join(subtracted)}, which has the same flow as H"] if subtracted else []

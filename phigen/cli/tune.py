@@ -144,9 +144,9 @@ def initial_value_problem(
     horizon: float | None,
     measure: str,
 ) -> tuple[Run, Problem]:
-    """Return the run of that name, by default the first, and its initial value problem.
+    """Return the run called ``name``, by default the first, and the initial value problem for measuring settings.
 
-    The problem of a run of a large lattice has fewer sites than the run.
+    For a run of a large lattice, the problem has fewer sites than the run.
     """
     spec = compilation.spec
     if spec.lattice:
@@ -157,7 +157,10 @@ def initial_value_problem(
 
 
 def problem_of(compilation: Compilation, experiment: Experiment, horizon: float | None, console: Console) -> Problem:
-    """Return the initial value problem of an experiment, by default over the length of its run; in τ with a monitor."""
+    """Return the initial value problem of an experiment over the length ``horizon``, by default that of its run.
+
+    The length is in the time t, or with a monitor in the new time τ.
+    """
     import numpy as np
 
     from phigen.cli.endings import ended, length
@@ -209,7 +212,10 @@ def _of_lattice(
 
 
 def _time_scales(run: Run, horizon: float | None) -> tuple[float, float, float]:
-    """Return a first estimate of the step, the length of a run in time, and the sign of its direction."""
+    """Return a first estimate of the step size, the length of time to integrate, and the sign of the direction of time.
+
+    The length is ``horizon``, by default that of the run.
+    """
     step = float(run.step)
     span = abs(step) * run.steps if horizon is None else horizon
     return min(abs(step), span), span, math.copysign(1.0, step)

@@ -18,12 +18,13 @@ if TYPE_CHECKING:
 
 #: Further accuracies for which results are shown, relative to the requested one.
 _FURTHER_ACCURACIES = (1e4, 1e2, 1e-2, 1e-4)
-#: If an error is smaller than the accuracy by more than this factor, something other than the error decided the step.
+#: If the error of the winner is smaller than the accuracy by more than this factor, a remark says that larger steps
+#: fail. An error this small shows that the accuracy did not limit the step.
 _UNDECIDED_FACTOR = 20
-#: Largest number of monitors that are shown, least factor by which a monitor must reduce the steps, and number of
-#: characters to which formulas are shortened.
+#: Largest number of monitors in the table; least factor by which a monitor must reduce the number of steps to be
+#: proposed, since each of its steps costs more; number of characters to which formulas in the table are cut.
 _MOST_MONITORS, _LEAST_GAIN, _FORMULA_LENGTH = 5, 2.0, 60
-#: Number of states that the proposed run stores.
+#: Number of states that the proposed run of an ordinary system stores, enough for a figure.
 _STORED_STATES = 1000
 
 
@@ -41,7 +42,7 @@ def print_tuning(tuning: Tuning, spec: Spec, run: Run) -> None:
         out(f"  {remark}")
     if other_rows := _other_rows(tuning):
         out("")
-        for line in table([["by the scans, for", "error", "step", "run, ms"], *other_rows], right=[1, 2, 3]):
+        for line in table([["cheapest setting for", "error", "step", "run, ms"], *other_rows], right=[1, 2, 3]):
             out(f"  {line}")
     assert tuning.winner is not None
     out("\nTo paste into the spec, instead of lines with the same keys" + (" and of terms:\n" if spec.terms else ":\n"))
@@ -53,7 +54,7 @@ def print_tuning(tuning: Tuning, spec: Spec, run: Run) -> None:
 
 
 def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
-    """Print the savings by each monitor, and lines for the spec that select the best one."""
+    """Print how many steps each monitor saves, and lines for the spec that select the best monitor."""
     from phigen.tuning.search import rounded_down
 
     gaining = [t for t in monitors.found if monitors.gain(t) > _LEAST_GAIN]
@@ -95,7 +96,7 @@ def monitored_lines(trial: Trial) -> list[str]:
 
 
 def listed(tuning: Tuning) -> Iterator[tuple[str, Finalist]]:
-    """Yield the rows of the table as pairs of label and result."""
+    """Yield label and result of each row of the table: proposals, classical methods, and the spec without changes."""
     for finalist in tuning.finalists:
         yield finalist.curve.label + (", the spec's" if finalist is tuning.own else ""), finalist
     for peer in tuning.peers:
@@ -148,17 +149,17 @@ def remarks(tuning: Tuning) -> Iterator[str]:
     elif tuning.measure == "energy" and not best.curve.bounded:
         yield f"Errors were measured up to {measured_span}, and extrapolated (~) by their observed growth."
     elif tuning.measure == "energy":
-        yield f"Errors were measured up to {measured_span}. Beyond, phigen's stay bounded but for rounding (~)."
+        yield f"Errors were measured up to {measured_span}. Later, only rounding adds to phigen's (~: estimated)."
     else:
-        yield f"Errors were measured up to {measured_span}; phigen's grow linearly, and so does ~ up to {full_span}."
+        yield f"Errors were measured up to {measured_span}, and extrapolated to {full_span} (~) by linear growth."
     if tuning.measure == "energy":
         yield stated({ENERGY: tuning.unit})
     if best.point.error * _UNDECIDED_FACTOR < tuning.accuracy and best.point.step > 0.9 * best.curve.largest:
         yield "The accuracy would allow a larger step, but larger steps fail or do not resolve the motion."
     if tuning.orbit_error is not None:
         yield (
-            f"The relative error of the orbit is {tuning.orbit_error:.1e} of its size at most up to {tuning.clock} = "
-            f"{tuning.piece:.4g}: --measure orbit bounds that."
+            f"Up to {tuning.clock} = {tuning.piece:.4g} the error of the orbit is at most {tuning.orbit_error:.1e} of "
+            "its size; --measure orbit chooses settings by this error."
         )
     if tuning.sizes:
         sites = "×".join(map(str, tuning.sizes))
@@ -176,9 +177,12 @@ def remarks(tuning: Tuning) -> Iterator[str]:
 
 
 def _automatic(tuning: Tuning) -> str:
-    """Return a sentence that compares the scheme of ``scheme: auto`` with the measured best."""
+    """Return a sentence that names the scheme that ``scheme: auto`` chooses, and compares its time with the best."""
     assert tuning.winner is not None
-    ratio, text = tuning.automatic_ratio, f"scheme: auto takes {tuning.automatic} at order {tuning.winner.curve.order}"
+    ratio, text = (
+        tuning.automatic_ratio,
+        f"scheme: auto chooses {tuning.automatic} at order {tuning.winner.curve.order}",
+    )
     if not math.isfinite(ratio):
         return f"{text}, but no measured method of that scheme reaches the accuracy."
     return f"{text}; the best of that scheme takes {ratio:.2g} times the time of the best of all."
@@ -190,7 +194,7 @@ def _extrapolated(tuning: Tuning) -> str:
 
 
 def _other_rows(tuning: Tuning) -> list[list[str]]:
-    """Return table rows with the cheapest candidate for each further accuracy that the scans reached."""
+    """Return table rows with the cheapest setting for each of `_FURTHER_ACCURACIES` that a measured setting reached."""
     from phigen.tuning.search import cheapest_step
 
     rows = []
@@ -213,8 +217,8 @@ def lines_of(finalist: Finalist) -> list[str]:
 def run_lines_of(tuning: Tuning, run: Run) -> list[str]:
     """Return the lines of the proposed run: step, number of steps up to the horizon, and stride.
 
-    With ``stop``, the run is one step longer, so that it reaches the stop. A large stride lets a solver make many steps
-    at once.
+    If the run has a key ``stop``, it is one step longer, so that the stop is reached. The stride is large, since a
+    solver is faster if it makes many steps between two stored states.
     """
     assert tuning.winner is not None
     step = tuning.winner.point.step

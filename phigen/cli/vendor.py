@@ -45,7 +45,7 @@ class VendorRequest:
 
 @dataclass(frozen=True)
 class VendoredSolver:
-    """Files of one solver that belong in the folder, and the request for them."""
+    """Files (name → text) that the folder should contain for one solver, and the request for that solver."""
 
     order: VendorRequest
     compilation: Compilation
@@ -158,7 +158,10 @@ def _from_specs(
     checking: bool,
     collector: Collector,
 ) -> list[VendorRequest]:
-    """Return the requests of the command line; a check without options takes those in the manifest."""
+    """Return the requests for the specs on the command line, with the options on the command line.
+
+    A check without options uses the options of each solver in the manifest.
+    """
     orders = []
     for spec in load_all(spec_files, collector) if spec_files else []:
         entry = entries.get(spec.name)
@@ -250,7 +253,8 @@ def _write(
 def _obstacle(change: Change, entry: ManifestEntry | None) -> str:
     """Return why a file must not be changed; "" if it may be.
 
-    The manifest also detects edits of headers of files, which their checksums do not cover.
+    The checksum in a file covers only the text below its header, so edits of the header are detected by the hash in
+    the manifest.
     """
     if change.obstacle or change.before is None or change.before == change.after:
         return change.obstacle
@@ -301,7 +305,10 @@ def _problems(
 
 
 def _complaint(path: Path, entry: ManifestEntry | None, vendored: VendoredSolver) -> tuple[str, bool]:
-    """Return the problem with a file, "" if there is none, and whether the file was edited by hand."""
+    """Return the problem with a file, "" if there is none, and whether correcting the problem needs ``--force``.
+
+    That is the case for files that were edited by hand.
+    """
     content = path.read_bytes() if path.is_file() else None
     stated, expected = entry.files.get(path.name) if entry else None, vendored.files.get(path.name)
     if content is None:
@@ -334,7 +341,7 @@ def _cause(entry: ManifestEntry | None, vendored: VendoredSolver) -> str:
 
 
 def _wrong_builds(folder: Path, entries: Mapping[str, ManifestEntry], builds: Sequence[str]) -> Iterator[VendorProblem]:
-    """Yield the files of build systems that differ from what the manifest requires."""
+    """Yield the problems with files of build systems, such as CMakeLists.txt, that are absent or out of date."""
     from phigen.cli.outputs import Change, read
 
     for file, text in build_files(builds, {name: entry.files for name, entry in entries.items()}).items():
@@ -370,7 +377,7 @@ def _judge(folder: Path, problems: Sequence[VendorProblem]) -> None:
 def _report_check(console: Console, folder: Path, vendored: Sequence[VendoredSolver]) -> None:
     gone = [m.order for m in vendored if not m.order.found]
     for order in gone:
-        spec_place = os.path.normpath(folder / order.spec_file) if order.spec_file else "far from here"
+        spec_place = os.path.normpath(folder / order.spec_file) if order.spec_file else "path not recorded"
         console.note(
             f"{order.spec.name}: its spec ({spec_place}) was not found, so its changes cannot be checked; "
             "the files agree with the copy of the spec in the manifest"

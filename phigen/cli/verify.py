@@ -121,7 +121,10 @@ def _draw(path: Path, compilation: Compilation, experiment: Experiment, console:
 
 
 def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
-    """Return how constant the modified Hamiltonian is on a run. Raises `NotOfferedError` and `StepError`."""
+    """Return how much the modified Hamiltonian, with 0, 1, … of its corrections, changes along a run.
+
+    Raises `NotOfferedError` and `StepError`.
+    """
     import numpy as np
 
     from phigen.api import chosen_target, solver_of
@@ -141,8 +144,8 @@ def verified(
 ) -> Verification:
     """Return the verification of a compilation with its tangent map, on a run of its spec.
 
-    ``targets`` are by default those of the spec; targets that Python cannot run are left out. If the run ends within a
-    step, its whole steps are made, at least one.
+    ``targets`` are by default those of the spec; targets that Python cannot run are left out. Only whole steps are
+    made, at least one: a shorter last step of the run is left out.
     """
     from phigen.api import chosen_target, solver_of
     from phigen.cli.endings import ended
