@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 2936f6f96adf3d241fbbbaca50c957c96dbd24ca84b3915fe67ed40e7b5a0f69
+# body-sha256: e45f5ff5e28504f0283174c63fd0b8a250fe76899203ce89c8e1bc839dd08c01
 import numpy as np
 
 VERSION = "0.1.0"
@@ -25,13 +25,14 @@ DEFAULT_PARAMETERS = {
 AT_SITES = ("k",)
 POSITIVE = ("k",)
 
-# Along each axis: whether the ends are open, the smallest size, the number that divides all sizes.
+# Along each axis: whether the ends are open, the smallest number of sites, and a number that must divide the number of
+# sites.
 OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty, the
-# multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty,
+# the multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
 TIMES = (0.0792036964311957, 0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498, 0.2193769557534996, 0.1096884778767498, 0.434336666566456, 0.3246481886897062, -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (2, 2), (3, 3), (0, 4), (1, 5), (2, 6), (3, 7), (0, 8), (1, 9), (2, 10), (3, 11), (0, 12), (1, 13), (2, 14), (3, 15), (0, 16), (1, 17), (2, 18), (3, 19), (0, 20), (1, 21), (2, 22), (3, 23), (0, 24))
@@ -56,7 +57,7 @@ class FailedError(ArithmeticError):
 
 
 def _finite(values):
-    """Return the values; raises FailedError if one is not finite."""
+    """Return the values unchanged; raises FailedError if one is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
@@ -87,11 +88,12 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """Return the shape of the values of a parameter: () for one value."""
+        """Return the shape of a parameter: that of the sites, or () for a single value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """Return the values at an offset from each site; beyond open ends they are arbitrary."""
+        """Return, for each site, the value at the site that lies at an offset from it; beyond open ends it is
+        arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -102,7 +104,10 @@ class _Sites:
         return values
 
     def present(self, *bounds):
-        """Return 1 where all sites from offset low to offset high exist, along each open axis, else 0."""
+        """Return 1 at sites whose neighbours from offset low to offset high along each axis exist, else 0.
+
+        bounds lists low and high for each axis. Neighbours beyond an open end do not exist.
+        """
         if bounds not in self._known:
             there = np.ones(self.sizes)
             for place, size, low, high in zip(self._positions, self.sizes, bounds[::2], bounds[1::2]):
@@ -128,14 +133,15 @@ class _Graph(_Sites):
         super().__init__(shape, parameters)
 
     def shape_of(self, parameter):
-        """Return the shape of the values of a parameter: () for one value."""
+        """Return the shape of a parameter: that of the sites, of the bonds, or () for a single value."""
         return (len(self.ends),) if parameter in AT_BONDS else super().shape_of(parameter)
 
     def bonds(self, end, chosen):
-        """Return three arrays over bonds with end a or b, or over both ends ("") of all bonds: the site here at that
-        end, the site there at the other end, the number of the bond.
+        """Return arrays `here`, `there` and `number` over all bonds, seen from their ends a or b, or from both ends
+        ("").
 
-        With chosen "here" or "there", only bonds whose site here or there has the present colour.
+        here[k] is the site at the end from which bond number[k] is seen, there[k] the site at its opposite end. With
+        chosen "here" or "there", only bonds are listed whose site `here` or `there` has the present colour.
         """
         key = (end, chosen, chosen and self.colour)
         if key not in self._known:
@@ -149,17 +155,17 @@ class _Graph(_Sites):
         return self._known[key]
 
     def summed(self, values, here):
-        """Return, for each site, the sum of the values of its bonds; here is the site of each value."""
+        """Return, for each site, the sum of the values of its bonds; here[k] is the site to which values[k] belongs."""
         return np.bincount(here, np.broadcast_to(values, here.shape), self.sizes[0])
 
 
-# For each part of H, whether it consists of one flow for each colour of sites. In SCHEDULE, 0 is the first flow of a
-# step, 1 all inner flows, 2 the last flow, 3 all inner flows in reverse order.
+# For each part of H, whether it consists of one flow for each colour of sites. An entry of SCHEDULE begins with 0 for
+# the first flow of a step, 1 for all inner flows, 2 for the last flow, and 3 for all inner flows in reverse order.
 BY_COLOUR = (True,)
 
 
 class _Coloured(_Graph):
-    """A graph with colours: no bond connects two sites of one colour."""
+    """A graph whose sites have colours, such that no bond connects two sites of one colour."""
 
     def __init__(self, shape, parameters):
         super().__init__(shape, parameters)
@@ -177,12 +183,12 @@ class _Coloured(_Graph):
         self.colour = 0
 
     def chosen(self):
-        """1 at the sites of the colour, else 0."""
+        """Return an array with 1 at the sites of the present colour, and 0 elsewhere."""
         return (self.colours == self.colour) * 1.0
 
 
 def _advance(sites, rows, x, past):
-    """Make one step; raises FailedError. `past` is unused: nothing is predicted."""
+    """Return the state after one step from x; raises FailedError. `past` is unused: splittings need no predictors."""
     for (part, sites.colour), row in sites.schedule:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -190,7 +196,7 @@ def _advance(sites, rows, x, past):
 
 
 def _coefficients(sites, h):
-    """Return the coefficients of all flows of a step."""
+    """Return the coefficients of a step of size h, functions of h and the parameters: a row for each entry of TIMES."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -212,7 +218,8 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0
+    (DIM, *sizes).
 
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """
@@ -243,7 +250,7 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the terms of the Casimirs at each site, (number of Casimirs, *sizes)."""
+    """Return the contribution of each site to each Casimir, (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 265de4474df13fd5eb494a6c5b57c4c9368ea6a782dbe9fcad764ab3b19dac05
+# body-sha256: 12314714d1ef9b836f1792e33544ece0325fe3734c4229525c9b9d1523099daf
 import numpy as np
 
 VERSION = "0.1.0"
@@ -48,7 +48,7 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column is that of all members."""
+    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
@@ -66,7 +66,8 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
+    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
+    repeated."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -85,7 +86,7 @@ PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
-    """Return an array of numbers. Raises ValueError if one is too large."""
+    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -93,7 +94,10 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters by name, with defaults for missing ones.
+
+    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -187,9 +191,11 @@ CONTRACTING = 0.05  # largest reduction factor of the residual by an iteration w
 
 
 def _holds(coef, p, m, slope):
-    """Return for which members the slope of an expansion at m is pi(m) p.
+    """Return for which members the slope of the Taylor series of a path at the point m is pi(m) p, as its equation
+    says.
 
-    Others only seem to have converged: an expansion has gaps between its terms, as t + t**9, or extends across a kink.
+    A series for which this fails only seems to have converged: it has gaps between its terms, as t + t**9, or extends
+    across the kink of an absolute value.
     """
     e = [m[:, i] for i in range(DIM)] + [None] * (55 - DIM)
     e[4] = coef[4] * e[0]
@@ -254,24 +260,30 @@ def _holds(coef, p, m, slope):
 
 
 def _product(a, b, k):
-    """Return coefficient k of the product of two Taylor series."""
+    """Return coefficient k of the product of two Taylor series, whose coefficients are the entries of a and b."""
     return sum(a[j] * b[k - j] for j in range(k + 1))
 
 
 def _chain(a, d, k):
-    """Return coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'; d is the series of f'(a)."""
+    """Return coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'.
+
+    a are the coefficients of the argument, d those of f'(a).
+    """
     return sum(j * a[j] * d[k - j] for j in range(1, k + 1)) / k
 
 
 def _power(a, b, r, k):
-    """Return a[0] times coefficient k >= 1 of the Taylor series of b = a**r, from a b' = r a' b."""
+    """Return a[0] times coefficient k >= 1 of the Taylor series b = a**r, from a b' = r a' b.
+
+    The entries of a and b are coefficients of the series; those of b before k are used.
+    """
     return sum(((r + 1.0) * j - k) * a[j] * b[k - j] for j in range(1, k + 1)) / k
 
 
 def _piece(coef, p, start):
-    """Return the path dm/dt = pi(m) p, 0 <= t <= 1, from start, by its Taylor series; arrays (members, DIM).
+    """Compute the path dm/dt = pi(m) p, 0 <= t <= 1, from m = start, by its Taylor series; arrays (members, DIM).
 
-    Returns m(1) - start, the mean of m - start, and for which members 30 terms sufficed.
+    Returns m(1) - start, the mean of m(t) - start, and for which members 30 terms sufficed.
     """
     s = [[start[:, i]] for i in range(DIM)] + [[] for _ in range(55 - DIM)]
     s[4].append(coef[4] * s[0][0] + 0.0)
@@ -398,9 +410,10 @@ def _piece(coef, p, start):
 
 
 def _path(coef, x, p):
-    """Return the change of x along the whole path from x, the mean of m - x, and the number of pieces computed.
+    """Return for the path dm/dt = pi(m) p from m = x, 0 <= t <= 1, its end minus x and its mean minus x.
 
-    The path is cut into 1, 2, 4, ... pieces until each expansion converges. NaN if it is too long or leaves the domain.
+    The path is cut into 1, 2, 4, ... pieces until the Taylor series of each piece converges; the third result is the
+    number of pieces computed. The values are NaN if the path is too long or leaves the domain of pi.
     """
     change, mean, pieces_used = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))
@@ -420,18 +433,21 @@ def _path(coef, x, p):
 
 
 def _residual(coef, x, p):
-    """Return p - grad S_h(mean of the path from x with covector p), the change of x along the path, an approximate
-    Jacobian, and the number of pieces."""
+    """Return the residual p - grad S_h(mean of the path) of the equation for the covector p of a stage.
+
+    The path dm/dt = pi(m) p, 0 <= t <= 1, starts at x; S_h is the generating function. Further results are the change
+    of x along the path, an approximate Jacobian of the residual, and the number of pieces computed of the path.
+    """
     change, mean, pieces_used = _path(coef, x, p)
     slope, jacobian = _generate(coef, x + mean)
     return p - slope, change, jacobian, pieces_used
 
 
 def _differences(coef, x, p, residual):
-    """Return the Jacobian of the residual by differences, and the number of pieces of all paths.
+    """Return the Jacobian of the residual by p, from differences, and the number of pieces computed of all paths.
 
-    It serves for steps so large that iterations with the approximate Jacobian do not converge. NaN where a path cannot
-    be followed.
+    It serves for steps so large that iterations with the approximate Jacobian do not converge. It is NaN for members
+    whose paths cannot be followed.
     """
     jacobian, pieces_used = np.full((len(x), DIM, DIM), np.nan), np.zeros(len(x), dtype=int)
     norm = np.max(np.abs(p), axis=-1) + np.finfo(float).tiny
@@ -463,9 +479,9 @@ MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Return for which members the increment from x to end is short, or the change of energy small.
+    """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
 
-    If a step is too large, its equation may have solutions far away, at another energy, unrelated to the motion.
+    The equation of a step that is too large may have solutions far away, at another energy, unrelated to the motion.
     """
     _, parameters, h = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -479,17 +495,18 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, prediction):
-    """Return the result of _attempt, with a status for implausible solutions."""
+    """Return the result of _attempt, with the status NO_CONVERGENCE for solutions that are not plausible."""
     following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
 
 
 def _attempt(coef, x, carry, p):
-    """Solve p = grad S_h(mean of the path from x with covector p), and move to the end of the path.
+    """Make one stage: solve p = grad S_h(mean of the path) for the covector p, and move to the end of the path.
 
-    Arrays are (members, DIM). A step that needs more than MOST_PIECES pieces is too large for a meaningful solution.
-    Returns new x, carry, p, and a status for each member, "" if good.
+    The path dm/dt = pi(m) p, 0 <= t <= 1, starts at x; S_h is the generating function. Arrays are (members, DIM). A
+    step that needs more than MOST_PIECES pieces of paths is too large for a meaningful solution. Returns the new x, its
+    compensation term, p, and a status for each member, "" if it was solved.
     """
     x, carry, p = x.copy(), carry.copy(), p.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -501,7 +518,7 @@ def _attempt(coef, x, carry, p):
         norm = np.max(np.abs(p[open_]), axis=-1) + np.finfo(float).tiny
         size = np.max(np.abs(residual), axis=-1) / norm
         finite = np.isfinite(residual).all(axis=-1)
-        # Second criterion: residuals no longer shrink, since they are at rounding level.
+        # Also accept solutions whose small residuals no longer shrink: they are at rounding level.
         done = (size <= SOLVED) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -527,7 +544,10 @@ def _attempt(coef, x, carry, p):
 
 
 def _advance(stage, x, carry, memory):
-    """Make one stage of all members; `memory` holds the last two p, for the predictor."""
+    """Make one stage of all members: return the new x, its compensation term, memory, and a status for each member.
+
+    `memory` holds the covectors p of the last two steps, which predict the next.
+    """
     following, rest, p, status = _solved(stage, x, carry, 2 * memory[0] - memory[1])
     predicted = memory[0].any(axis=-1)
     failed = np.flatnonzero((status != "") & predicted)
@@ -544,9 +564,10 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
+    """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
-    The coefficients are arrays (coefficients, members), or (coefficients, 1).
+    The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
+    (coefficients, 1) if all members have the same.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -556,24 +577,28 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
+    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """Return the state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
+    fails."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+
+    Raises ValueError if the shape of the array does not fit the leading axes of x.
+    """
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
+    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

@@ -7,7 +7,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 8dc538360edc7e56664b8bfec40fd48b02b14e09d1d7861f54867705951f78b6
+# body-sha256: 9732307be1ee9a35048a880689ef02e9732b07d4bc64b9345b97297061d148f7
 import numpy as np
 
 VERSION = "0.1.0"
@@ -46,7 +46,7 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column is that of all members."""
+    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
@@ -64,7 +64,8 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
+    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
+    repeated."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -83,7 +84,7 @@ PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
-    """Return an array of numbers. Raises ValueError if one is too large."""
+    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -91,7 +92,10 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters by name, with defaults for missing ones.
+
+    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -151,8 +155,8 @@ def _flow2(coef, state):
         ])
 
 
-# The times of flows, as fractions of h: one for each row of coefficients. The flows of a step in order, each as (part of
-# H, row).
+# TIMES has the time of the flow of each row of coefficients, as a fraction of h. ROW is the number of coefficients in a
+# row. SCHEDULE lists the flows of a step in order, each as (part of H, row).
 TIMES = (0.06510124154444503, 0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727, -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757, -0.10568212657746093, 0.1845396409783157, 0.22145701433231887, 0.25837438768632204, 0.27669305564781616, 0.2950117236093103, -0.15524840511036214, -0.6055085338300346, -0.15524840511036214, 0.2950117236093103, 0.27669305564781616, 0.25837438768632204, 0.22145701433231887, 0.1845396409783157, -0.10568212657746093, -0.39590389413323757, -0.11853099378904099, 0.1588419065551556, -0.11531652804484584, -0.38947496264484727, 0.08584400956513055, 0.5611629817751084, 0.3456827324319992, 0.13020248308889007, 0.06510124154444503,)
 ROW = 4
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12), (1, 13), (0, 14), (1, 15), (0, 16), (1, 17), (0, 18), (1, 19), (0, 20), (1, 21), (0, 22), (1, 23), (0, 24), (1, 25), (0, 26), (1, 27), (0, 28), (1, 29), (0, 30), (1, 31), (0, 32), (1, 33), (0, 34))
@@ -160,9 +164,10 @@ FLOWS = (_flow1, _flow2,)
 
 
 def _advance(stage, x, carry, memory):
-    """Make one step of all members: the flows of the parts of K, one after another; returns its physical time as memory.
+    """Make one step of all members: the exact flows of the parts of the Hamiltonian K, one after the other.
 
-    The time is NaN if the argument of a logarithm of K has left its domain.
+    Returns the new x, its compensation term, the physical time of the step (twice, in place of memory), and a status
+    for each member. The time is NaN if the argument of a logarithm in K has left its domain.
     """
     coef, elapsed = stage[0], np.zeros(len(x))
     for part, row in SCHEDULE:
@@ -174,7 +179,7 @@ def _advance(stage, x, carry, memory):
 
 
 def _prepare(parameters, gauge, h):
-    """Return the coefficients of all rows."""
+    """Return the coefficients of the flows of a step of size h, one row after the other, one row for each of TIMES."""
     return [c for time in TIMES for c in _prepare_row(parameters, gauge, time * h)]
 
 
@@ -202,15 +207,19 @@ def _refused(parameters, x):
 
 
 def _time_of(stage, x, value):
-    """Return the physical time (members,) of a stage with start x and solution value; NaN unless it has the sign of the step."""
+    """Return the physical time (members,) that passes in a stage with start x and solution value.
+
+    It is NaN unless it has the sign of the step.
+    """
     elapsed = value
     return np.where(elapsed * np.sign(stage[2]) > 0, elapsed, np.nan)
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
+    """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
-    The coefficients are arrays (coefficients, members), or (coefficients, 1).
+    The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
+    (coefficients, 1) if all members have the same.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -220,24 +229,28 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the energy level e = -H(x) that integrate() holds fixed for trajectories from x: (..., 1)."""
+    """Return the energy level e = -H(x), (..., 1), a constant of each trajectory from x that integrate() computes."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """Return the state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
+    fails."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+
+    Raises ValueError if the shape of the array does not fit the leading axes of x.
+    """
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
+    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

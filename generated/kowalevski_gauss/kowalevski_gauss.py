@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 1b17a13032dea405764e6f08a53c90ca6ae93903b9f48b2f91ba8bdd4de19a91
+# body-sha256: 90288f3fc189eb8f933ac9edd129ac9add22202db724d41e55eb366b795bcaac
 import numpy as np
 
 VERSION = "0.1.0"
@@ -44,7 +44,7 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column is that of all members."""
+    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
@@ -62,7 +62,8 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
+    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
+    repeated."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -81,7 +82,7 @@ PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
-    """Return an array of numbers. Raises ValueError if one is too large."""
+    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -89,7 +90,10 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters by name, with defaults for missing ones.
+
+    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -204,7 +208,8 @@ ROUNDING = 4e-16  # sweeps end at a change below this with at least the ratio ST
 NEARLY_ROUNDING = 2e-14  # sweeps end at the second change below this that is no smaller than the last
 TRIALS = 32  # steps between comparisons of the predictors; a comparison costs as much as two sweeps
 
-# Gauss collocation: nodes, weights, and the matrix mu = A diag(1/b). All entries of mu + mu.T are exactly 1.
+# Gauss collocation with nodes c, weights b and matrix A: NODES is c, WEIGHTS is b, MIXING is mu = A diag(1/b). All
+# entries of mu + mu.T are exactly 1 in floating point, which makes the method symplectic.
 NODES = np.array((0.019855071751231884, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751, 0.591717321247825, 0.7627662049581645, 0.8983332387068134, 0.9801449282487681,))
 WEIGHTS = np.array((0.05061426814518813, 0.11119051722668724, 0.15685332293894363, 0.181341891689181, 0.181341891689181, 0.15685332293894363, 0.11119051722668724, 0.05061426814518813,))
 MIXING = np.array([
@@ -218,7 +223,8 @@ MIXING = np.array([
     [1.005482808253216, 0.9912514332308027, 1.012225914113298, 0.9830238267636289, 1.0247213458032003, 0.9599572962220551, 1.0818949631055814, 0.5],
 ])
 
-# Number of the first unknowns, with the scale of the state: coordinates, time, functionals. The others are of size 1.
+# Number of unknowns whose changes are measured relative to |x|: coordinates, time and functionals, which come first.
+# The other unknowns, group elements, have sizes near 1.
 PLAIN = 4
 
 
@@ -228,14 +234,15 @@ def _point(stage, x):
 
 
 def _slopes(stage, point, z):
-    """Return the increments h b_j f(Z_j) of all stages j from their unknowns Z_j; arrays (unknowns, members, stages)."""
+    """Return the increments h b_j f(Z_j) of all stages j from their unknowns Z_j; arrays (unknowns, members,
+    stages)."""
     weights = np.broadcast_to(np.reshape(stage[2], (-1, 1)) * WEIGHTS, point.shape[:2])
     return np.moveaxis(_stage_field(stage[0][:, :, np.newaxis], point, z, [weights]), -1, 0)
 
 
 def _change_of(x, change, increments):
-    """Return the largest change at any stage, (members,); that of the plain unknowns is relative to |x|, or to
-    their increments at x = 0."""
+    """Return the largest change of the unknowns at any stage, (members,); changes of the first PLAIN unknowns are
+    measured relative to |x|, or to their increments if x = 0."""
     square = np.sum(x**2, axis=-1)[:, np.newaxis] + np.finfo(float).tiny
     square = np.where(square > np.finfo(float).tiny, square, square + np.sum(increments[:PLAIN] ** 2, axis=0))
     plain, rest = np.sum(change[:PLAIN] ** 2, axis=0) / square, np.sum(change[PLAIN:] ** 2, axis=0)
@@ -243,8 +250,8 @@ def _change_of(x, change, increments):
 
 
 def _solved(stage, x, z):
-    """Return the increments of all stages, (unknowns, members, stages), by sweeps from z, and a status for each
-    member."""
+    """Solve the equations of a step by fixed-point sweeps from the unknowns z; return the increments of all stages,
+    (unknowns, members, stages), and a status for each member, "" if solved."""
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
     point = _point(stage, x)
     solved = _slopes(stage, point, z)
@@ -277,7 +284,8 @@ def _factors_at(fractions):
     """Return factors f_j of the stage increments at fractions of a step, (fractions, stages).
 
     The sum of f_j times increment j is the collocation polynomial minus its value at the end of the step. The factors
-    are integrals of Lagrange polynomials from 1 to the fraction, divided by the weights, by sums of Legendre polynomials.
+    are integrals of Lagrange polynomials from 1 to the fraction, divided by the weights, by sums of Legendre
+    polynomials.
     """
     x, nodes = 2 * np.reshape(fractions, (-1, 1)) - 1, 2 * NODES - 1
     legendre = np.polynomial.legendre.legvander
@@ -296,9 +304,9 @@ PREDICTION = _factors_at(1 + NODES)
 
 
 def _with_new_step(memory, ratio):
-    """Return `memory` for a step after a kick, or of another size: the predicted unknowns.
+    """Return `memory` with predicted unknowns, for a step after a kick or of another size than the last step.
 
-    `ratio` is the size relative to that of the last step.
+    `ratio` is the new size divided by the last one. If it exceeds 1 in magnitude, there is no prediction.
     """
     if memory[1].ndim == 4 and ratio == 1:
         return memory
@@ -315,16 +323,19 @@ def _predicted(memory):
 
 
 def _in_next_frame(stage, x, end, increments):
-    """Return columns of increments, (unknowns, members, columns), in the frame of the end of a step from x."""
+    """Return increments (unknowns, members, columns) of a step from x, transformed to the frame at the end of the step.
+
+    The next step uses this frame. `end` is the sum of the stage increments of the step.
+    """
     start = np.repeat(_point(stage, x)[:, :1], increments.shape[-1], axis=1)
     return np.moveaxis(_next_frame(stage[0][:, :, np.newaxis], start, end[:, :, np.newaxis], increments), -1, 0)
 
 
 def _advance(stage, x, carry, memory):
-    """Make one step of all members.
+    """Make one step of all members: return the new x, its compensation term, memory, and a status for each member.
 
-    `memory` is a pair: the stage increments of the last step, and the same in the frame of its end. The second may
-    instead be the starting values of the sweeps.
+    `memory` is a pair: the stage increments of the last step, and these increments in the frame at the end of that
+    step. The second may instead be the starting values of the sweeps.
     """
     predicted = _predicted(memory)
     anew = np.zeros((8, len(x), len(WEIGHTS)))
@@ -347,9 +358,10 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
+    """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
-    The coefficients are arrays (coefficients, members), or (coefficients, 1).
+    The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
+    (coefficients, 1) if all members have the same.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -359,24 +371,28 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
+    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """Return the state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
+    fails."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+
+    Raises ValueError if the shape of the array does not fit the leading axes of x.
+    """
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
+    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 5617573a9f6e31efb0cf63df7b278c06f8dfcafa31c09b217787947a7ddb4a6a
+# body-sha256: f5d5d13e44764defeda7216d007eafdc21dba81f5374d09fc9f132b8b94b450a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -44,7 +44,7 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column is that of all members."""
+    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
@@ -62,7 +62,8 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
+    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
+    repeated."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -81,7 +82,7 @@ PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
-    """Return an array of numbers. Raises ValueError if one is too large."""
+    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -89,7 +90,10 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters by name, with defaults for missing ones.
+
+    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -124,7 +128,7 @@ def _explicit(coef, state):
 
 
 def _advance(stage, x, carry, memory):
-    """Make one stage of all members."""
+    """Make one stage of all members: return the new x, its compensation term, memory, and a status for each member."""
     following, rest = _sum(x, carry, _explicit(stage[0], x))
     good = np.isfinite(following).all(axis=-1)
     return following, rest, memory, np.where(good, "", "NOT_FINITE")
@@ -136,9 +140,10 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
+    """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
-    The coefficients are arrays (coefficients, members), or (coefficients, 1).
+    The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
+    (coefficients, 1) if all members have the same.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -148,24 +153,28 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
+    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """Return the state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
+    fails."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+
+    Raises ValueError if the shape of the array does not fit the leading axes of x.
+    """
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
+    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

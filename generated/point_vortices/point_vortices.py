@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: f2ca4c893a0ee15fab7ecd9603cf4aab8712080902033bc09d1046dcdeed9e5b
+# body-sha256: fed7a59d8009da9a2127d851301c16cfaf63bb3ec544df885f732b1a7e058a8b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -18,7 +18,7 @@ ORDER = 4
 AXES = ("i",)
 COORDINATES = ("x", "y",)
 CASIMIRS = ()
-# None: the default in the spec is an array, for which this module has no sizes. Such a parameter must be given.
+# None marks a parameter that callers must give: its default in the spec is an array, which fits one lattice size only.
 DEFAULT_PARAMETERS = {
     "G": None,
 }
@@ -27,13 +27,14 @@ DEFAULT_PARAMETERS = {
 AT_SITES = ("G",)
 POSITIVE = ()
 
-# Along each axis: whether the ends are open, the smallest size, the number that divides all sizes.
+# Along each axis: whether the ends are open, the smallest number of sites, and a number that must divide the number of
+# sites.
 OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty, the
-# multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty,
+# the multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
 TIMES = (0.4144907717943757, 0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (0, 1), (0, 2), (0, 3), (0, 4))
@@ -58,7 +59,7 @@ class FailedError(ArithmeticError):
 
 
 def _finite(values):
-    """Return the values; raises FailedError if one is not finite."""
+    """Return the values unchanged; raises FailedError if one is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
@@ -91,11 +92,12 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """Return the shape of the values of a parameter: () for one value."""
+        """Return the shape of a parameter: that of the sites, or () for a single value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """Return the values at an offset from each site; beyond open ends they are arbitrary."""
+        """Return, for each site, the value at the site that lies at an offset from it; beyond open ends it is
+        arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -106,7 +108,10 @@ class _Sites:
         return values
 
     def present(self, *bounds):
-        """Return 1 where all sites from offset low to offset high exist, along each open axis, else 0."""
+        """Return 1 at sites whose neighbours from offset low to offset high along each axis exist, else 0.
+
+        bounds lists low and high for each axis. Neighbours beyond an open end do not exist.
+        """
         if bounds not in self._known:
             there = np.ones(self.sizes)
             for place, size, low, high in zip(self._positions, self.sizes, bounds[::2], bounds[1::2]):
@@ -127,7 +132,8 @@ NEARLY_SETTLED = 2.0**-30  # changes below this are not left to Newton's method
 
 
 def _usual(y):
-    """Return the largest magnitude of each field of y, plus a small part of that of all fields."""
+    """Return the size of each field of y: its largest magnitude, plus a small part of the largest magnitude of all
+    fields."""
     sizes = np.abs(y).max(tuple(range(1, y.ndim)))
     return sizes + LEAST_SIZE * sizes.max() + 1e-300
 
@@ -157,7 +163,11 @@ def _by_sweeps(coef, x, y, sites):
 
 
 def _remember(differences, value):
-    """Update backward differences with a new value; returns the number of them that predict best."""
+    """Update the list of backward differences with a new value; returns how many of them to sum for the next
+    prediction.
+
+    It is the number that would have predicted the new value best.
+    """
     order, least, following = 1, np.inf, value
     for k in range(min(len(differences), DIFFERENCES)):
         last = differences[k]
@@ -171,7 +181,10 @@ def _remember(differences, value):
 
 
 def _advance(sites, rows, x, past):
-    """Make one step; raises FailedError. `past` has the predictor of each stage: order, and differences of y - x.
+    """Return the state after one step from x; raises FailedError if it fails.
+
+    `past` has the predictor of each stage: the order of extrapolation, and backward differences of past values of y -
+    x, where y is the solution of the stage.
     """
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))
@@ -247,7 +260,7 @@ def _krylov(matrix, side, usual):
 
 
 def _coefficients(sites, h):
-    """Return the coefficients of all flows of a step."""
+    """Return the coefficients of a step of size h, functions of h and the parameters: a row for each entry of TIMES."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -269,7 +282,8 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0
+    (DIM, *sizes).
 
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """
@@ -300,7 +314,7 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the terms of the Casimirs at each site, (number of Casimirs, *sizes)."""
+    """Return the contribution of each site to each Casimir, (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
@@ -317,7 +331,7 @@ def _prepare(parameters, h):
 
 
 def _over_others(values, sites):
-    """Return, for each site a, the sum of values (a, b) over all other sites b."""
+    """Return, for each site a, the sum of values[a, b] over all sites b except a."""
     values = np.array(np.broadcast_to(values, sites.sizes * 2))
     np.fill_diagonal(values, 0.0)
     return values.sum(axis=1)

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: db2499c16d0478cceb19000fa52625d827bdbb397b8fd3fcd0aa83012bd16a2f
+# body-sha256: 6fc2be5e256ab3464da8e28ac99c8e59b6d59e3a890583c0e4c8ed5f0ffdf23e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -48,7 +48,7 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column is that of all members."""
+    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
@@ -66,7 +66,8 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
+    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
+    repeated."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -85,7 +86,7 @@ PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
-    """Return an array of numbers. Raises ValueError if one is too large."""
+    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -93,7 +94,10 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters by name, with defaults for missing ones.
+
+    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -207,9 +211,9 @@ MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Return for which members the increment from x to end is short, or the change of energy small.
+    """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
 
-    If a step is too large, its equation may have solutions far away, at another energy, unrelated to the motion.
+    The equation of a step that is too large may have solutions far away, at another energy, unrelated to the motion.
     """
     _, parameters, h = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -223,7 +227,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, prediction):
-    """Return the result of _attempt, with a status for implausible solutions."""
+    """Return the result of _attempt, with the status NO_CONVERGENCE for solutions that are not plausible."""
     following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -235,17 +239,20 @@ SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that sho
 
 
 def _size(y, delta):
-    """Return the largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|, for each member."""
+    """Return the relative size of the correction delta of y for each member.
+
+    It is the largest ratio of |delta_i| to |y_i| + FLOOR times the largest |y_j|.
+    """
     scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
 
 
 def _attempt(coef, x, carry, y):
-    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
+    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and make the step; arrays (members, DIM).
 
     The effect of the last correction on the increment is added to first order, so a solution is accepted if its error,
-    quadratic in the last correction, is below 1e-20. Returns new x, carry, y, and a status for each member, ""
-    if good.
+    quadratic in the last correction, is below 1e-20. Returns the new x, its compensation term, y, and a
+    status for each member, "" if it was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -260,7 +267,7 @@ def _attempt(coef, x, carry, y):
         status[open_[~finite]] = "NOT_FINITE"
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
-        # Second criterion: corrections no longer shrink, since they are at rounding level.
+        # Also accept solutions whose small corrections no longer shrink: they are at rounding level.
         done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
@@ -276,7 +283,10 @@ def _attempt(coef, x, carry, y):
 
 
 def _advance(stage, x, carry, memory):
-    """Make one stage of all members; `memory` holds the offsets y - x of the last two steps, for the predictor."""
+    """Make one stage of all members: return the new x, its compensation term, memory, and a status for each member.
+
+    y is the solution of the stage. `memory` holds the offsets y - x of the last two steps, which predict the next.
+    """
     prediction = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, prediction)
     predicted = memory[0].any(axis=-1)
@@ -294,9 +304,10 @@ def _choose_gauge(parameters, x):
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that do not depend on the state: coefficients, parameters, step size.
+    """Return for each stage of a step its coefficients, the parameters, and the size of the stage.
 
-    The coefficients are arrays (coefficients, members), or (coefficients, 1).
+    The coefficients are functions of parameters, gauge and size. They form an array (coefficients, members), or
+    (coefficients, 1) if all members have the same.
     """
     stages = [fraction * h for fraction in FRACTIONS]
     if not GAUGE:
@@ -306,24 +317,28 @@ def _coefficients(parameters, x, h, gauge):
 
 
 def gauge(x, **parameters):
-    """Return the factors of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
+    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, gauge=None, **parameters):
-    """Return the state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
+    fails."""
     return integrate(x, h, 1, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+
+    Raises ValueError if the shape of the array does not fit the leading axes of x.
+    """
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
+    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

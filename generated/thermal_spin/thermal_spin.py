@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 597a6650368769168843f18b7f33b844fc6c82fee0f41313729c9270aa57f2e5
+# body-sha256: dc56902097a96878a6add8a746d7489dca8577c3d1cdf58b42f6177d59b0626b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -53,7 +53,7 @@ class StepError(ArithmeticError):
 
 
 def _at(coef, members):
-    """Return the columns of coefficients for some members; a single column is that of all members."""
+    """Return the columns of coefficients for some members; a single column holds for all members and is unchanged."""
     return coef if coef.shape[1] == 1 else coef[:, members]
 
 
@@ -71,7 +71,8 @@ def _table(rows):
 
 
 def _filled(like, values):
-    """Stack values along a new last axis, in place of that of `like`; numbers are repeated to the shape of `like`."""
+    """Return an array with the values along its last axis; its leading axes are those of `like`. Numbers are
+    repeated."""
     out = np.empty(like.shape[:-1] + (len(values),))
     for i, value in enumerate(values):
         out[..., i] = value
@@ -90,7 +91,7 @@ PROBE_STEP = 1e-100  # a step size for which coefficients are finite
 
 
 def _numbers(values):
-    """Return an array of numbers. Raises ValueError if one is too large."""
+    """Return values as an array of floating-point numbers. Raises ValueError if one is too large for them."""
     try:
         return np.array(values, dtype=float)
     except OverflowError as error:
@@ -98,7 +99,10 @@ def _numbers(values):
 
 
 def _values(parameters):
-    """Return all parameters, given ones or defaults, as numbers of NumPy, for which division by zero gives infinity."""
+    """Return all parameters by name, with defaults for missing ones.
+
+    They are numbers of NumPy, since division by these gives infinity at 0 where a Python float raises an error.
+    """
     unknown = sorted(set(parameters) - set(DEFAULT_PARAMETERS))
     if unknown:
         raise TypeError(f"unknown parameters {unknown}; known are {sorted(DEFAULT_PARAMETERS)}")
@@ -301,9 +305,9 @@ MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
 
 
 def _plausible(stage, x, end):
-    """Return for which members the increment from x to end is short, or the change of energy small.
+    """Return for which members the increment from x to end is plausible: it is short, or changes the energy little.
 
-    If a step is too large, its equation may have solutions far away, at another energy, unrelated to the motion.
+    The equation of a step that is too large may have solutions far away, at another energy, unrelated to the motion.
     """
     _, parameters, h, dw = stage
     distance, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
@@ -319,7 +323,7 @@ def _plausible(stage, x, end):
 
 
 def _solved(stage, x, carry, prediction):
-    """Return the result of _attempt, with a status for implausible solutions."""
+    """Return the result of _attempt, with the status NO_CONVERGENCE for solutions that are not plausible."""
     following, rest, value, status = _attempt(stage[0], x, carry, prediction)
     status[(status == "") & ~_plausible(stage, x, following)] = "NO_CONVERGENCE"
     return following, rest, value, status
@@ -331,17 +335,20 @@ SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that sho
 
 
 def _size(y, delta):
-    """Return the largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|, for each member."""
+    """Return the relative size of the correction delta of y for each member.
+
+    It is the largest ratio of |delta_i| to |y_i| + FLOOR times the largest |y_j|.
+    """
     scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
 
 
 def _attempt(coef, x, carry, y):
-    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and advance; arrays (members, DIM).
+    """Solve (y - x) + displacement(y) = 0 for y by Newton's method, and make the step; arrays (members, DIM).
 
     The effect of the last correction on the increment is added to first order, so a solution is accepted if its error,
-    quadratic in the last correction, is below 1e-20. Returns new x, carry, y, and a status for each member, ""
-    if good.
+    quadratic in the last correction, is below 1e-20. Returns the new x, its compensation term, y, and a
+    status for each member, "" if it was solved.
     """
     x, carry, y = x.copy(), carry.copy(), y.copy()
     status = np.full(len(x), "NO_CONVERGENCE", dtype=object)
@@ -356,7 +363,7 @@ def _attempt(coef, x, carry, y):
         status[open_[~finite]] = "NOT_FINITE"
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
-        # Second criterion: corrections no longer shrink, since they are at rounding level.
+        # Also accept solutions whose small corrections no longer shrink: they are at rounding level.
         done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
@@ -372,8 +379,11 @@ def _attempt(coef, x, carry, y):
 
 
 def _advance(stage, x, carry, memory):
-    """Make one stage of all members. `memory` holds the last offset y - x only, since steps with noise cannot be
-    predicted."""
+    """Make one stage of all members: return the new x, its compensation term, memory, and a status for each member.
+
+    y is the solution of the stage, and `memory` holds its last offset y - x. Nothing is predicted from it, since steps
+    with noise cannot be predicted.
+    """
     following, rest, y, status = _solved(stage, x, carry, x)
     return following, rest, (y - x, y - x), status
 
@@ -383,17 +393,18 @@ def _choose_gauge(parameters, x):
     return np.zeros((len(x), 0))
 
 
-# The sources of noise; the number of increments in a step; the number of parts of a step with increments of their own;
-# the bound of normal variates, since rare larger ones would make steps fail.
+# Names of the sources of noise; the number of increments in a step; the number of parts of a step with separate
+# increments; the bound at which normal variates are truncated, since rare large ones would make steps fail.
 SOURCES = ("bath_x", "bath_y", "bath_z",)
 PARTS = 1
 BOUND = 6.0
 
 
 def _philox(counter, key):
-    """Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw (2011): four random words from a counter of four.
+    """Return four random words as a function of a counter of four words and a key of two words.
 
-    Words have 32 bits, stored as uint64; the key has two words.
+    Words have 32 bits, stored as uint64. The function is Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw
+    (2011).
     """
     low = np.uint64(0xFFFFFFFF)
     a, b, c, d = counter
@@ -406,12 +417,15 @@ def _philox(counter, key):
 
 
 def _unit(high, low):
-    """Return numbers in [0, 1), from 53 bits of two words."""
+    """Return numbers in [0, 1), from 53 bits of two random words of 32 bits."""
     return ((high >> np.uint64(5)) * 67108864.0 + (low >> np.uint64(6))) * 2.0**-53
 
 
 def _two_normals(seed, counter):
-    """Return two arrays of independent standard normal variates (Box and Muller), from a counter of four words."""
+    """Return two arrays of independent standard normal variates, by the method of Box and Muller.
+
+    The random numbers are a function of the seed and of a counter of four words.
+    """
     a, b, c, d = _philox(counter, (seed & 0xFFFFFFFF, seed >> 32))
     radius = np.minimum(np.sqrt(-2.0 * np.log(_unit(a, b) + 2.0**-54)), BOUND)
     angle = 6.283185307179586 * _unit(c, d)
@@ -419,7 +433,7 @@ def _two_normals(seed, counter):
 
 
 def _normals(seed, members, step):
-    """Return normal variates of variance 1 for a step: (increments in a step, members)."""
+    """Return normal variates of mean 0 and variance 1 for a step: (increments in a step, members)."""
     count, word, normals = PARTS * len(SOURCES), 0xFFFFFFFF, []
     for pair in range((count + 1) // 2):
         counter = [np.full(members.shape, w, dtype=np.uint64) for w in (step & word, step >> 32, 0, pair)]
@@ -429,54 +443,62 @@ def _normals(seed, members, step):
 
 
 def _drawing(h, count, seed=0, member=0, step0=0, increments=None):
-    """Return the increments of the noise as a function of the number of steps done: (increments, members).
+    """Return a function that maps the number of steps done to the increments of the noise in the next step.
 
-    Random increments depend only on seed, member (a number for the first member, or an array for all), and the number of
-    the step, step0 + done. `increments`, if given, are used instead: (steps, increments) for all members, or (steps,
-    members, increments).
+    Its result has the shape (increments, members). Random increments depend only on seed, on the numbers of the members
+    (member is the number of the first member, or an array with all), and on the number of the step, step0 + done.
+    `increments`, if not None, are used instead: (steps, increments) for all members, or (steps, members, increments).
     """
     members = np.arange(count) + member if np.ndim(member) == 0 else np.asarray(member)
     if increments is None:
-        size = np.sign(h) * np.sqrt(abs(h) / PARTS)  # so that a step of -h inverts one of h
+        size = np.sign(h) * np.sqrt(abs(h) / PARTS)  # with the sign of h, so that a step of -h inverts a step of h
         return lambda done: size * _normals(int(seed), members, int(step0) + done)
     draws = PARTS * len(SOURCES)
     return lambda done: np.broadcast_to(np.asarray(increments[done], dtype=float), (count, draws)).T
 
 
 def _coefficients(parameters, x, h, gauge):
-    """Return the data of each stage that depend on parameters and step size only: coefficients, (coefficients, members or
-    1), parameters and step size."""
+    """Return for the only stage of a step the coefficients that depend on neither state, time nor noise, the parameters
+    and the step size.
+
+    The coefficients form an array (coefficients, members), or (coefficients, 1) if all members have the same.
+    """
     return [(_table(_prepare(parameters, h)), parameters, h)]
 
 
 def _renewed(stage, t, h, dw):
-    """Return a stage of the step of size h from the time t on with the increments dw (increments, members).
+    """Return the data of the stage in the step of size h that begins at the time t.
 
-    Its coefficients are arrays (coefficients, members).
+    They are all coefficients, (coefficients, members), the parameters, the step size,
+    and the increments dw of the noise in the step, (increments, members). `stage` is what _coefficients returns.
     """
     coef, parameters, step = stage
     return _table([*coef, *_refresh(coef, dw)]), parameters, step, dw
 
 
 def gauge(x, **parameters):
-    """Return the factors of the Casimirs in GAUGE that integrate() chooses for trajectories from x: (..., len(GAUGE))."""
+    """Return the factors (..., len(GAUGE)) of Casimirs that integrate() subtracts from H on trajectories from x."""
     x = np.asarray(x, dtype=float)
     with np.errstate(all="ignore"):
         return _choose_gauge(_values(parameters), x.reshape(-1, DIM)).reshape(x.shape[:-1] + (len(GAUGE),))
 
 
 def step(x, h, seed=0, member=0, step0=0, increments=None, gauge=None, **parameters):
-    """Return the state after one step of size h, of either sign. x: (..., DIM); raises StepError."""
+    """Return the state (..., DIM) after one step of size h, of either sign. Raises StepError if it
+    fails."""
     return integrate(x, h, 1, seed=seed, member=member, step0=step0, increments=increments, gauge=gauge, **parameters)[-1]
 
 
 def _of_members(value, x):
-    """Return value, a number or an array with one for each member. Raises ValueError if the length is not that of x."""
+    """Return a number unchanged, or an array of numbers for the members of x as an array (members,).
+
+    Raises ValueError if the shape of the array does not fit the leading axes of x.
+    """
     return value if np.ndim(value) == 0 else np.broadcast_to(value, x.shape[:-1]).reshape(-1)
 
 
 def _checked(x0, h, steps, stride, parameters):
-    """Return the arguments of integrate() as arrays. Raises ValueError for values that are not admissible."""
+    """Return x0, h and all parameters as arrays. Raises ValueError for arguments that integrate() refuses."""
     x, h = _numbers(x0), _numbers(h)[()]
     if x.shape[-1:] != (DIM,):
         raise ValueError(f"x0 has shape {x.shape}, not (..., {DIM})")

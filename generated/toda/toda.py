@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: cae5bb68ec26c90196dec1ff8221a3a51e0d12197728b2510509c9d47c5bec5d
+# body-sha256: a52f252de521422fa0611e53e6163299e2fa51c5faf93b476cffc7eb934c51bd
 import numpy as np
 
 VERSION = "0.1.0"
@@ -23,13 +23,14 @@ DEFAULT_PARAMETERS = {
 AT_SITES = ()
 POSITIVE = ()
 
-# Along each axis: whether the ends are open, the smallest size, the number that divides all sizes.
+# Along each axis: whether the ends are open, the smallest number of sites, and a number that must divide the number of
+# sites.
 OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
 
-# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty, the
-# multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
+# For each row of coefficients, TIMES has the time of its flow as a fraction of the step, and MULTIPLES, if not empty,
+# the multiple of h² in a modified kick. SCHEDULE has the flows of a step in order, each as (part of H, row).
 TIMES = (0.08298440641740498, 0.2452989571842711, 0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083, -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711, 0.08298440641740498,)
 MULTIPLES = ()
 SCHEDULE = ((0, 0), (1, 1), (0, 2), (1, 3), (0, 4), (1, 5), (0, 6), (1, 7), (0, 8), (1, 9), (0, 10), (1, 11), (0, 12))
@@ -54,7 +55,7 @@ class FailedError(ArithmeticError):
 
 
 def _finite(values):
-    """Return the values; raises FailedError if one is not finite."""
+    """Return the values unchanged; raises FailedError if one is not finite."""
     if not np.isfinite(values).all():
         raise FailedError("NOT_FINITE")
     return values
@@ -85,11 +86,12 @@ class _Sites:
         self._known = {}
 
     def shape_of(self, parameter):
-        """Return the shape of the values of a parameter: () for one value."""
+        """Return the shape of a parameter: that of the sites, or () for a single value."""
         return self.sizes if parameter in AT_SITES else ()
 
     def shifted(self, values, *offset):
-        """Return the values at an offset from each site; beyond open ends they are arbitrary."""
+        """Return, for each site, the value at the site that lies at an offset from it; beyond open ends it is
+        arbitrary."""
         for axis, steps in enumerate(offset):
             if steps and OPEN[axis]:
                 last = self.sizes[axis] - 1
@@ -100,7 +102,10 @@ class _Sites:
         return values
 
     def present(self, *bounds):
-        """Return 1 where all sites from offset low to offset high exist, along each open axis, else 0."""
+        """Return 1 at sites whose neighbours from offset low to offset high along each axis exist, else 0.
+
+        bounds lists low and high for each axis. Neighbours beyond an open end do not exist.
+        """
         if bounds not in self._known:
             there = np.ones(self.sizes)
             for place, size, low, high in zip(self._positions, self.sizes, bounds[::2], bounds[1::2]):
@@ -110,7 +115,7 @@ class _Sites:
 
 
 def _advance(sites, rows, x, past):
-    """Make one step; raises FailedError. `past` is unused: nothing is predicted."""
+    """Return the state after one step from x; raises FailedError. `past` is unused: splittings need no predictors."""
     for part, row in SCHEDULE:
         for sweep in PARTS[part]:
             x = sweep(rows[row], x, sites)
@@ -118,7 +123,7 @@ def _advance(sites, rows, x, past):
 
 
 def _coefficients(sites, h):
-    """Return the coefficients of all flows of a step."""
+    """Return the coefficients of a step of size h, functions of h and the parameters: a row for each entry of TIMES."""
     with np.errstate(all="ignore"):
         rows = [_prepare(sites.parameters, t * h) for t in TIMES]
     if not all(np.isfinite(c).all() for row in rows for c in row):
@@ -140,7 +145,8 @@ def step(x, h, **parameters):
 
 
 def integrate(x0, h, steps, stride=1, **parameters):
-    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0 (DIM, *sizes).
+    """Return the states at steps 0, stride, 2*stride, ... and at the last step, shape (frames, DIM, *sizes), from x0
+    (DIM, *sizes).
 
     Raises ValueError for arguments that are not allowed, and StepError as soon as a step fails.
     """
@@ -171,7 +177,7 @@ def hamiltonian(x, **parameters):
 
 
 def casimirs(x, **parameters):
-    """Return the terms of the Casimirs at each site, (number of Casimirs, *sizes)."""
+    """Return the contribution of each site to each Casimir, (number of Casimirs, *sizes)."""
     x, sites = _started(x, parameters)
     return _casimirs(sites.parameters, x, sites)
 
