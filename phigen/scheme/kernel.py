@@ -1,4 +1,4 @@
-"""Kernels: the functions of a program that contain no loops and branches, as expression graphs.
+"""Kernels: the functions of a program without loops or branches, as expression graphs.
 
 `phigen.scheme.lowering` turns a kernel into a list of assignments.
 """

@@ -1,8 +1,9 @@
-"""Flows of noise in splittings: half a step before, and half a step after the flows of H. Header lines on noise.
+"""Noise in splittings: the flows of the noise sources run for half a step before and half a step after the flows of H.
+This module also has the header lines about noise.
 
-The increments of both halves are independent, so the mean of a step is exp(hN/2) exp(hA) exp(hN/2), with A the
-generator of the motion and N = ½ Σ X² that of the noise. Since the sources are also split symmetrically, the weak order
-is 2.
+The increments of the two halves are independent. So the mean of a step is exp(hN/2) exp(hA) exp(hN/2), where A is the
+generator of the flow of H, and N = ½ Σ X² the generator of the noise along the fields X. Since the order of the sources
+is reversed in the second half, the step is symmetric and has weak order 2.
 """
 
 from __future__ import annotations
@@ -22,18 +23,19 @@ from phigen.symbolic.symbols import increment
 
 
 def expect_no_adjoint(system: System, adjoint: bool) -> None:
-    """Raise `SpecError` if the transpose of a step with noise is requested."""
+    """Raise `SpecError` if a spec with noise requests gradients by the transpose of a step."""
     if system.noise and adjoint:
         raise SpecError([Diagnostic("adjoint is not offered with noise", system.locations.get(("noise",)))])
 
 
 def noise_facts(system: System, weak: int) -> Iterator[str]:
-    """Yield the lines about noise in the header of generated files."""
+    """Yield the lines about noise in the header of generated files; ``weak`` is the weak order of the method."""
     yield from noise_lines([s.name for s in system.noise], weak)
 
 
 def noise_lines(sources: Sequence[str], weak: int) -> Iterator[str]:
-    """Yield the header lines on sources of noise with these names."""
+    """Yield the header lines about noise sources with the names ``sources``; ``weak`` is the weak order of the
+    method."""
     if not sources:
         return
     names = ", ".join(sources)
@@ -42,7 +44,8 @@ def noise_lines(sources: Sequence[str], weak: int) -> Iterator[str]:
 
 
 def noise_flows(system: System) -> tuple[Flow, ...]:
-    """Return the flow of g for each source. Raises `SpecError` for a source whose flow is not elementary."""
+    """Return for each source of noise the flow of its Hamiltonian g. Raises `SpecError` if such a flow is not
+    elementary."""
     return tuple(_flow(system, source) for source in system.noise)
 
 
@@ -61,23 +64,25 @@ def _flow(system: System, source: Source) -> Flow:
 
 
 def driving_times(system: System) -> list[Expression]:
-    """Return the durations σ ΔW of the flows of the sources; the increment ΔW is one symbol."""
+    """Return for each source of noise the duration σ ΔW of its flow in half a step; ΔW is a single symbol for all
+    sources."""
     return [source.amplitude * symbol(increment(0)) for source in system.noise]
 
 
 def driven(system: System) -> list[Flow]:
-    """Return the flow of each source of noise over its duration σ ΔW, see `driving_times`.
+    """Return for each source of noise the flow of its Hamiltonian over the duration σ ΔW of half a step.
 
-    Raises `SpecError` for a flow that is not elementary.
+    Raises `SpecError` if such a flow is not elementary.
     """
     timed_flows = zip(noise_flows(system), driving_times(system), strict=True)
     return [replace(flow, increment=tuple(substitute(flow.increment, {TIME: time}))) for flow, time in timed_flows]
 
 
 def with_noise(schedule: Schedule, sources: int) -> Schedule:
-    """Return the schedule with the sources as the first parts, in order at the start of a step and reversed at its end.
+    """Return the schedule with the flows of the noise sources at the start of a step, and in reverse order at its end.
 
-    The first rows of ``times`` belong to the sources at the start, the last rows to those at the end.
+    The sources become the first parts. The first rows of ``times`` belong to their flows at the start, and the last
+    rows to their flows at the end.
     """
     parts = range(sources)
     rows = sources + len(schedule.times)

@@ -1,8 +1,10 @@
-"""Splitting methods for two parts with {V, {V, {V, T}}} = 0: Runge–Kutta–Nyström methods, and modified potentials.
+"""Splitting methods for H = T + V with {V, {V, {V, T}}} = 0: methods of Runge–Kutta–Nyström type, also with modified
+potentials.
 
-A step alternates flows of T and V, Φ_h = φ_{t_n h} ∘ … ∘ φ_{t_1 h}, with t_i = t_{n+1−i}. The condition leaves fewer
-order conditions than two arbitrary parts have. If V + κ{V, {V, T}} also has an elementary flow, each kick may have a
-multiple κ_i = m_i h². These are further unknowns of the order conditions (`phigen.splitting.kicks`).
+A step alternates flows of T and V: Φ_h = φ_{t_n h} ∘ … ∘ φ_{t_1 h} with t_i = t_{n+1−i}. Because of the condition, the
+times t_i need to satisfy fewer order conditions than for arbitrary T and V. If V + κ{V, {V, T}} has an elementary flow
+too, each flow of V (a kick) may use a multiple κ_i = m_i h². The m_i are further unknowns of the order conditions
+(`phigen.splitting.kicks`).
 """
 
 from __future__ import annotations
@@ -15,10 +17,11 @@ from phigen.scheme.alternation import Schedule
 
 @dataclass(frozen=True)
 class Nystrom:
-    """A Nyström method: the times t_i of all flows, in order, and the multiples m_i of modified kicks.
+    """A splitting method of Nyström type: the times t_i of its flows in order, and the ``multiples`` m_i of its kicks.
 
     ``kicks_first`` says whether a step begins with a flow of V. ``error`` is the Euclidean norm of the leading error,
-    in the basis of the Lie algebra of `tests/splitting/nystrom_algebra.py`, by which methods are compared.
+    by which methods are compared; its components are those in the basis of the Lie algebra in
+    `tests/splitting/nystrom_algebra.py`.
     """
 
     name: str
@@ -30,16 +33,16 @@ class Nystrom:
 
     @property
     def stages(self) -> int:
-        """The number of flows of the part that a step does not begin with."""
+        """The number of stages, each of which is a flow of the second part and a flow of the first part."""
         return len(self.times) // 2
 
     @property
     def kicks(self) -> int:
-        """The number of flows of V."""
+        """The number of flows of V in a step."""
         return self.stages + self.kicks_first
 
     def schedule(self) -> Schedule:
-        """Return the flows of a step; part 0 is the one that a step begins with."""
+        """Return the flows of a step; part 0 is the part with which a step begins."""
         multiples = []
         if self.multiples:
             kicks = iter(self.multiples)
@@ -50,16 +53,21 @@ class Nystrom:
 
 
 def _method(name: str, order: int, first: str, half: str, error: float, multiples: str = "") -> Nystrom:
-    """Return a method from its times up to the middle one, and the multiples of the kicks among them."""
+    """Return a symmetric method from the first half of its times and of the multiples of its kicks, with the middle
+    values.
+
+    ``first`` is T or V, the part with which a step begins.
+    """
     times = [Fraction(v) for v in half.split()]
     kicks = [Fraction(v) for v in multiples.split()]
-    middle_kicks = (len(times) - 1) % 2 != (first == "V")  # the middle flow, which occurs once, is a kick
+    middle_kicks = (len(times) - 1) % 2 != (first == "V")  # whether the middle flow, which is not repeated, is a kick
     mirrored = kicks[-2::-1] if middle_kicks else kicks[::-1]
     return Nystrom(name, order, first == "V", (*times, *times[-2::-1]), (*kicks, *mirrored), error)
 
 
-#: S. Blanes, P. C. Moan, Practical symplectic partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl.
-#: Math. 142 (2002): SRKN_6^b and SRKN_14^a. Newton's method added digits to the 15 published ones.
+#: Times of the methods SRKN_6^b and SRKN_14^a, by S. Blanes, P. C. Moan, Practical symplectic partitioned Runge–Kutta
+#: and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142 (2002). Newton's method added digits to the 15 published
+#: ones.
 _SRKN6B = """
     0.082984406417404976396007246036789421 0.245298957184271116624067925015978842
     0.396309801498368038617837686730772926 0.604872665711079915617327045447534800
@@ -77,10 +85,10 @@ _SRKN14A = """
     0.207305069056895744169370738047259668
 """
 
-#: Computed for phigen: Newton's method on the order conditions from many random starts. Free parameters were determined
-#: by least squares of the leading error, then by a random search for the least energy errors of four systems
-#: (Kowalevski top, Hénon–Heiles, Kepler, two coupled pendulums). All digits are from a last Newton iteration. The tests
-#: verify the conditions.
+#: Times and multiples of methods that were computed for phigen: Newton's method solved the order conditions from many
+#: random starts. Free parameters were determined by least squares of the leading error, then by a random search for the
+#: least energy errors of four systems (Kowalevski top, Hénon–Heiles, Kepler, two coupled pendulums). All digits are
+#: from a last Newton iteration. The tests verify the order conditions.
 _GRADIENT_3 = """
     0.080025653215254155070797714594342583 0.272898300356015957781728984549341217
     0.419974346784745844929202285405657417 0.454203399287968084436542030901317567
@@ -156,10 +164,10 @@ METHODS = (
     _method("nystrom", 8, "V", _NYSTROM_18, 7.83e-06),
 )
 
-#: The names of the Nyström methods.
+#: The names of the Nyström methods, each once.
 NAMES = tuple(dict.fromkeys(m.name for m in METHODS))
 
 
 def orders(name: str) -> list[int]:
-    """Return the orders of the methods of this name."""
+    """Return the orders for which there is a Nyström method with this name."""
     return sorted({m.order for m in METHODS if m.name == name})

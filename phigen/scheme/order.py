@@ -1,4 +1,4 @@
-"""The order of a method and the terms of the series that give it."""
+"""The order of a method, and the number of terms S_i of the generating function with which it has this order."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Order:
-    """The order of the method and the number of terms S_1 … S_k that give it."""
+    """The order of a method, and the number of ``terms`` S_1 … S_k of its generating function (for Gauss methods: of
+    its stages).
+
+    ``note`` tells the user if the order or the number of terms differs from what was asked for.
+    """
 
     order: int
     terms: int
@@ -15,10 +19,10 @@ class Order:
 
 
 def plan_order(order: int | None, terms: int | None, *, symmetric: bool) -> Order:
-    """Return the order and the number of terms, from the one of them that is not None.
+    """Return the order and the number of terms of a method, from one of the two; the other argument is None.
 
-    In a symmetric bi-realisation the even S_i vanish and the method is symmetric, so its order is even: S_1 … S_k with
-    k odd result in order k + 1. Otherwise S_1 … S_k result in order k.
+    In a symmetric bi-realisation the terms S_i with even i vanish, and the method is symmetric, so its order is even:
+    the terms S_1 … S_k with odd k give order k + 1. In any other bi-realisation S_1 … S_k give order k.
     """
     if terms is not None:
         if not symmetric:

@@ -1,9 +1,10 @@
-"""Transposes of sums over bonds or pairs of sites: each site collects the contributions of its bonds, as end a and as
-end b.
+"""Transposes of sums over the bonds or pairs of the sites of a lattice: each site collects its cotangents from its
+bonds.
 
-Often the sums at b are those at a up to a sign, as the forces between two sites are. The contribution to the site as b
-is then the same formula as its contribution as a, applied to the cotangents of the other site: a product of the Hessian
-of the pair's energy with one vector.
+A site is the end a of some bonds and the end b of others. Often the sum at b equals the sum at a up to its sign, as the
+forces between two sites do. Then the contribution that a site receives as end b is the formula of the end a, applied to
+the cotangents of the site at the other end. So one formula is sufficient: a product of the Hessian of the energy of a
+pair with one vector.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 _OTHER = {"a": "b", "b": "a"}
 
 
-#: The end, and the selection by colour, of the same bonds as seen from their other sites.
+#: The end of a bond, and the site that must have the colour of the sweep, as seen from the site at the other end.
 _OPPOSITE = {"": "", "a": "b", "b": "a"}
 _CHOSEN = {"": "", "here": "there", "there": "here"}
 
@@ -29,11 +30,13 @@ _CHOSEN = {"": "", "here": "there", "there": "here"}
 def transposed_at_ends(
     places: Mapping[str, tuple[str, str]], ends: Ends, opposite: Collection[str], transpose: Kernel, *, summed: bool
 ) -> list[tuple[str, Ends, Kernel]]:
-    """Return the loops that collect cotangents at a site: the end of the site, the bonds or pairs, and the kernel.
+    """Return the loops that collect cotangents at each site: the end at which the site lies, the bonds or pairs, and
+    the kernel.
 
-    Each site collects the cotangents that it receives, so that no two sites write to one place. If bonds are equal at
-    both ends, one loop is sufficient; its kernel also computes the sums if they are to be ``summed``. Otherwise one
-    loop treats the site as the end b, and reads the cotangents of other sites; a second loop treats it as the end a.
+    Each site collects the cotangents that it receives, so no two sites write to the same place. If the bonds of a site
+    are the same at both ends, there is one loop; its kernel also computes the sums themselves if they are to be
+    ``summed``. Otherwise there are two loops: the first treats the site as the end b and reads the cotangents of the
+    sites at a, the second treats the site as the end a.
     """
     if ends.of_all:
         combined = paired(places, ends.kernel, transpose, opposite)
@@ -48,9 +51,9 @@ def transposed_at_ends(
 
 
 def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Kernel:
-    """Return a kernel with only the cotangents of the site at this end.
+    """Return a transposed kernel with 0 in place of the cotangents that do not belong to the site at ``end``.
 
-    Cotangents of bonds and of shared values belong to the end b.
+    The cotangents of parameters of bonds and of shared values are computed for the end b only.
     """
     outputs = []
     for o in kernel.outputs:
@@ -64,11 +67,11 @@ def _at_end(ends: Mapping[str, tuple[str, str]], kernel: Kernel, end: str) -> Ke
 def paired(
     ends: Mapping[str, tuple[str, str]], kernel: Kernel, transpose: Kernel, opposite: Collection[str] = ()
 ) -> Kernel:
-    """Return the transpose of a kernel of bonds or pairs, with all contributions of one bond or pair to its site a.
+    """Return the transpose of a kernel of bonds or pairs that adds all contributions of a bond or pair to its site a.
 
-    ``ends`` maps each symbol to a field or parameter and an end. Parameters at bonds that are ``opposite`` have the
-    other sign as seen from b. Outputs for sums over all bonds or pairs, and for parameters at bonds, are to be summed
-    over all sites and their bonds or pairs.
+    ``ends`` maps each symbol to a pair: a field or parameter, and an end. The parameters of bonds in ``opposite`` have
+    the opposite sign as seen from b. The outputs for sums over the whole lattice, and for parameters of bonds, must be
+    summed over all sites and their bonds or pairs.
     """
     names = {place: s for s, place in ends.items()}
     exchanged = {s: symbol(names[base, _OTHER[end]]) for s, (base, end) in ends.items()}
@@ -101,7 +104,10 @@ def paired(
 
 
 def _signs(sums: Sequence[Expression], exchanged: Mapping[str, Expression]) -> list[int]:
-    """Return the factors, 1 or -1, from the sums at a to those at b; an empty list unless all are proved."""
+    """Return the factors, 1 or −1, by which the ``sums`` at the end b of a bond differ from those at the end a.
+
+    ``exchanged`` has the symbols after an exchange of the ends. The list is empty unless every factor is proved.
+    """
     signs = []
     for value, other_sum in zip(sums, substitute(sums, exchanged), strict=True):
         proved_signs = (sign for sign in (-1, 1) if decide_zero("", [("", value - sign * other_sum)]).verdict == PROVED)

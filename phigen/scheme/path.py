@@ -1,8 +1,9 @@
-"""The path ṁ = π(m)p as Taylor recurrences, which a solver for Karasev's bi-realisation follows at run time.
+"""The path ṁ = π(m)p as recurrences for Taylor coefficients, by which a solver follows it for Karasev's bi-realisation.
 
-Each node of the graph of π(m)p is a series in the time along the path. The coefficient of order k of a node follows
-from those of its arguments up to order k (sums, products) or of the node itself below k (powers, functions). So the
-coefficients of m are computed one order at a time, as many as the size of p requires.
+Each node of the graph of π(m)p is a Taylor series in the time along the path. For sums and products, the coefficient of
+order k of a node follows from the coefficients of its arguments up to order k. For powers and functions it also needs
+the lower coefficients of the node itself. So the coefficients of m are computed one order after another, as many as the
+size of p requires.
 """
 
 from __future__ import annotations
@@ -21,11 +22,14 @@ from phigen.symbolic.taylor import closure
 
 @dataclass(frozen=True)
 class ConvolutionTerm:
-    """A sum over the orders j of products of coefficients of the series ``a`` and ``b``; ``kind`` is one of:
+    """A sum over j of products of Taylor coefficients a_j and b_{k−j} of two series, given by their numbers ``a`` and
+    ``b``.
 
-    ``product``: Σ_{j=0}^{k} a_j b_{k−j}
-    ``chain``: Σ_{j=1}^{k} (j/k) a_j b_{k−j}, for b = ∂f/∂a
-    ``power``: Σ_{j=1}^{k} (r j/k − (k−j)/k) a_j b_{k−j}, for b = aʳ, r = ``exponent``
+    ``kind`` is one of these:
+
+    - ``product``: Σ_{j=0}^{k} a_j b_{k−j}
+    - ``chain``: Σ_{j=1}^{k} (j/k) a_j b_{k−j}, where b is the series of ∂f/∂a for a function f
+    - ``power``: Σ_{j=1}^{k} (r j/k − (k−j)/k) a_j b_{k−j}, for b = aʳ with r = ``exponent``
     """
 
     kind: str
@@ -36,11 +40,13 @@ class ConvolutionTerm:
 
 @dataclass(frozen=True)
 class NodeSeries:
-    """The series of one node: its value at order 0, ``first``, and the rule for orders k ≥ 1.
+    """The Taylor series of a node: its value ``first`` at order 0, and the rule for its coefficients of the orders k ≥
+    1.
 
-    ``linear`` lists pairs (series, factor), each of which contributes factor · a_k; ``terms`` are sums of products over
-    orders. ``divisor`` is the series whose value at order 0 divides the terms (for powers), or None. Symbols ``s:i`` in
-    expressions are the values at order 0 of series i.
+    The coefficient is a sum of two kinds of terms. ``linear`` lists pairs of a series a and a factor, each of which
+    contributes factor · a_k. ``terms`` are sums of products of coefficients; for powers they are divided by the value
+    at order 0 of the series with the number ``divisor``. In expressions, the symbol ``s:i`` is the value of series i at
+    order 0.
     """
 
     first: Expression
@@ -51,9 +57,11 @@ class NodeSeries:
 
 @dataclass(frozen=True)
 class Recurrences:
-    """A path as recurrences: series 0 … n−1 are the coordinates m_i, ``slopes[i]`` is the series of ṁ_i.
+    """The Taylor series of a path: series 0 … n−1 are the coordinates m_i, and series number ``slopes[i]`` is that of
+    ṁ_i.
 
-    ``fixed`` are values that are constant along a path (functions of p and the coefficients), with the symbols ``f:i``.
+    ``fixed`` are values that are constant along a path, functions of p and of the coefficients; their symbols are
+    ``f:i``.
     """
 
     series: tuple[NodeSeries, ...]
@@ -63,7 +71,7 @@ class Recurrences:
 
 @dataclass(frozen=True)
 class SeriesEntry:
-    """An entry of a matrix that is not 0, and its series."""
+    """An entry of a matrix that is not 0 everywhere: its row, its column, and the number of its Taylor series."""
 
     row: int
     column: int
@@ -72,11 +80,11 @@ class SeriesEntry:
 
 @dataclass(frozen=True)
 class PathSlopes:
-    """Recurrences for the derivatives of a path with respect to its start and to p.
+    """Recurrences for the derivatives of a path with respect to its start, to p, and to some coefficients c.
 
-    They solve V̇ = J V + (0, π) for V = (∂m, ∂_p m). ``series`` and ``fixed`` continue those of the path. ``jacobian``
-    is J = ∂(π(m)p)/∂m, ``tensor`` is π(m), and ``along`` is ∂(π(m)p)/∂c, a column for each differentiated coefficient
-    c: Ẇ = J W + ∂(π(m)p)/∂c.
+    The derivatives V = (∂m/∂m_0, ∂m/∂p) satisfy V̇ = J V + (0, π) with J = ∂(π(m)p)/∂m; the derivatives W with respect
+    to c satisfy Ẇ = J W + ∂(π(m)p)/∂c. ``jacobian`` has the entries of J, ``tensor`` those of π(m), and ``along`` those
+    of ∂(π(m)p)/∂c, a column for each c. ``series`` and ``fixed`` continue the lists of the path.
     """
 
     series: tuple[NodeSeries, ...]
@@ -87,13 +95,16 @@ class PathSlopes:
 
 
 def build_path(system: System, coefficients: Coefficients) -> Recurrences:
-    """Return the recurrences of ṁ = π(m)p. Values that depend on parameters only are added to the table."""
+    """Return the recurrences of the path ṁ = π(m)p. Values that depend on parameters only are added to
+    ``coefficients``."""
     return path_of(system.coordinates, _flow(system, coefficients))
 
 
 def build_slopes(system: System, coefficients: Coefficients, variables: Sequence[str] = ()) -> PathSlopes:
-    """Return the recurrences for derivatives of the path of `build_path`, also with respect to the coefficients
-    ``variables``."""
+    """Return the recurrences for the derivatives of the path ṁ = π(m)p with respect to its start and to p.
+
+    They also give the derivatives with respect to the coefficients named in ``variables``.
+    """
     n, flow = system.dimension, _flow(system, coefficients)
     columns = [derivatives(flow, c) for c in system.coordinates]
     jacobian = [columns[j][i] for i in range(n) for j in range(n)]
@@ -104,7 +115,7 @@ def build_slopes(system: System, coefficients: Coefficients, variables: Sequence
 
 
 def used_by_path(system: System, coefficients: Coefficients) -> list[str]:
-    """Return the coefficients that π(m)p depends on."""
+    """Return the symbols of the coefficients on which π(m)p depends."""
     symbols = set(symbols_of(*_flow(system, coefficients)))
     return [s for s in coefficients.slots if s in symbols]
 
@@ -115,12 +126,14 @@ def _flow(system: System, coefficients: Coefficients) -> list[Expression]:
 
 
 def path_of(coordinates: Sequence[str], flow: Sequence[Expression]) -> Recurrences:
-    """Return the recurrences of ṁ = flow(m, p), where p is constant along the path."""
+    """Return the recurrences of the path ṁ = f, where ``flow`` are the components of f in terms of m and of
+    constants."""
     return _PathBuilder(coordinates).path(_chains(flow))
 
 
 def _chains(roots: Sequence[Expression]) -> list[Expression]:
-    """Return expressions with positive integer powers written as products; other powers have a recurrence."""
+    """Return the expressions with positive integer powers written as products; only other powers need a recurrence of
+    their own."""
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if not e.args:
@@ -144,7 +157,7 @@ class _PathBuilder:
 
     def path(self, flow: Sequence[Expression]) -> Recurrences:
         self._include(flow)
-        slopes = tuple(self._as_series(f) for f in flow)  # adds further series
+        slopes = tuple(self._as_series(f) for f in flow)  # may append to self.series
         return Recurrences(tuple(self.series), slopes, tuple(self.fixed))
 
     def slopes(self, roots: Sequence[Expression]) -> PathSlopes:
@@ -161,7 +174,7 @@ class _PathBuilder:
 
     def _include(self, roots: Sequence[Expression]) -> None:
         order = closure(roots)
-        self._keep += order  # nodes are identified by id, so they must not be deleted
+        self._keep += order  # keeps the nodes alive, since they are identified by id
         self._in_motion |= self._moving(order)
         fresh = [e for e in order if id(e) in self._in_motion and id(e) not in self._series_of]
         for e in fresh:
@@ -169,8 +182,8 @@ class _PathBuilder:
                 self._series_of[id(e)] = self.coordinates.index(e.value)
             else:
                 self._series_of[id(e)] = len(self.series)
-                # The series of a function refers to that of its derivative, which may come later: this place is filled
-                # below.
+                # This entry is a placeholder, replaced below: the rule of a function refers to the series of its
+                # derivative, which may have a later number.
                 self.series.append(NodeSeries(symbol("pending")))
         for e in fresh:
             if e.args:
@@ -184,7 +197,8 @@ class _PathBuilder:
         return moving
 
     def _as_series(self, e: Expression) -> int:
-        """Return the series of a node; a constant becomes a series without further terms."""
+        """Return the number of the series of a node; a value that is constant along the path becomes a series with
+        order 0 only."""
         if id(e) not in self._series_of:
             value = self._value(e)
             self._series_of[id(e)] = len(self.series)
@@ -192,7 +206,7 @@ class _PathBuilder:
         return self._series_of[id(e)]
 
     def _value(self, e: Expression) -> Expression:
-        """Return the value of a node at order 0, as a symbol or a number."""
+        """Return the value of a node at order 0 of its series: the symbol ``s:i`` or ``f:i``, or a number."""
         if id(e) in self._series_of:
             return symbol(Symbol(SERIES, self._series_of[id(e)]))
         if not e.args:

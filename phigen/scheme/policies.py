@@ -1,8 +1,8 @@
-"""Numerical policies of the runtimes: convergence of a solve, range of a predictor, search for a gauge.
+"""Numerical constants of the runtimes in all languages: when an iteration ends, how far a predictor reaches, how a
+gauge is searched.
 
-Each number is defined here, once, with its reason. It is printed as a named constant into C, JavaScript and NumPy
-(`phigen.targets.policies`). Constants of a single runtime, such as blocks of steps in C, are in the files of that
-runtime.
+Each constant is defined once, with its reason, and is printed into C, JavaScript and NumPy (`phigen.targets.policies`).
+Constants that only one runtime has, such as the number of steps in a block in C, are in the files of that runtime.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, fields
 
 @dataclass(frozen=True)
 class PolicyConstant:
-    """A named number of a policy; ``about`` is the comment in generated code: its meaning, unit or reason."""
+    """A named constant of a runtime; ``about`` is its comment in generated code, with its meaning, unit or reason."""
 
     name: str
     value: int | float
@@ -22,41 +22,44 @@ class PolicyConstant:
 
 @dataclass(frozen=True)
 class Policy:
-    """Numbers that belong together: the fields of a subclass, each defined by `number` or `count`."""
+    """Base class for groups of constants that belong together; subclasses define each constant as a field."""
 
     def constants(self) -> Iterator[PolicyConstant]:
-        """Yield the numbers, with their names in generated code."""
+        """Yield the constants of the group, with the names that they have in generated code."""
         for constant in fields(self):
             yield PolicyConstant(constant.name.upper(), getattr(self, constant.name), constant.metadata["about"])
 
 
 def number(value: float, description: str) -> float:
-    """Return the default of a field of a policy that is a real number."""
+    """Return the dataclass field of a real constant; ``description`` becomes its comment in generated code."""
     return field(default=float(value), metadata={"about": description})
 
 
 def count(value: int, description: str) -> int:
-    """Return the default of a field of a policy that is a whole number."""
+    """Return the dataclass field of an integer constant; ``description`` becomes its comment in generated code."""
     return field(default=value, metadata={"about": description})
 
 
 @dataclass(frozen=True)
 class StartPolicy(Policy):
-    """The first evaluation of coefficients, which checks parameters before the step size is known."""
+    """The first evaluation of the coefficients, which checks the values of parameters before a step size is known."""
 
     probe_step: float = number(1e-100, "a step size for which coefficients are finite")
 
 
 @dataclass(frozen=True)
 class MeasurePolicy(Policy):
-    """The scale of a correction of y; it is 0 for coordinates that keep their sign and may differ much in size."""
+    """The size of a correction of y, the solution of the implicit equation, relative to the components of y.
+
+    For coordinates that keep their sign and may differ much in size, the floor is 0.
+    """
 
     floor: float = number(1e-6, "smaller components of y count as this fraction of the largest")
 
 
 @dataclass(frozen=True)
 class NewtonPolicy(Policy):
-    """Newton's method for the point of an implicit step; its tolerance is in `InnerSolve`."""
+    """Newton's method for the implicit equation of a step; its tolerance is in `InnerSolve`."""
 
     nearly_solved: float = number(1e-8, "a correction below this may be rounding")
     shrinking: float = number(0.25, "ratio of successive corrections below NEARLY_SOLVED that shows rounding")
@@ -64,10 +67,10 @@ class NewtonPolicy(Policy):
 
 @dataclass(frozen=True)
 class PathPolicy(Policy):
-    """The solve of a step along paths dm/dt = π(m)p, and the Taylor series of a path.
+    """The solution of the equation for p in a step along paths dm/dt = π(m)p, and the Taylor series of a path.
 
-    ``longest_path`` and ``most_pieces`` were measured on the corpus: steps that take more pieces usually have an
-    error as large as the state.
+    ``longest_path`` and ``most_pieces`` were measured on the corpus: steps that need more pieces of Taylor series
+    usually have errors as large as the state.
     """
 
     longest_path: int = count(128, "largest number of pieces of a path, a power of 2")
@@ -90,7 +93,8 @@ class PathPolicy(Policy):
 
 @dataclass(frozen=True)
 class GaussPolicy(Policy):
-    """Sweeps over the stages of a Gauss method."""
+    """Fixed-point sweeps over the stages of a Gauss method: when they end, when a step fails, how predictors are
+    compared."""
 
     most_rising: int = count(
         3, "growing changes after transients: with more sweeps of this kind, the step is too large"
@@ -110,7 +114,8 @@ class GaussPolicy(Policy):
 
 @dataclass(frozen=True)
 class PredictorPolicy(Policy):
-    """Starting values of an inner solve, from those of earlier steps by backward differences."""
+    """Starting values for the iteration of an implicit step, extrapolated from earlier steps by backward
+    differences."""
 
     reach: float = number(4.0, "largest distance from the last value, relative to it")
     differences: int = count(9, "number of stored differences; higher ones would amplify rounding errors")
@@ -118,7 +123,7 @@ class PredictorPolicy(Policy):
 
 @dataclass(frozen=True)
 class PlausibilityPolicy(Policy):
-    """Criteria that reject solutions of an implicit step far from the motion: distant ones, with another energy."""
+    """Criteria that reject a spurious solution of an implicit step: one far from the state, with another energy."""
 
     plausible: float = number(1.5, "accepted length of steps, relative to state and motion")
     max_energy_change: float = number(0.5, "largest relative change of energy in longer steps")
@@ -126,7 +131,7 @@ class PlausibilityPolicy(Policy):
 
 @dataclass(frozen=True)
 class GaugeSearch(Policy):
-    """The search for the multiples of Casimirs whose subtraction from H minimises the leading error."""
+    """The search for the multiples of Casimirs whose subtraction from H minimises the leading error of a step."""
 
     samples: int = count(32, "number of states along a short piece of the trajectory")
     degree: int = count(6, "S_3 is cubic in H, so the square of the error is of degree six in each multiple")
@@ -143,7 +148,8 @@ class GaugeSearch(Policy):
 
 @dataclass(frozen=True)
 class TangentPolicy(Policy):
-    """The additional solve for the point of a step, to the last bit, before its derivative is computed."""
+    """The additional Newton iterations that solve the implicit equation to the last bit before a step is
+    differentiated."""
 
     tangent_solved: float = number(1e-15, "a correction below this is rounding")
     tangent_nearly_solved: float = number(1e-10, "a correction below this that no longer shrinks is rounding too")
@@ -152,7 +158,7 @@ class TangentPolicy(Policy):
 
 @dataclass(frozen=True)
 class GaussTangentPolicy(Policy):
-    """Sweeps for the linear equations of the derivatives of Gauss stages."""
+    """Sweeps that solve the linear equations for the derivatives of the stages of a Gauss step."""
 
     tangent_solved: float = number(1e-17, "a relative change below this is rounding;")
     tangent_nearly_solved: float = number(1e-13, "a residual below this may be rounding: see TANGENT_SHRINKING")
@@ -163,7 +169,7 @@ class GaussTangentPolicy(Policy):
 
 @dataclass(frozen=True)
 class GaussAdjointPolicy(Policy):
-    """Sweeps of the transposed equations of Gauss stages."""
+    """Sweeps that solve the transposed linear equations of the stages of a Gauss step, for gradients."""
 
     adjoint_solved: float = number(1e-17, "largest expected change by a further sweep, relative to the cotangents")
     adjoint_stalled: float = number(0.8, "ratio of successive changes from which on sweeps do not help")
@@ -174,7 +180,7 @@ class GaussAdjointPolicy(Policy):
 
 @dataclass(frozen=True)
 class PathTangentPolicy(Policy):
-    """The Taylor series of a path with its variation."""
+    """The Taylor series of a path together with its variation, for the derivatives of a step."""
 
     tangent_negligible: float = number(1e-18, "terms that rounding hides in their sum, in sizes of start and sum")
     tangent_rounded_slope: float = number(
@@ -184,7 +190,7 @@ class PathTangentPolicy(Policy):
 
 @dataclass(frozen=True)
 class LatticeSweepPolicy(Policy):
-    """Sweeps over a lattice that solve the equation of a stage of a series."""
+    """Sweeps over a lattice that solve the implicit equation of a stage, for steps with a generating function."""
 
     differences: int = count(4, "number of differences in the predictor of a stage")
     patience: int = count(10, "sweeps after which slow convergence is left to Newton's method")
@@ -197,7 +203,8 @@ class LatticeSweepPolicy(Policy):
 
 @dataclass(frozen=True)
 class LatticeNewtonPolicy(Policy):
-    """Newton's method for a stage for which sweeps do not converge, with linear equations in Krylov spaces."""
+    """Newton's method for a stage on a lattice whose sweeps converge slowly; Krylov methods solve its linear
+    equations."""
 
     directions: int = count(24, "dimension of the Krylov space of a correction")
     solved: float = number(1e-6, "relative residual at which the iteration for a correction ends")
@@ -207,14 +214,14 @@ class LatticeNewtonPolicy(Policy):
 
 @dataclass(frozen=True)
 class LatticeTangentPolicy(Policy):
-    """The equation of a tangent vector of a lattice, solved by corrections."""
+    """The linear equation for a tangent vector of a step of a lattice, solved by iterative corrections."""
 
     carried: float = number(2.0**-54, "a relative residual of a tangent vector below this is rounding")
     nearly_carried: float = number(1e-11, "a residual below this that no longer shrinks is rounding too")
     carried_shrinking: float = number(0.5, "a residual shrinks if below this fraction of the one before")
 
 
-#: The policies of all runtimes by the names of the files that hold their constants.
+#: The groups of constants of all runtimes, by the name of the file with their definitions in generated code.
 POLICIES: dict[str, Policy] = {
     "start_policy": StartPolicy(),
     "measure_policy": MeasurePolicy(),

@@ -1,7 +1,7 @@
-"""The program: the representation of a solver that targets print.
+"""The program: the representation of a solver from which targets print source code.
 
-A `Program` has a step (`phigen.scheme.steps`), whose kernels are straight-line functions, a description, and further
-kernels such as observables.
+A `Program` has a step (`phigen.scheme.steps`), whose kernels are functions without loops or branches. It also has a
+description, and kernels that are not part of a step, such as those of observables.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from phigen.symbolic.symbols import LEVEL
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
-#: Precision of single-precision code in which functions of the library have one name for all types, as on devices.
+#: Value of the precision option for single-precision code in languages where a library function has one name for all
+#: types, as in code for graphics cards.
 OVERLOADED = "overloaded float"
 
 
 @dataclass(frozen=True)
 class About:
-    """Content of the header of a generated file: ``facts`` are its lines, ``operations`` the operation counts of a
-    step."""
+    """Content of the header of generated files: ``facts`` are its lines; ``operations`` has the number of operations of
+    a step by kind."""
 
     title: str = ""
     license: str = "0BSD"
@@ -47,10 +48,10 @@ class About:
 
 @dataclass(frozen=True)
 class Observables:
-    """The Hamiltonian, the Casimirs, the vector field, and the observables of the spec, if there are any.
+    """Kernels of the Hamiltonian, the Casimirs, the vector field, and the ``named`` observables of the spec.
 
-    For lattices, ``named`` has the densities of observables that ``reductions`` turn into numbers. ``at_sites`` has the
-    observables that are fields; their names are ``fields``.
+    On a lattice, ``named`` computes densities at a site, which the ``reductions`` combine into numbers. ``at_sites``
+    computes the observables that are fields; ``fields`` has their names.
     """
 
     energy: Kernel
@@ -69,7 +70,10 @@ class Observables:
 
 @dataclass(frozen=True)
 class FreeGauge:
-    """The Casimirs whose multiples the solver chooses for each trajectory, and the kernels for the choice."""
+    """The Casimirs whose multiples the solver chooses for each trajectory, and two kernels for this choice.
+
+    ``guide`` is the error vector π∇S_3; ``products`` are the scalar products of the gradients of H and of the Casimirs.
+    """
 
     casimirs: tuple[str, ...]
     guide: Kernel
@@ -78,10 +82,11 @@ class FreeGauge:
 
 @dataclass(frozen=True)
 class Monitor:
-    """Steps of equal size in τ: ``rate`` is dt/dτ at a state, ``elapsed`` the time of a step (at its point y).
+    """Kernels of a monitored solver, whose steps have equal size in τ.
 
-    In a splitting the kernels of flows return their time, and ``elapsed`` is None. ``level`` is the gradient of H, on
-    which e depends, if the transpose of steps was requested.
+    ``rate`` is dt/dτ at a state. ``elapsed`` is the physical time of a step, as a function of the solution y of its
+    implicit equation; in a splitting it is None, since the kernels of the flows return their time. ``level`` is the
+    gradient of H, for the transpose of the energy level e = −H(x₀), if gradients were requested.
     """
 
     rate: Kernel
@@ -89,17 +94,18 @@ class Monitor:
     level: Kernel | None = None
 
 
-#: Largest normal variate; larger ones are truncated, so that no rare one makes a step impossible. One pair in 7e7 is
-#: larger; the truncation reduces the variance by 1.5e-8.
+#: Largest absolute value of a normal variate; larger ones are set to this value, so that no rare variate makes a step
+#: impossible. One pair of variates in 7e7 is affected, and the variance decreases by 1.5e-8.
 MAX_NORMAL_VARIATE = 6.0
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Sources of noise by name. Each source has ``parts`` increments in a step, independent and identically
-    distributed.
+    """The sources of noise by name. Each source has ``parts`` independent increments ΔW in a step, with the same
+    distribution.
 
-    ``fields`` is the kernel of σπ∇g of all sources; None for lattices, where each site has separate noise.
+    ``fields`` is the kernel of the vector fields σπ∇g of all sources. It is None for lattices, where each site has
+    independent noise.
     """
 
     sources: tuple[str, ...]
@@ -108,7 +114,7 @@ class Noise:
 
     @property
     def draws(self) -> int:
-        """The number of increments in a step."""
+        """The number of noise increments that a step takes."""
         return self.parts * len(self.sources)
 
 
@@ -122,13 +128,15 @@ class Modified:
 
 @dataclass(frozen=True)
 class Attitude:
-    """Kernels of the group elements whose action on x is a step: one for each stage, or one for each flow.
+    """Kernels of the group elements whose action on x is a step: one element for each stage, or for each flow of a
+    splitting.
 
-    ``turn`` is the element of an implicit stage as a function of the solved y, ``along`` as a function of p. All
-    elements are returned minus 1. For exp(P) of a matrix P, these kernels return the covector p of P and a bound for
-    the square of its size; ``exponential`` is exp(P) − 1 for a size of at most 1/2. ``turns`` are the flows of a
-    splitting, each with the product of the elements of the step up to this flow. ``rate`` is the gradient of the
-    Casimirs that were subtracted from H: they rotate the body, but do not change x.
+    All elements are returned minus 1. ``turn`` is the element of an implicit stage as a function of y, the solution of
+    its equation; ``along`` is the element of a step along a path as a function of the covector p. If elements are
+    matrices exp(P), these two kernels return the components p of P and a bound for the square of the size of P, and
+    ``exponential`` computes exp(P) − 1 for a size of at most 1/2. ``turns`` has, for each flow of a splitting, its
+    increments and the product of the elements of the step up to this flow. ``rate`` is the gradient of the Casimirs
+    that were subtracted from H: they rotate the body, but do not change x.
     """
 
     group: Group
@@ -141,18 +149,21 @@ class Attitude:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """The shape of an attitude as an array."""
+        """The shape of an attitude as an array: (rows, rows) for a matrix, (4,) for a quaternion."""
         rows = self.group.rows
         return (rows, rows) if rows else (4,)
 
     @property
     def quaternion(self) -> bool:
-        """Whether an element is a single quaternion, without matrices and translations."""
+        """Whether an attitude is a quaternion alone: neither a matrix nor a quaternion with a translation."""
         return not (self.group.matrices or self.group.translation)
 
     @property
     def lengthened(self) -> bool:
-        """Whether the quaternion of a step must be normalised; this is so for products of the elements of flows."""
+        """Whether the quaternion of a step must be normalised.
+
+        The elements of flows may have any length, so this is so in splittings.
+        """
         return bool(self.turns) and self.quaternion
 
     @property
@@ -163,9 +174,11 @@ class Attitude:
 
 @dataclass(frozen=True)
 class StackBound:
-    """Bytes of stack of the longest chains of calls, measured with a ``compiler`` and its flags.
+    """Bytes of stack of the longest chains of calls in a generated C solver, measured with a ``compiler`` and its
+    flags.
 
-    The chains start in ``init`` or in ``step``; ``longest`` is the largest value of all functions.
+    ``init`` and ``step`` are the values for calls of these two functions; ``longest`` is the largest value over all
+    functions.
     """
 
     compiler: str
@@ -176,16 +189,16 @@ class StackBound:
 
 @dataclass(frozen=True)
 class Program:
-    """A solver, ready to be printed.
+    """A solver, with everything that a target needs to print it.
 
-    A step of size h is a composition: one ``step`` of size f h for each f in ``fractions``. ``time`` is the name of t
-    if H depends on the time, else "". ``pushed`` are the Casimirs that forces change. ``extras`` are the requested
-    parts of the code other than the step; ``observed`` has the names of the observables of the spec.
+    A step of size h is a composition: it makes one ``step`` of size f h for each f in ``fractions``. ``time`` is the
+    name of the time if H depends on it, else "". ``pushed`` are the Casimirs that forces change. ``extras`` says which
+    parts of the code were requested in addition to the step. ``observed`` has the names of the observables of the spec.
 
-    ``lanes`` requests C that makes several steps or members at once; ``profile`` (``fast``, ``small``) says whether the
-    C is optimised for speed or for size. ``compensated`` requests compensated sums over the steps of a lattice that is
-    split. ``truncated`` says that a step is a Poisson map only up to its truncation error. ``stack`` is the measured
-    stack that the header of the C states.
+    ``lanes`` requests C that makes several steps, or steps of several members of an ensemble, in SIMD lanes.
+    ``profile`` (``fast``, ``small``) says whether the C is optimised for speed or for size. ``compensated`` requests
+    compensated sums over the steps of a lattice with a splitting. ``truncated`` says that a step is a Poisson map only
+    up to its truncation error. ``stack`` is the measured use of stack, which the header of the C states.
     """
 
     name: str
@@ -215,7 +228,7 @@ class Program:
 
     @property
     def version(self) -> str:
-        """The version of phigen that made this program."""
+        """The version of phigen with which this program was made."""
         return __version__
 
     @property
@@ -224,39 +237,44 @@ class Program:
         return len(self.coordinates)
 
     def offers(self, part: str) -> bool:
-        """Whether the code contains a part of `phigen.spec.names.PARTS`, if that part applies to the system."""
+        """Whether the generated code contains a part of `phigen.spec.names.PARTS`, provided that the part applies to
+        the system."""
         return self.extras.offers(part, self.profile)
 
     @property
     def single(self) -> bool:
-        """Whether the C computes in single precision."""
+        """Whether the generated C computes in single precision."""
         return self.extras.real != "double"
 
     @property
     def searches_gauge(self) -> bool:
-        """Whether the solver searches for the gauge of a trajectory, instead of computing it by a formula."""
+        """Whether the solver searches the gauge of a trajectory on sample states, instead of computing it by a
+        formula."""
         return self.gauge is not None and self.offers("gauge-search")
 
     @property
     def choice(self) -> tuple[Kernel, ...]:
-        """The kernels with which the gauge of a trajectory is chosen."""
+        """The kernels by which the solver chooses the multiples of Casimirs for a trajectory."""
         guide = (self.gauge.guide,) if self.gauge and self.searches_gauge else ()
         return (*guide, *((self.gauge.products,) if self.gauge else ()))
 
     @property
     def midpoints(self) -> tuple[float, ...]:
-        """The middles of the stages, as fractions of the step."""
+        """The times in the middle of the stages of a step, as fractions of the step."""
         stage_ends = [Fraction(0), *accumulate(Fraction(f) for f in self.fractions)]
         return tuple(float((a + b) / 2) for a, b in pairwise(stage_ends))
 
     @property
     def is_monitored(self) -> bool:
-        """Whether steps are equal in τ, not in the time."""
+        """Whether steps have equal size in τ, the time of a monitor, instead of in the physical time."""
         return self.monitor is not None or bool(self.step.swept and self.step.swept.rates)
 
     @property
     def held(self) -> tuple[str, ...]:
-        """The quantities with a constant value for each trajectory: the Casimirs with a chosen multiple, or e."""
+        """The names of the quantities that have a constant value for each trajectory.
+
+        These are the Casimirs whose multiples the solver chooses or, for a monitored system, the energy level e.
+        """
         return (LEVEL.kind,) if self.monitor else self.gauge.casimirs if self.gauge else ()
 
     @property

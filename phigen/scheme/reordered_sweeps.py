@@ -1,4 +1,5 @@
-"""Sharing of loops between sweeps: parts of H that differ only by a permutation of the fields use one loop."""
+"""Sharing of loops between sweeps over a lattice: parts of H that differ only by a permutation of the fields use one
+loop."""
 
 from __future__ import annotations
 
@@ -13,12 +14,15 @@ from phigen.symbolic.expression import natural_key, substitute, symbol
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Largest number of fields of a site for which permutations are tried: 3 fields have 6 orders.
+#: Largest number of fields of a site for which permutations of the fields are tried: 3 fields have 6 orders.
 MOST_FIELDS = 3
 
 
 def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """Yield the other orders of some fields, cyclic ones first; nothing for more than `MOST_FIELDS` fields."""
+    """Yield all orders of the ``fields`` except the given one, cyclic permutations first.
+
+    Nothing is yielded for more than `MOST_FIELDS` fields.
+    """
     original = tuple(fields)
     round_ = [original[k:] + original[:k] for k in range(1, len(original))]
     permuted = dict.fromkeys([*round_, *permutations(original)]) if len(original) <= MOST_FIELDS else ()
@@ -26,9 +30,10 @@ def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
 
 
 def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str]) -> dict[str, str]:
-    """Return the renaming of noise increments that belongs to an order of the fields.
+    """Return the renaming of the symbols of noise increments that belongs to an exchange of the ``fields`` by
+    ``order``.
 
-    It is empty unless each field has exactly one source of noise.
+    The renaming is empty unless each field has exactly one source of noise.
     """
     if len(sites.increments) != len(order):
         return {}
@@ -37,10 +42,10 @@ def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str])
 
 
 def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str, ...], float]]:
-    """Yield other forms of the sums: with permuted parameters at bonds, and with bonds in the opposite direction.
+    """Yield equivalent forms of the sums over bonds: with permuted parameters of bonds, and with all bonds reversed.
 
-    The direction is reversed only if all contributions are odd in it. Each item is the sums, the order of the
-    parameters (() if unchanged), and the sign 1 or -1.
+    Each item consists of the sums, the order of the parameters (() if it is unchanged), and a sign. Bonds are reversed,
+    with the sign −1, only if it is proved that every contribution changes its sign with the direction of the bond.
     """
     loops = over_ends(gather)
     if len(loops) != 1 or not loops[0][1]:
@@ -63,16 +68,15 @@ def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str
 
 
 def _signed(kernel: Kernel, sign: float) -> Kernel:
-    """Return the kernel, with negated values if ``sign`` is negative."""
+    """Return the kernel with its values negated if ``sign`` is negative, else unchanged."""
     values = tuple(-e if sign < 0 else e for e in kernel.roots)
     return replace(kernel, outputs=(Output(kernel.outputs[0].name, values),))
 
 
 def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Sweep) -> Sweep | None:
-    """Return a sweep with its fields renamed: each field of ``order`` becomes the field of ``fields`` at the same
-    place.
+    """Return a sweep with renamed fields: the field ``order[k]`` becomes the field ``fields[k]``.
 
-    None if the result would read neighbours that no sweep reads.
+    Returns None if the renamed sweep would read a neighbour for which the lattice has no symbol.
     """
     into = dict(zip(order, fields, strict=True))
     into |= {old_symbol: new_symbol for new_symbol, old_symbol in turned_increments(sites, fields, order).items()}
@@ -100,7 +104,8 @@ def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Swe
 
 
 def _renamed(kernel: Kernel, names: Mapping[str, str], places: Sequence[int] = ()) -> Kernel:
-    """Return the kernel with renamed symbols, and its values in the order of ``places``."""
+    """Return the kernel with its symbols renamed by ``names``; its values are permuted to the order of ``places``, if
+    given."""
     values = substitute(kernel.roots, {old_name: symbol(new_name) for old_name, new_name in names.items()})
     inputs = {
         key: tuple(sorted((names.get(s, s) for s in symbols), key=natural_key))

@@ -1,6 +1,6 @@
-"""Flows over the time −h, written term by term: terms odd in h change their sign, even terms do not.
+"""Formulas of a flow over the time −h, from those over h: each value that is odd in h changes its sign.
 
-So the inverse of a flow can share sines, exponentials and forces with the transpose of the flow.
+In this form the inverse of a flow shares sines, exponentials and forces with the transpose of the flow.
 """
 
 from __future__ import annotations
@@ -22,17 +22,19 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Output of a transpose: the state before the flow; also the name of its input with the values needed for this.
+#: Output of a transposed flow: the state before the flow. Also the name of the input with those fields after the flow
+#: that are needed for it alone.
 STATE_BEFORE = "state_before"
 
 ODD, NEITHER, EVEN = -1, 0, 1
 
-#: A sum of symbols, each with an integer factor.
+#: A sum of symbols: name of the symbol → integer factor.
 Form = Mapping[str, int]
 
 
 def of_coefficients(step: Splitting | Sweeps) -> dict[str, int]:
-    """Return the parities of the coefficients of a flow as functions of its duration."""
+    """Return for each coefficient of a flow whether it is odd or even, or neither, as a function of the duration of the
+    flow."""
     parities = [parity for parity, _ in _parities(step.prepare.roots, dict.fromkeys(step.prepare.inputs["h"], ODD))]
     if step.refresh:
         slots: dict[str, int] = {coefficient(k): parity for k, parity in enumerate(parities)}
@@ -41,16 +43,16 @@ def of_coefficients(step: Splitting | Sweeps) -> dict[str, int]:
 
 
 def over_negative_time(values: Sequence[Expression], parities: Mapping[str, int]) -> list[Expression]:
-    """Return the values over the time −h; ``parities`` are those of the symbols."""
+    """Return the values with the time h replaced by −h; ``parities`` says which symbols are odd or even in h."""
     return [reversed_value for _, reversed_value in _parities(values, parities)]
 
 
 def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> list[Expression]:
-    """Return values at the state before a flow, in symbols of the state after it.
+    """Return values at the state before a flow, as expressions in the state after it.
 
-    ``changes`` are the increments of the inverse flow. Sub-expressions that the flow leaves invariant are not computed
-    twice: sums, such as that of two spins that rotate about it, and arguments of functions, such as |ψ|² if the flow
-    changes phases only. The invariance is proved.
+    ``changes`` are the increments of the inverse flow. Sub-expressions that the flow does not change are not computed
+    again. These are sums, such as the sum of two spins that rotate about it, and arguments of functions, such as |ψ|²
+    in a flow that changes phases only. That the flow does not change them is proved.
     """
     previous = {s: symbol(s) + change for s, change in changes.items()}
 
@@ -62,7 +64,7 @@ def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> l
 
     arguments = dict.fromkeys(e.args[0] for e in topological(values) if e.op in FUNCTIONS and len(e.args) == 1)
     candidates = [e for e in arguments if not previous.keys().isdisjoint(symbols_of(e)) and not _called_in(e)]
-    # several functions would make the proof slow
+    # values with at most one function; more functions would make the proof slow
     invariants = {
         e: symbol(Symbol("invariant", k))
         for k, (e, (reversed_value, _)) in enumerate(zip(candidates, fold(candidates, visit), strict=True))
@@ -74,12 +76,13 @@ def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> l
 
 
 def _called_in(value: Expression) -> set[Expression]:
-    """Return the arguments of all function calls in a value."""
+    """Return the arguments of all function calls in an expression."""
     return {e.args[0] for e in topological([value]) if e.op in FUNCTIONS}
 
 
 def _form(node: Expression, args: Sequence[Form | None]) -> Form | None:
-    """Return a node as a sum of symbols with integer factors, or None if it has another form."""
+    """Return a node as a sum of symbols with integer factors, from its arguments in this form; None if it has another
+    form."""
     if node.op == "symbol":
         return {node.value: 1}
     if node.op not in ("add", "sub", "neg") or None in args:
@@ -92,7 +95,7 @@ def _form(node: Expression, args: Sequence[Form | None]) -> Form | None:
 
 
 def _stays(form: Form, changes: Mapping[str, Expression]) -> bool:
-    """Whether the increments of the symbols in a sum cancel term by term."""
+    """Whether a sum of symbols is constant along a flow, because the increments ``changes`` of its symbols cancel."""
     remaining: dict[Expression, int] = {}
     for name, factor in form.items():
         if name in changes:
@@ -104,9 +107,9 @@ def _stays(form: Form, changes: Mapping[str, Expression]) -> bool:
 
 
 def _parities(values: Sequence[Expression], of_symbols: Mapping[str, int]) -> list[tuple[int, Expression]]:
-    """Return, for each value, its parity as a function of the time, and its value over −h.
+    """Return for each value its parity, as a function of the duration h of a flow, and the value with −h in place of h.
 
-    Symbols that are not listed are even.
+    ``of_symbols`` has the parities of symbols; symbols that are not listed are even.
     """
 
     def visit(node: Expression, args: list[tuple[int, Expression]]) -> tuple[int, Expression]:
@@ -119,7 +122,7 @@ def _parities(values: Sequence[Expression], of_symbols: Mapping[str, int]) -> li
 
 
 def _parity(node: Expression, of_args: Sequence[int]) -> int:
-    """Return the parity of a node from those of its arguments."""
+    """Return the parity of a node of an expression from the parities of its arguments."""
     if all(parity == EVEN for parity in of_args):
         return EVEN
     first = of_args[0]

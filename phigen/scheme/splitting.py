@@ -1,4 +1,4 @@
-"""Programs of splittings: kernels of the flows of the parts of H, and the schedule of a step."""
+"""Programs of splittings: the kernels of the flows of the parts of H, and the order of these flows in a step."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def build_splitting(
     group: Group | None = None,
     monitor: Logarithmic | None = None,
 ) -> Program:
-    """Return the explicit solver as a program. Raises `LimitError` if a kernel is too large."""
+    """Return the program of a splitting, an explicit solver. Raises `LimitError` if a kernel is too large."""
     extras = spec.extras
     _expect_no_modified(system, extras)
     if isinstance(choice.method, Corrected):
@@ -128,7 +128,11 @@ def _step(
     *,
     adjoint: bool,
 ) -> Splitting:
-    """Return the step. The table of coefficients must be full, except for those that are computed anew in each flow."""
+    """Return the step of a splitting from the kernels of its flows.
+
+    The table of ``coefficients`` must be complete, except for coefficients that depend on the time or on noise
+    increments.
+    """
     renewed_inputs = {"t": system.times, "dw": system.increments[:1]}
     refresh = coefficients.refresh(**{name: symbols for name, symbols in renewed_inputs.items() if symbols})
     inputs = {"gauge": constant_symbols, "h": (TIME,), "kick": (KICK,) if schedule.multiples else ()}
@@ -148,7 +152,10 @@ def _step(
 
 
 def facts(choice: ScheduledMethod, step: Splitting, sources: int = 0) -> list[str]:
-    """Return the header lines on the method; ``sources`` is the number of noise sources, which are the first parts."""
+    """Return the lines on the method for the header of generated files.
+
+    ``sources`` is the number of sources of noise; their flows are the first parts of the step.
+    """
     count, flows, method = len(step.flows) - sources, len(step.schedule.flows) - 2 * sources, choice.method
     further = f", {len(step.schedule.begin)} more before and after a run" * bool(step.schedule.begin)
     if count == 1 and choice.carrier is None:
@@ -164,7 +171,7 @@ def facts(choice: ScheduledMethod, step: Splitting, sources: int = 0) -> list[st
 
 
 def _clock(choice: ScheduledMethod) -> str:
-    """Return the header line on the time; "" if H does not depend on the time."""
+    """Return the header line that says in which flow the time advances; "" if H does not depend on the time."""
     if choice.carrier is None:
         return ""
     flows = choice.splitting.flows
@@ -174,7 +181,11 @@ def _clock(choice: ScheduledMethod) -> str:
 
 
 def _named(system: System, flow: Flow, k: int) -> str:
-    """Return the Hamiltonian or force of flow k in words; flows of noise come first, and their duration is σ ΔW."""
+    """Return a description of the flow number k, from 1 on: its Hamiltonian, or its number if it is the flow of a
+    force.
+
+    The flows of noise sources have the first numbers.
+    """
     sources = system.noise
     if k <= len(sources):
         return f"{flow.hamiltonian}, for the noise {sources[k - 1].name}"
@@ -184,7 +195,7 @@ def _named(system: System, flow: Flow, k: int) -> str:
 
 
 def _operations(step: Splitting) -> dict[str, int]:
-    """Return the operations of a step, without those of compensated summation."""
+    """Return the numbers of operations of a step by kind, without those of compensated summation."""
     times = Counter(part for part, _ in step.schedule.flows)
     totals: Counter[str] = Counter()
     for part, kernel in enumerate(step.flows):
@@ -194,7 +205,11 @@ def _operations(step: Splitting) -> dict[str, int]:
 
 
 def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic | None) -> None:
-    """Raise `SpecError` if the duration of a flow with a matrix exponential depends on the state."""
+    """Raise `SpecError` if a monitor makes the duration of a flow depend on the state although the flow uses a matrix
+    exponential.
+
+    Such exponentials are computed before the steps, for fixed durations.
+    """
     for flow in flows if monitor else ():
         if flow.exponentials:
             message = "monitor: log: the flow of {} takes a matrix exponential, whose time must not depend on the state"
@@ -207,8 +222,10 @@ def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic |
 
 
 def _expect_correctable(system: System, spec: Spec, method: Corrected) -> None:
-    """Raise `SpecError` for features that need the state after single steps, which steps with a corrector do not
-    have."""
+    """Raise `SpecError` for features that a method with a corrector does not offer, such as noise, forces or a monitor.
+
+    Most of them need the state after each single step, which exists only at the end of a run.
+    """
     refused = {
         "time": (bool(system.time), "the corrector would need its own times"),
         "noise": (bool(system.noise), "the corrector would undo random increments"),

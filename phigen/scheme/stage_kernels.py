@@ -1,4 +1,5 @@
-"""Kernels derived from those of a stage of the series: parts of transposes, and diagonal blocks at sites."""
+"""Kernels for the implicit equation of a stage on a lattice: the parts of its transpose, and its diagonal blocks at
+sites."""
 
 from __future__ import annotations
 
@@ -9,20 +10,25 @@ from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.steps import Sites, Sweeps
 from phigen.symbolic.expression import ZERO, gradient
 
-#: Name of the kernel of the derivatives of a sweep with respect to the fields at the same site.
+#: Name of the kernel of the derivatives of the right-hand side of y = … at a site with respect to y at the same site.
 _BLOCK = "own_slope"
 
-#: Which cotangents are computed: (those of fields at other sites, all others).
+#: Selections of cotangents for a transposed kernel: (those of fields, all others).
 _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
 
-#: Kernels of a reverse pass, in order, with their source kernels: from the end of a stage to y; from y to y at other
-#: sites, repeated until the equation is solved; from y to x and to parameters.
+#: Transposed kernels of a stage in the order of the reverse pass, with the kernels that they transpose. The first one
+#: passes the cotangent of the new state to y, the solution of the implicit equation. The second one passes the
+#: cotangent of y to y at other sites, and is repeated until the transposed equation is solved. The third one passes the
+#: cotangent of y to the old state x and to parameters.
 KERNELS = (("advance_back", "increment", _ALL), ("slope_back", "relax", _FIELDS), ("relax_back", "relax", _OTHERS))
 
 
 def restricted(sites: Sites, fields: Sequence[str], kernel: Kernel, selection: tuple[bool, bool], name: str) -> Kernel:
-    """Return a transposed kernel with the cotangents of fields only, or of the other values only; both have those of
-    sums."""
+    """Return a transposed kernel that computes only the selected cotangents: those of fields, or those of all other
+    values.
+
+    Cotangents of sums over bonds or pairs are always computed.
+    """
     of_fields, of_others = selection
     outputs = []
     for o in kernel.outputs:
@@ -40,8 +46,11 @@ def restricted(sites: Sites, fields: Sequence[str], kernel: Kernel, selection: t
 
 
 def site_block(step: Sweeps, fields: Sequence[str], relax: Kernel) -> Kernel:
-    """Return the kernel of the derivatives of a sweep with respect to y at the same site, as a matrix over the
-    fields."""
+    """Return the kernel of the derivatives of ``relax``, the right-hand side of y = …, with respect to y at the same
+    site.
+
+    Its output is a matrix over the fields, row by row.
+    """
     places = step.sites.places
     at_site = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}
     slopes = [gradient(e, [at_site[f]])[0] if f in at_site else ZERO for e in relax.roots for f in fields]

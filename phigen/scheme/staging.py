@@ -1,10 +1,10 @@
-"""Staging: state-independent values are computed in ``prepare`` or in ``refresh``.
+"""Staging: values that do not depend on the state are computed before the steps, or once in each stage of a step.
 
 There are three kinds of symbols. *Static* symbols, parameters and the step size, are known before the first step.
 *Inputs* of a step, such as the time in its middle, are new in every step. All other symbols belong to the state and
-change with every evaluation. ``prepare`` computes, once, the values that depend on static symbols only; ``refresh``
-computes, once in every stage of a step, those that also depend on inputs. Both fill one table of coefficients ``c:0``,
-``c:1``, …, in which the static values come first.
+change with every evaluation. The kernel ``prepare`` computes, before the steps, the values that depend on static
+symbols only. The kernel ``refresh`` computes, once in every stage of a step, the values that also depend on inputs.
+Both fill one table of coefficients ``c:0``, ``c:1``, …, with the static values first.
 """
 
 from __future__ import annotations
@@ -20,20 +20,21 @@ from phigen.symbolic.symbols import COEFFICIENT, RENEWED, Symbol, coefficient, k
 
 T = TypeVar("T")
 
-#: The inputs of a step, with their description.
+#: The inputs of a step that are new in every step, with their description in generated code.
 INPUTS = {"t": "the time", "dw": "the increments of the noise"}
 
-#: Name of the argument of kernels with the table of coefficients, and of the output of ``refresh``, the end of the
-#: table.
+#: Name of the table of coefficients as an argument of kernels, and name of the output of ``refresh``, which is the end
+#: of this table.
 TABLE, NOW = "coef", "now"
 
 
 class Coefficients:
-    """The table of state-independent values. `hoist` fills it; equal values are added only once.
+    """The table of the coefficients ``c:k`` of a program: expressions that do not depend on the state, each of which is
+    added once.
 
-    ``values`` are the values that ``prepare`` computes, ``renewed`` those that depend on ``inputs`` of a step. Between
-    them are the entries of ``exponentials``, exp(tA) − 1. The positions of ``renewed`` and ``exponentials`` are unknown
-    until the table is full: until `settled` they have symbols of other kinds.
+    ``values`` are the expressions that ``prepare`` computes. Then come the entries of the matrices exp(tA) − 1 in
+    ``exponentials``, and last the ``renewed`` expressions, which depend on the inputs of a step. The places of the last
+    two groups are unknown until the table is complete; until a call of `settled` they have provisional symbols.
     """
 
     def __init__(self, static: Iterable[str], inputs: Iterable[str] = ()) -> None:
@@ -45,30 +46,36 @@ class Coefficients:
 
     @property
     def slots(self) -> tuple[str, ...]:
-        """The symbols of the coefficients of ``prepare`` that the table contains so far."""
+        """The symbols of the coefficients that ``prepare`` computes, as far as the table has been filled."""
         return tuple(coefficient(k) for k in range(len(self.values)))
 
     @property
     def table(self) -> tuple[str, ...]:
-        """The symbols of all coefficients so far; those that are renewed in each step come last."""
+        """The symbols of all coefficients, as far as the table has been filled; those that are new in each step come
+        last."""
         entries = (name for e in self.exponentials for name in e.symbols)
         return (*self.slots, *entries, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))
 
     @property
     def everything(self) -> list[Expression]:
-        """The expressions of the table. An entry of an exponential is represented by a sum of all values that it
-        depends on."""
+        """The expressions of all coefficients, for tests of what they depend on.
+
+        An entry of exp(tA) − 1 is represented by the sum of all entries of tA.
+        """
         sums = (total(e.exponents) for e in self.exponentials for _ in e.rates)
         return [*self.values, *sums, *self.renewed]
 
     @property
     def prepared(self) -> list[Expression]:
-        """The values that ``prepare`` stores: expressions, then the entries of tA whose exponentials `blocks` lists."""
+        """The values that ``prepare`` stores: the static expressions, then the entries of the matrices tA.
+
+        The generated code replaces each of these matrices, listed in `blocks`, by exp(tA) − 1.
+        """
         return [*self.values, *(e for exponential in self.exponentials for e in exponential.exponents)]
 
     @property
     def blocks(self) -> tuple[tuple[int, int], ...]:
-        """The positions of the matrices tA in the table, with their sizes."""
+        """For each matrix tA the place of its first entry in the table, and its number of rows."""
         blocks, start = [], len(self.values)
         for exponential in self.exponentials:
             blocks.append((start, exponential.size))
@@ -76,17 +83,17 @@ class Coefficients:
         return tuple(blocks)
 
     def include(self, exponentials: Iterable[MatrixExponential]) -> None:
-        """Add matrix exponentials to the table, each once."""
+        """Add matrix exponentials to the table; those that it already has are skipped."""
         self.exponentials += [e for e in dict.fromkeys(exponentials) if e not in self.exponentials]
 
     def empty(self) -> Coefficients:
-        """Return a table with the same symbols and no values."""
+        """Return a table without values, for the same static symbols and inputs."""
         return Coefficients(self._static, self._inputs)
 
     def hoist(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return the roots with each largest state-independent part replaced by a coefficient ``c:k``.
+        """Return the roots with each maximal state-independent sub-expression replaced by a coefficient ``c:k``.
 
-        Plain numbers are not replaced: a literal is cheaper than a load.
+        Plain numbers are not replaced: a literal is cheaper than a load from the table.
         """
         return self._hoisted(roots, lambda name: self._is_fixed(name) or self._is_new(name))
 
@@ -107,7 +114,8 @@ class Coefficients:
         return [self.slot(self._written_out(r)) if hoisted[id(r)] else d for r, d in zip(roots, replaced, strict=True)]
 
     def is_static(self, e: Expression) -> bool:
-        """Whether an expression does not depend on the state."""
+        """Whether an expression contains only static symbols and inputs of a step, and hence does not depend on the
+        state."""
         return all(name in self._static or name in self._inputs for name in symbols_of(e))
 
     def written_out(self, roots: Sequence[Expression]) -> list[Expression]:
@@ -115,7 +123,8 @@ class Coefficients:
         return [self._written_out(e) for e in roots]
 
     def slot(self, e: Expression) -> Expression:
-        """Return the coefficient for a state-independent expression; a number is returned unchanged."""
+        """Return the coefficient for a state-independent expression, which is added to the table; a number is returned
+        unchanged."""
         if e.is_number:
             return e
         name = self._index.get(id(e))
@@ -127,13 +136,13 @@ class Coefficients:
         return symbol(name)
 
     def refresh(self, **inputs: Sequence[str]) -> Kernel | None:
-        """Return the kernel of the values that depend on the inputs of a step, or None if there are none.
+        """Return the kernel ``refresh`` of the coefficients that depend on inputs of a step; None if there are none.
 
-        Must be called before ``prepare`` is built, since it may add values to ``prepare``.
+        It must be built before ``prepare``, since it may add values that ``prepare`` computes.
         """
         if not self.renewed:
             return None
-        if not self.values:  # the first part of the table must not be empty: the second part starts after it
+        if not self.values:  # the static part of the table must not be empty: `refresh` writes after it
             self.slot(symbol(min(self._static)))
         values = tuple(self._hoisted(self.renewed, self._is_fixed))
         return Kernel(
@@ -144,10 +153,9 @@ class Coefficients:
         )
 
     def settled(self, unsettled: T) -> T:
-        """Return an object built with this full table, with the final positions of the coefficients.
+        """Return a copy of an object with the final symbols of all coefficients, now that the table is complete.
 
-        The object consists of kernels, recurrences and other frozen dataclasses and tuples. Coefficients that are
-        renewed in each step come after all others.
+        The object consists of kernels, recurrences, and other frozen dataclasses and tuples.
         """
         provisional = self.table[len(self.values) :]
         if not provisional:
@@ -168,7 +176,7 @@ class Coefficients:
         return name in self._inputs or kind_of(name) == RENEWED
 
     def _written_out(self, e: Expression) -> Expression:
-        """Return the expression with its coefficients replaced by their expressions."""
+        """Return the expression with each of its coefficients replaced by the expression that it stands for."""
         coefficient_symbols = [n for n in symbols_of(e) if isinstance(n, Symbol) and n.kind in (COEFFICIENT, RENEWED)]
         tables = {COEFFICIENT: self.values, RENEWED: self.renewed}
         return (
@@ -179,7 +187,7 @@ class Coefficients:
 
 
 def _expressions(tree: Any) -> Iterable[Expression]:
-    """Yield all expressions inside tuples and dataclasses."""
+    """Yield all expressions inside nested tuples and dataclasses."""
     if isinstance(tree, Expression):
         yield tree
     elif isinstance(tree, tuple):
@@ -191,7 +199,11 @@ def _expressions(tree: Any) -> Iterable[Expression]:
 
 
 def _rebuilt(tree: Any, renamed: dict[int, Expression], slots: tuple[str, ...]) -> Any:
-    """Return the object with renamed symbols; kernels that read the table receive all of its ``slots``."""
+    """Return a copy of nested tuples and dataclasses with the expressions in ``renamed``, by the ``id`` of the
+    original.
+
+    Kernels that read the table of coefficients receive all of its ``slots`` as input.
+    """
     if isinstance(tree, Expression):
         return renamed[id(tree)]
     if isinstance(tree, tuple):

@@ -1,12 +1,12 @@
-"""Assembly of the one-step map: solve α(y, ∇S_h(y)) = x for y, then x' = x + (β − α)(y, ∇S_h(y)).
+"""Formulas of an implicit step: solve α(y, ∇S_h(y)) = x for y, then x' = x + (β − α)(y, ∇S_h(y)).
 
-With a(y) = α(y, ∇S_h(y)) − y and d(y) = (β − α)(y, ∇S_h(y)) a Newton step is
+With a(y) = α(y, ∇S_h(y)) − y and d(y) = (β − α)(y, ∇S_h(y)), an iteration of Newton's method is
 
     J(y) δ = (y − x) + a(y),     y ← y − δ,     J = ∂_xα + ∂_pα · Hess S_h = I + a'(y).
 
-To first order, the increment at the corrected y is d − M δ with M = d'(y), so the last correction needs no second
-evaluation. If the equation y = x − a(y) is triangular (a one-sided realisation with a separable Hamiltonian), it is
-solved by substitution and the step is explicit.
+To first order, the increment x' − x at the corrected y is d − M δ with M = d'(y). So after the last correction d need
+not be evaluated again. If the equation y = x − a(y) is triangular, as for a one-sided realisation with a separable
+Hamiltonian, it is solved by substitution, and the step is explicit.
 """
 
 from __future__ import annotations
@@ -35,7 +35,10 @@ SparseRow = dict[int, Expression]
 
 @dataclass(frozen=True)
 class Linearised:
-    """The values of one Newton iteration at y: a and d (n), J and M (n×n)."""
+    """The vectors and matrices of a Newton iteration at y: α − y and β − α (n entries), and their Jacobians (n×n).
+
+    ``jacobian`` is that of α, the Newton matrix J; ``increment_jacobian`` is that of β − α. All are at p = ∇S_h(y).
+    """
 
     displacement: list[Expression]
     increment: list[Expression]
@@ -46,7 +49,7 @@ class Linearised:
 def at_momenta(
     expressions: Sequence[Expression], coordinates: Sequence[str], slope: Sequence[Expression]
 ) -> list[Expression]:
-    """Return the expressions with p = ∇S_h (``slope``) inserted."""
+    """Return the expressions with the momenta p replaced by ``slope``, which is ∇S_h."""
     return substitute(expressions, {momentum(c): g for c, g in zip(coordinates, slope, strict=True)})
 
 
@@ -56,9 +59,10 @@ def linearise(
     coordinates: Sequence[str],
     generating: GeneratingFunction,
 ) -> Linearised:
-    """Return a, d and their total derivatives with respect to y, with p = ∇S_h(y)."""
+    """Return α − y and β − α at p = ∇S_h(y) with their total derivatives with respect to y."""
     n = len(coordinates)
-    # Momenta that are 0 are substituted first: the H of a large system may depend on few coordinates.
+    # Components of p that are 0 are substituted first, which shortens the formulas: the H of a large system may depend
+    # on few coordinates.
     absent: dict[str, Expression] = {
         momentum(c): ZERO for c, g in zip(coordinates, generating.slope, strict=True) if g.is_zero
     }
@@ -80,13 +84,13 @@ def linearise(
 
 
 def _rows(expressions: Sequence[Expression], names: Sequence[str]) -> list[SparseRow]:
-    """Return the nonzero derivatives of each expression, by the index of the name."""
+    """Return the nonzero derivatives of each expression with respect to ``names``: index of the name → derivative."""
     index = {name: j for j, name in enumerate(names)}
     return [{index[name]: d for name, d in row.items()} for row in sparse_derivatives(expressions, names)]
 
 
 def _total_derivative_row(x_part: SparseRow, p_part: SparseRow, hessian: Sequence[SparseRow]) -> list[Expression]:
-    """Return a row of ∂_x + ∂_p · Hess S_h, from a row of each derivative."""
+    """Return a row of the matrix ∂_x + ∂_p · Hess S_h, from a row of ∂_x (``x_part``) and a row of ∂_p (``p_part``)."""
     n = len(hessian)
     products: list[SparseRow] = [{} for _ in range(n)]
     for k, e in p_part.items():
@@ -96,7 +100,11 @@ def _total_derivative_row(x_part: SparseRow, p_part: SparseRow, hessian: Sequenc
 
 
 def explicit_order(displacement: Sequence[Expression], coordinates: Sequence[str]) -> list[int] | None:
-    """Return an order in which y_i = x_i − a_i(y) can be solved by substitution, or None if there is a cycle."""
+    """Return an order of the indices i in which y_i = x_i − a_i(y) can be solved by substitution; None if there is a
+    cycle.
+
+    ``displacement`` is a(y).
+    """
     index = {c: i for i, c in enumerate(coordinates)}
     graph = {i: [index[s] for s in symbols_of(a) if s in index] for i, a in enumerate(displacement)}
     try:
@@ -111,7 +119,8 @@ def explicit_increment(
     coordinates: Sequence[str],
     order: Sequence[int],
 ) -> list[Expression]:
-    """Return the increment as a function of x; the equation for y is solved by substitution in the given order."""
+    """Return the increment of an explicit step as a function of x: y = x − a(y) is solved by substitution in
+    ``order``."""
     solutions: dict[str, Expression] = {}
     for i in order:
         (shift,) = substitute([displacement[i]], solutions)

@@ -1,7 +1,7 @@
-"""The kinds of steps: one record for each, with the facts that other rooms need.
+"""The kinds of steps: a record for each kind, with the properties that other packages need.
 
-A step (`phigen.scheme.steps`) has a kind and kernels. Rooms that treat kinds differently have a table with an entry for
-each kind: `phigen.lanes.in_lanes` for the lowering to lanes, and a module of each target for the text of the step.
+A step (`phigen.scheme.steps`) has a kind and kernels. A package that treats kinds differently has a table with an entry
+for each kind: `phigen.lanes.in_lanes` for steps in SIMD lanes, and a module of each target for the printed code.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class StepKind:
-    """A kind of step.
+    """A kind of step: how it computes the new state.
 
-    ``title`` names the method in a sentence, ``manner`` in the header of generated files; ``unit`` is the unit of
-    operation counts. ``implicit`` steps solve an equation for one point by an inner solve. ``predicted`` steps start
-    their iteration with a value extrapolated from earlier steps. Steps by ``flows`` have a schedule, and a row of
-    coefficients for each of its times. A step that ``collocates`` solves for all its stages at once. Steps on ``sites``
-    are those of lattices.
+    ``title`` names the method in a sentence, ``manner`` in the header of generated files. ``unit`` says to what the
+    printed operation counts refer. ``implicit`` steps solve an equation for one point by an iteration. ``predicted``
+    steps start their iteration from a value extrapolated from earlier steps. Steps by ``flows`` have a schedule, and a
+    row of coefficients for each of its times. A step that ``collocates`` solves for all its stages at once. Steps over
+    ``sites`` are those of lattices.
     """
 
     name: str
@@ -60,5 +60,5 @@ GAUSS = StepKind(
 SPLITTING = StepKind("splitting", "flows of parts of H", "explicit", flows=True)
 SWEEPS = StepKind("sweeps", "sweeps over the sites", "explicit", unit="step of one site", sites=True)
 
-#: All kinds by name.
+#: All kinds of steps, by name.
 STEP_KINDS: Mapping[str, StepKind] = {kind.name: kind for kind in (NEWTON, EXPLICIT, PATH, GAUSS, SPLITTING, SWEEPS)}
