@@ -1,10 +1,9 @@
 """The steps of all kinds, with their kernels: Newton, Explicit, Path, Gauss, Splitting and Sweeps.
 
-The kernels of a step belong to three stages of evaluation. ``prepare`` computes, from parameters and step size, the
-values that depend neither on the state nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … If H
-depends on the time, or there is noise, ``refresh`` computes further coefficients once in each stage, from these and
-from the time in the middle of the stage or the increments of the noise. All other kernels read the coefficients and the
-state only.
+The kernels of a step are evaluated at three different times. ``prepare`` computes the coefficients ``c:0``, ``c:1``, …
+from parameters and step size, before the steps. If H depends on the time, or if there is noise, ``refresh`` computes
+further coefficients once in each stage, from the time in the middle of the stage or from the noise increments. All
+other kernels read the coefficients and the state only.
 """
 
 from __future__ import annotations
@@ -20,17 +19,18 @@ from phigen.scheme.path import PathSlopes, Recurrences
 from phigen.scheme.step_kinds import EXPLICIT, GAUSS, NEWTON, PATH, SPLITTING, SWEEPS, StepKind
 from phigen.symbolic.symbols import Symbol
 
-#: Suffix of the name of a transposed kernel of a lattice.
+#: Suffix of the names of transposed kernels on a lattice.
 BACK = "_back"
 
 
 @dataclass(frozen=True)
 class PathAdjoint:
-    """The path integrated backwards with cotangents (`phigen.scheme.adjoint`).
+    """The kernels and recurrences that transpose a step along a path; the formulas are in `phigen.scheme.adjoint`.
 
-    ``recurrences`` yield the cotangents, those of the ``used`` coefficients last. ``curvature`` is ∇S_h and its Hessian
-    at the mean, ``slope`` the transpose of ∇S_h with respect to coefficients. ``slopes`` are the recurrences for the
-    derivatives of a path, for many paths at once.
+    ``recurrences`` follow the path backwards together with its cotangents; the last of these belong to the coefficients
+    with the indices ``used``. ``curvature`` computes ∇S_h and its Hessian at the mean of the path. ``slope`` is the
+    transpose of ∇S_h with respect to the coefficients. ``slopes`` are the recurrences for the derivatives of a path, by
+    which many paths are transposed at once.
     """
 
     recurrences: Recurrences
@@ -42,10 +42,10 @@ class PathAdjoint:
 
 @dataclass(frozen=True)
 class Adjoint:
-    """The transpose of a step.
+    """The transpose of a step, for gradients.
 
-    It has the transposes of the kernels of the step or of its flows (``steps``), of ``prepare``, of ``refresh`` and, if
-    the step follows a path, of the ``path``.
+    It consists of the transposes of the kernels of the step or of its flows (``steps``), of ``prepare``, of
+    ``refresh``, and of the ``path`` that the step follows, if any.
     """
 
     steps: tuple[Kernel, ...]
@@ -55,115 +55,127 @@ class Adjoint:
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once, without the curvature of a path."""
+        """All kernels of the transpose, each once, except ``curvature`` of a path, which the step has too."""
         slope = self.path.slope if self.path else None
         return _present((*self.steps, slope, self.prepare, self.refresh))
 
 
 @dataclass(frozen=True)
 class _Staged:
-    """Base class of all steps. ``adjoint`` is the transpose of the step, if it was requested."""
+    """Base class of all steps, with defaults for the properties that only some kinds of steps have.
+
+    ``prepare`` and ``refresh`` compute the coefficients. ``adjoint`` is the transpose of the step, if gradients were
+    requested.
+    """
 
     prepare: Kernel
     refresh: Kernel | None = field(default=None, kw_only=True)
     adjoint: Adjoint | None = field(default=None, kw_only=True)
 
-    #: The properties of steps of this kind.
+    #: The record of the kind of step, which the subclass sets.
     kind: ClassVar[StepKind]
 
     @property
     def transposed(self) -> tuple[Kernel, ...]:
-        """The kernels of the transpose; empty if it was not requested."""
+        """The kernels of the transposed step; empty if gradients were not requested."""
         return self.adjoint.kernels if self.adjoint else ()
 
     @property
     def inner_solve(self) -> InnerSolve | None:
-        """Settings of the solve for one point; None for steps without such a solve."""
+        """Settings of the iteration that solves the implicit equation of a step; None for steps that solve no such
+        equation."""
         return None
 
     @property
     def eliminate(self) -> Kernel | None:
-        """Kernel that solves with one Newton matrix; None if elimination is not unrolled."""
+        """Kernel that solves linear equations with the Newton matrix; None if the runtime does this in a loop."""
         return None
 
     @property
     def eliminate_transposed(self) -> Kernel | None:
-        """Kernel that solves with the transpose of a Newton matrix; None if elimination is not unrolled."""
+        """Kernel that solves linear equations with the transposed Newton matrix; None if the runtime does this in a
+        loop."""
         return None
 
     @property
     def invert(self) -> Kernel | None:
-        """Kernel of the inverse of a Newton matrix; None if it is not unrolled."""
+        """Kernel of the inverse of the Newton matrix; None if there is no such kernel."""
         return None
 
     @property
     def centred(self) -> bool:
-        """Whether the point y of an implicit step is the mean of its ends."""
+        """Whether y, the solution of the implicit equation of a step, is the mean of the old and the new state."""
         return False
 
     @property
     def frame(self) -> Kernel | None:
-        """Kernel of the change from the frame of a step to that of the next; None if steps have no frames."""
+        """Kernel that transforms derivatives of group elements to the frame of the next Gauss step; None if no frame
+        changes."""
         return None
 
     @property
     def lift(self) -> Lift | None:
-        """Frames of group elements that move from step to step; None if there are none."""
+        """The frames at which the group elements of a Gauss step start, if they follow the state; None if they start at
+        1."""
         return None
 
     @property
     def lifted(self) -> Gauss | None:
-        """The same step in such frames, if there is one."""
+        """The same Gauss step with group elements that start at frames F instead of 1; None if there is no such
+        form."""
         return None
 
     @property
     def reduced(self) -> ReducedSweeps | None:
-        """Sweeps over some of the unknowns of a step, if the other unknowns follow from them; else None."""
+        """Sweeps over a part of the unknowns of a Gauss step, from which all other unknowns follow; else None."""
         return None
 
     @property
     def path(self) -> Recurrences | None:
-        """The recurrences of the path that a step follows; None if it follows none."""
+        """The recurrences of the path that a step follows; None for steps that follow no path."""
         return None
 
     @property
     def varied_path(self) -> Recurrences | None:
-        """The recurrences of the path with its variation, for derivatives; None if the step follows no path."""
+        """The recurrences of the path of a step together with its variation, for tangent maps; None if there are
+        none."""
         return None
 
     @property
     def back(self) -> PathAdjoint | None:
-        """The path integrated backwards with cotangents, if the step follows a path and its adjoint was requested;
-        else None."""
+        """The transpose of the path that a step follows; None without a path, or if gradients were not requested."""
         return self.adjoint.path if self.adjoint else None
 
     @property
     def flow_schedule(self) -> Schedule | None:
-        """The schedule of the flows of a step; None if the step is not a sequence of flows."""
+        """The order and the durations of the flows of a step; None if the step is not a sequence of flows."""
         return None
 
     @property
     def flow_kernels(self) -> tuple[Kernel, ...]:
-        """The flows of a splitting with their derivatives and transposes; empty for other steps."""
+        """The kernels of the flows of a splitting, of their derivatives and of their transposes; empty for other
+        steps."""
         return ()
 
     @property
     def multiples(self) -> tuple[float, ...]:
-        """The multiples of the modified potential in kicks, by rows of the schedule; empty without modified kicks."""
+        """For each row of the schedule the multiple, in units of h², of the modified potential of a kick; empty if
+        there is none."""
         return self.flow_schedule.multiples if self.flow_schedule else ()
 
     @property
     def method_name(self) -> str:
-        """The name of the composition of flows or stages; "" if the step has none."""
+        """The name of the composition of flows, or "" if the step is not composed of flows."""
         return ""
 
     @property
     def swept(self) -> Sweeps | None:
-        """The step itself if it is one of a lattice, else None."""
+        """The step itself if it is the step of a lattice, else None."""
         return None
 
     def maps(self, stages: int) -> int:
-        """Return the number of maps (stages or flows) whose composition is a step with this number of stages."""
+        """Return the number of maps, stages or flows, in a step; ``stages`` is the number of stages of its
+        composition."""
         return stages
 
     @property
@@ -178,26 +190,26 @@ class _Staged:
 
     @property
     def row(self) -> int:
-        """The number of values in a row of coefficients: those of ``prepare`` and those of ``refresh``."""
+        """The number of coefficients in a row of the table: those of ``prepare`` and those of ``refresh``."""
         return self.prepared + self.renewed
 
     @property
     def coefficients(self) -> int:
-        """The number of coefficients of one stage."""
+        """The number of coefficients of a step in all rows of the table; without a schedule there is one row."""
         return self.row
 
     @property
     def corrected(self) -> bool:
-        """Whether a run of steps begins and ends with a corrector."""
+        """Whether a run of steps begins and ends with flows of a symplectic corrector."""
         return self.flow_schedule is not None and bool(self.flow_schedule.begin)
 
 
 @dataclass(frozen=True)
 class InnerSolve:
-    """Settings of the solve of an implicit step.
+    """Settings of the iteration that solves the implicit equation of a step.
 
-    ``relative`` says that errors count relative to each coordinate, for coordinates that are positive or keep their
-    sign (log-canonical π).
+    ``tolerance`` bounds the last correction. ``relative`` says that errors are measured relative to each coordinate;
+    this is so for log-canonical π, whose coordinates keep their signs.
     """
 
     max_iterations: int = 20
@@ -207,7 +219,10 @@ class InnerSolve:
 
 @dataclass(frozen=True)
 class Factorisation:
-    """A Newton matrix with many zeros: ``factorise`` it once, then ``substitute`` right-hand sides."""
+    """Two kernels for linear equations whose matrix has many zeros.
+
+    ``factorise`` computes the factors of the matrix once; ``substitute`` then solves for each right-hand side.
+    """
 
     factorise: Kernel
     substitute: Kernel
@@ -215,10 +230,11 @@ class Factorisation:
 
 @dataclass(frozen=True)
 class Newton(_Staged):
-    """Step by Newton's method: α(y, ∇S_h(y)) = x is solved for y; then x' = x + (β − α)(y, ∇S_h(y)).
+    """Step by Newton's method: it solves α(y, ∇S_h(y)) = x for y; then x' = x + (β − α)(y, ∇S_h(y)).
 
-    ``eliminate`` solves with one matrix, ``eliminate_transposed`` with its transpose, if the adjoint was requested. For
-    many right-hand sides there is ``invert``, ``factors``, or neither. If a kernel is None, the runtime uses a loop.
+    ``linearise`` is one iteration. ``eliminate`` solves linear equations with the Newton matrix.
+    ``eliminate_transposed`` solves those with its transpose, if gradients were requested. For many right-hand sides
+    there is ``invert``, ``factors``, or neither of the two. Where a kernel is None, the runtime uses a loop.
     ``centred`` says that y is the mean of x and x'.
     """
 
@@ -234,12 +250,12 @@ class Newton(_Staged):
 
     @property
     def inner_solve(self) -> InnerSolve:
-        """Settings of the solve for y."""
+        """Settings of the iteration that solves for y."""
         return self.inner
 
     @property
     def main(self) -> Kernel:
-        """The kernel that takes most of the time."""
+        """The kernel that takes most of the computing time: one Newton iteration."""
         return self.linearise
 
     @property
@@ -252,7 +268,10 @@ class Newton(_Staged):
 
 @dataclass(frozen=True)
 class Explicit(_Staged):
-    """Explicit step: the increment is a formula. ``tangent`` is its Jacobian, if the tangent map was requested."""
+    """Explicit step x' = x + d(x): the kernel ``increment`` is d.
+
+    ``tangent`` is the Jacobian of d, if tangent maps were requested.
+    """
 
     increment: Kernel
     tangent: Kernel | None = None
@@ -261,7 +280,7 @@ class Explicit(_Staged):
 
     @property
     def main(self) -> Kernel:
-        """The kernel that takes most of the time."""
+        """The kernel that takes most of the computing time: the increment."""
         return self.increment
 
     @property
@@ -272,8 +291,10 @@ class Explicit(_Staged):
 
 @dataclass(frozen=True)
 class PathLanes:
-    """Kernels for several paths in lanes: the recurrences of the derivatives of a path, and kernels that use these
-    derivatives."""
+    """Kernels for the solution of several steps along paths at once, in SIMD lanes.
+
+    ``slopes`` are the recurrences for the derivatives of a path; the other kernels use these derivatives.
+    """
 
     slopes: PathSlopes
     curvature: Kernel
@@ -283,7 +304,8 @@ class PathLanes:
 
 @dataclass(frozen=True)
 class PathTangent:
-    """The path with its variation (`phigen.scheme.tangent`), and the Hessian of S_h at its mean."""
+    """The recurrences of a path together with its variation (`phigen.scheme.tangent`), and the kernel of Hess S_h at
+    its mean."""
 
     recurrences: Recurrences
     curvature: Kernel
@@ -291,7 +313,10 @@ class PathTangent:
 
 @dataclass(frozen=True)
 class Path(_Staged):
-    """Step along a path: p = ∇S_h(mean of the path ṁ = π(m)p) is solved for p; α and β are the ends of the path."""
+    """Step along a path ṁ = π(m)p: it solves p = ∇S_h(y) for p, where y = ∫ m dt is the mean of the path.
+
+    The path starts at the old state and ends at the new state.
+    """
 
     recurrences: Recurrences
     generate: Kernel
@@ -304,22 +329,22 @@ class Path(_Staged):
 
     @property
     def inner_solve(self) -> InnerSolve:
-        """Settings of the solve for p."""
+        """Settings of the iteration that solves for p."""
         return self.inner
 
     @property
     def path(self) -> Recurrences:
-        """The recurrences of the path."""
+        """The recurrences for the Taylor coefficients of the path."""
         return self.recurrences
 
     @property
     def varied_path(self) -> Recurrences | None:
-        """The recurrences of the path with its variation, if derivatives were requested."""
+        """The recurrences of the path together with its variation; None if tangent maps were not requested."""
         return self.tangent.recurrences if self.tangent else None
 
     @property
     def main(self) -> Kernel:
-        """The kernel that takes most of the time apart from the recurrences."""
+        """The kernel of ∇S_h, which takes most of the computing time apart from the recurrences of the path."""
         return self.generate
 
     @property
@@ -332,7 +357,7 @@ class Path(_Staged):
 
     @property
     def curvature(self) -> Kernel | None:
-        """Kernel of ∇S_h and its Hessian; None unless derivatives of a step were requested."""
+        """Kernel of ∇S_h and Hess S_h at the mean of the path; None unless tangent maps or gradients were requested."""
         if self.tangent:
             return self.tangent.curvature
         return self.back.curvature if self.back else None
@@ -340,8 +365,11 @@ class Path(_Staged):
 
 @dataclass(frozen=True)
 class GaussTangent:
-    """The Jacobians of the vector field of a stage, with respect to the start and to the unknowns, and that of
-    ``change``."""
+    """The Jacobians of two kernels of a Gauss step, for tangent maps: of ``slope``, the vector field of a stage, and of
+    ``change``.
+
+    The derivatives are with respect to the start of the step and to the unknowns of a stage.
+    """
 
     slope: Kernel
     change: Kernel
@@ -349,11 +377,12 @@ class GaussTangent:
 
 @dataclass(frozen=True)
 class ReducedSweeps:
-    """Sweeps over the ``iterated`` unknowns of a Gauss method; the lists contain indices of unknowns.
+    """Sweeps over a part of the unknowns of a Gauss step; all lists contain indices of unknowns.
 
-    The iterated unknowns depend on the ``followers`` only. The followers are linear in the ``integrated`` unknowns,
-    some of the iterated ones. Both kernels read integrals of the increments of the integrated unknowns: ``slope``
-    computes the increments, ``follow`` the followers.
+    The derivatives of the ``iterated`` unknowns depend on the ``followers`` only. The derivatives of the followers are
+    linear functions of the ``integrated`` unknowns, which are some of the iterated ones. Both kernels read the
+    integrals of the integrated unknowns up to a stage. ``slope`` computes the derivatives of the iterated unknowns,
+    ``follow`` the followers.
     """
 
     slope: Kernel
@@ -365,10 +394,11 @@ class ReducedSweeps:
 
 @dataclass(frozen=True)
 class Lift:
-    """Frames F of group elements, components of which follow the coordinates and the time in the start of a step.
+    """Frames of a Gauss step: quaternions F, at which the group elements of the step start instead of at 1.
 
-    ``functionals`` gives y = F* k F, three numbers for each copy of the quaternions; ``copies`` are the places of its
-    basis 1, i, j, k among the ``size`` components, which belong to the last unknowns.
+    ``functionals`` computes vectors y, three numbers for each copy of the quaternions, and F satisfies F* k F = y. The
+    frames have ``size`` components, which are the last unknowns of the step. ``copies`` has, for each copy of the
+    quaternions, the places of its basis 1, i, j, k among these components.
     """
 
     functionals: Kernel
@@ -380,12 +410,13 @@ class Lift:
 class Gauss(_Staged):
     """Step by Gauss collocation.
 
-    Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j) is solved by fixed-point sweeps; then x' = x + D(x, Σ_j L_j). The
-    unknowns Z are offsets, 0 at the start of the step. ``slope`` is f; its input x is the point, with the time as the
-    last entry if f depends on the time. ``change`` is D. ``frame`` transforms the L_j of a step to the frame of the
-    next step, if that differs. The first ``plain`` unknowns have the scale of the state; the others, of group elements,
-    have the scale 1. ``lifted`` is the same step in frames that move along, None if there is
-    none; its ``lift`` describes the frames.
+    Fixed-point sweeps solve the stage equations Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j). Then x' = x + D(x, Σ_j
+    L_j). The unknowns Z are offsets from the start of the step, where they are 0. ``slope`` is f; its input x is the
+    start of the step, followed by the time if f depends on it. ``change`` is D.
+
+    ``frame`` transforms the L_j to the frame of the next step, if that is another one. The first ``plain`` unknowns
+    have the scale of the state; the other ones belong to group elements and have the scale 1. ``lifted`` is the same
+    step in frames that follow the state, or None; its ``lift`` describes these frames.
     """
 
     slope: Kernel
@@ -403,7 +434,7 @@ class Gauss(_Staged):
 
     @property
     def main(self) -> Kernel:
-        """The kernel that takes most of the time."""
+        """The kernel that takes most of the computing time: the vector field of a stage."""
         return self.slope
 
     @property
@@ -413,7 +444,7 @@ class Gauss(_Staged):
 
     @property
     def stage_transposes(self) -> tuple[Kernel, ...]:
-        """Transposed kernels of a stage: those that read its weight w."""
+        """The transposed kernels that are called once for each stage: those that read the weight w of the stage."""
         return tuple(k for k in (self.adjoint.steps if self.adjoint else ()) if "w" in k.inputs)
 
     @property
@@ -425,19 +456,19 @@ class Gauss(_Staged):
 
 
 class _Scheduled(_Staged):
-    """A step of flows that follow a schedule."""
+    """Base class of steps that are sequences of flows in the order of a schedule."""
 
     schedule: Schedule
     composition: str
 
     @property
     def flow_schedule(self) -> Schedule:
-        """The order and the times of the flows in a step."""
+        """The order and the durations of the flows in a step."""
         return self.schedule
 
     @property
     def method_name(self) -> str:
-        """The name of the composition."""
+        """The name of the composition of flows."""
         return self.composition
 
     @property
@@ -448,10 +479,10 @@ class _Scheduled(_Staged):
 
 @dataclass(frozen=True)
 class Splitting(_Scheduled):
-    """Step of a splitting: the exact flows of the parts of H, one after another as the ``schedule`` lists them.
+    """Step of a splitting: the exact flows of the parts of H, in the order of the ``schedule``.
 
-    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the method;
-    ``tangents`` are the Jacobians of the increments of the flows, if the tangent map was requested.
+    ``prepare`` computes a row of coefficients for each row of the schedule. ``composition`` is the name of the method.
+    ``tangents`` are the Jacobians of the increments of the flows, if tangent maps were requested.
     """
 
     flows: tuple[Kernel, ...]
@@ -463,11 +494,11 @@ class Splitting(_Scheduled):
 
     @property
     def flow_kernels(self) -> tuple[Kernel, ...]:
-        """The flows with their derivatives and transposes."""
+        """The kernels of the flows, of their derivatives and of their transposes."""
         return (*self.flows, *self.tangents, *(self.adjoint.steps if self.adjoint else ()))
 
     def maps(self, stages: int) -> int:
-        """The number of flows in a step, including those of a corrector."""
+        """The number of flows in a run of one step, including those of a corrector; ``stages`` does not matter."""
         return len(self.schedule.flows_of_run)
 
     @property
@@ -478,11 +509,12 @@ class Splitting(_Scheduled):
 
 @dataclass(frozen=True)
 class Seam:
-    """The boundary seam along an axis, for sizes that are not multiples of the ``period`` of the colours.
+    """The boundary seam of a lattice along a periodic axis whose size is not a multiple of the ``period`` of the
+    colouring.
 
-    The seam consists of the last sites: the remainder of the size, and enough periods to make it at least ``wide``.
-    The terms that start on it also update sites within the distance ``near``. All other terms have colours that fit
-    their neighbours.
+    The seam consists of the last sites: those left over after the last whole period, and as many more periods as make
+    it at least ``wide`` sites long. The terms of H that start on the seam are separate parts; they update the seam and
+    the sites within the distance ``near`` of it. All other terms are coloured as on a lattice without a seam.
     """
 
     period: int = 1
@@ -491,7 +523,8 @@ class Seam:
 
     @property
     def least(self) -> int:
-        """The smallest size for which every remainder is possible: the seam, and at least as many other sites."""
+        """The smallest size of the axis for which every remainder is possible: the longest seam and ``wide`` other
+        sites."""
         return 2 * self.wide + self.period - 1
 
 
@@ -499,9 +532,9 @@ class Seam:
 class Sites:
     """The sites of a lattice, whose sizes are arguments of the solver.
 
-    ``places`` maps each symbol of kernels to a field, or parameter at sites, and an offset, with the fastest axis last.
-    The colour of a site is Σ ``weights``·position modulo ``colours``. Sizes are multiples of ``periods``, and at least
-    ``least``.
+    ``places`` maps each symbol of kernels to a field (or a parameter with a value at each site) and an offset from the
+    site, with the fastest axis last. The colour of a site is Σ ``weights``·position modulo ``colours``. The sizes must
+    be multiples of ``periods``, and at least ``least``. ``open`` says which axes have open ends.
     """
 
     axes: tuple[str, ...]
@@ -515,22 +548,22 @@ class Sites:
     ends: Mapping[str, tuple[str, str]] = field(
         default_factory=dict
     )  # symbols of kernels of bonds or pairs: field and end
-    at_bonds: tuple[str, ...] = ()  # parameters at bonds
-    increments: tuple[str, ...] = ()  # noise increments of a site in one part of a step
-    derived: tuple[Symbol, ...] = ()  # values at sites that the solver computes from the parameters
-    seams: tuple[Seam, ...] = ()  # boundary seams along the axes, with which the colours fit every size
+    at_bonds: tuple[str, ...] = ()  # names of the parameters with a value at each bond
+    increments: tuple[str, ...] = ()  # symbols of the noise increments of a site in one part of a step
+    derived: tuple[Symbol, ...] = ()  # symbols of values at sites, computed from parameters
+    seams: tuple[Seam, ...] = ()  # boundary seams along the axes, by which the colouring fits every size
 
 
 @dataclass(frozen=True)
 class Ends:
-    """A ``kernel`` of bonds or pairs between a site, a, and another site, b.
+    """A ``kernel`` for the bonds or pairs between a site, called a here, and another site, called b.
 
-    Its inputs are ``coef`` or ``params``, ``site``, and ``bonds``, the parameters at bonds. ``end`` is the end of the
-    bond at which the site lies, in the order of the user: a, b, or "" for either. ``chosen`` says which of the two must
-    have the colour of the sweep: ``here`` (a), ``there`` (b), or "" for neither. ``extremes`` maps the indices of
-    outputs that are reduced to ``max`` or ``min``; all other outputs are summed. For pairs, b runs over the sites from
-    ``first`` on; if the kernel is ``massive``, the sites after the last one with a mass contribute nothing and are
-    omitted.
+    The inputs of the kernel are ``coef`` or ``params``, ``site``, and ``bonds``, the parameters of the bond. ``end`` is
+    the end of the bond at which the site lies, in the order of the user: "a", "b", or "" for both ends. ``chosen`` says
+    which of the two sites must have the colour of the sweep: ``here`` (a), ``there`` (b), or "" for neither.
+    ``extremes`` maps the index of an output to ``max`` or ``min``, if this output is reduced in this way; all other
+    outputs are summed. For pairs, b runs over the sites from number ``first`` on. If the kernel is ``massive``, the
+    sites after the last one with a nonzero mass are omitted, since they contribute nothing.
     """
 
     kernel: Kernel
@@ -542,31 +575,33 @@ class Ends:
 
     @property
     def of_all(self) -> bool:
-        """Whether both sites of every bond or pair add the contribution of the bond or pair."""
+        """Whether every bond or pair contributes to both of its sites: no end and no colour is selected."""
         return not (self.end or self.chosen)
 
 
 @dataclass(frozen=True)
 class Gather:
-    """Sums over the bonds of a site, or over its pairs with other sites: one value for each of the ``names``."""
+    """Sums over the bonds of a site, or over its pairs with other sites; each of the ``names`` is the symbol of one
+    sum."""
 
     ends: tuple[Ends, ...]
     names: tuple[str, ...]
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """The kernels of all ends."""
+        """The kernels of the terms of the sums, one for each of the ``ends``."""
         return tuple(e.kernel for e in self.ends)
 
 
 @dataclass(frozen=True)
 class Partners:
-    """Sums over bonds or pairs at a site: half of the energies, and the forces or rates.
+    """Sums over the bonds or pairs of a site that are not part of a sweep, as functions of the parameters.
 
-    They are functions of the parameters. ``varied`` has the forces with their derivatives along variations of the
-    fields, for steps that solve an `Equation`. ``observed`` are the densities of observables of bonds and pairs,
-    ``of_parts`` the energies of parts of H and their derivatives, by the names of the kernels that read them
-    (`PartRates`).
+    ``energy`` is half of the energies, so that each is counted once over both sites. ``field`` has the forces or rates
+    of the vector field. ``varied`` has the forces and their derivatives in the direction of a variation of the fields,
+    for steps that solve an `Equation`. ``observed`` has the densities of observables. ``of_parts`` has the energies of
+    parts of H and their derivatives, by the name of the kernel that reads them (`PartRates`). ``graph`` says that the
+    bonds are those of a graph.
     """
 
     energy: Gather
@@ -577,24 +612,24 @@ class Partners:
     of_parts: tuple[tuple[str, Gather], ...] = ()
 
     def sums_of(self, kernel: Kernel) -> Gather:
-        """Return the sums that an observable reads; no sums if it reads none."""
+        """Return the sums over bonds or pairs that the kernel of an observable reads; no sums if it reads none."""
         sums = {Role.ENERGY: self.energy, Role.VECTOR_FIELD: self.field, Role.OBSERVABLES: self.observed}
         return dict(self.of_parts).get(kernel.name) or sums.get(kernel.role, Gather((), ()))
 
     @property
     def gathers(self) -> tuple[Gather, ...]:
-        """All sums, including empty ones."""
+        """All groups of sums, including empty groups."""
         return (self.energy, self.field, self.varied, self.observed, *(gather for _, gather in self.of_parts))
 
 
 @dataclass(frozen=True)
 class PartRates:
-    """Steps of a lattice that are equal in τ: K = log(A + e) − log(−B), where H = A + B has two parts.
+    """Kernels for the monitor ``log`` on a lattice: steps equal in τ for K = log(A + e) − log(−B), where H = A + B.
 
-    The flow of a part of K is that of the part of H over the time τ/(A + e), or τ/(−B). ``energies`` are the densities
-    of both parts, in the order of the parts of the step; the part with the number ``negative`` is B. ``slopes`` are the
-    derivatives of the densities along a variation, if derivatives of a step were requested: then ``prepare`` reads the
-    variation of the time of the flow, as the input ``late``.
+    The flow of a part of K over τ is the flow of A over τ/(A + e), or that of B over τ/(−B). ``energies`` are the
+    kernels of the densities of A and B, in the order of the parts of the step; the part with the number ``negative`` is
+    B. ``slopes`` are the derivatives of the densities in the direction of a variation, if tangent maps were requested.
+    In that case ``prepare`` has the variation of the duration of the flow as the further input ``late``.
     """
 
     energies: tuple[Kernel, Kernel]
@@ -609,16 +644,17 @@ class PartRates:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Increments of the fields with the indices ``moved`` at all sites of one ``colour``.
+    """Loop over the sites of a lattice that adds increments to the fields with the indices ``moved``.
 
-    A sweep reads no values that it changes. Without a colour, it updates every site. If it is ``inside``, it omits
-    sites near seams. With a ``window``, it updates only sites near seams, by the terms that begin on the seams of these
-    axes (a bit mask), or on none. It updates no sites before the ``first``.
+    The sites are those of one ``colour``, or all sites if ``colour`` is None. A sweep reads no values that it changes.
+    If it is ``inside``, it omits the sites near seams. If it has a ``window``, it updates only sites near seams, by
+    those terms of H that start on the seams of certain axes; ``window`` is the bit mask of these axes, and 0 stands for
+    terms that start on no seam. Sites before number ``first`` are not updated.
 
-    The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. The symbols of ``present`` are 1
-    if a term of H lies within open ends, or if a site has the colour of the sweep, else 0. ``gathered`` are the sums of
-    ``gather``. ``tangent`` exists if derivatives of a step were requested: it has the increments of the variations of
-    the fields, from the inputs of this sweep and the variations ``varied``.
+    The inputs of the ``kernel`` are ``coef``, ``site``, ``present`` and ``gathered``. A symbol of ``present`` is 1 if a
+    term of H does not extend beyond an open end, or if a site has the colour of the sweep, else 0. ``gathered`` are the
+    sums of ``gather``. ``tangent`` is the derivative of the sweep, if tangent maps were requested: it adds increments
+    to a variation of the fields, from the inputs of this sweep and the input ``varied``.
     """
 
     kernel: Kernel
@@ -632,18 +668,19 @@ class Sweep:
 
     @property
     def is_tangent(self) -> bool:
-        """Whether the sweep updates variations of the fields."""
+        """Whether the sweep updates a variation (tangent vector) of the fields instead of the fields."""
         return self.kernel.role is Role.SWEEP_TANGENT
 
 
 @dataclass(frozen=True)
 class Equation:
-    """The equation of a stage on a lattice: y = x − (α − x)(y, h∇H(y)); x is then updated by (β − α)(y, h∇H(y)).
+    """The implicit equation of a stage on a lattice: y = x − (α − x)(y, h∇H(y)); then (β − α)(y, h∇H(y)) is added to x.
 
-    The inputs of the kernels are those of sweeps, with values of y as ``site``. ``relax``, the right-hand side at a
-    site, also reads ``start``, the x of the site. ``advance`` is the increment of x. ``slope`` is the derivative of
-    ``relax`` along a variation of y, for Newton's method. ``tangents`` exist if derivatives of a step were requested:
-    those of ``relax`` along a variation of x, and of ``advance`` along one of y.
+    The kernels have the inputs of a sweep, with the values of y as ``site``. ``relax`` is the right-hand side at a
+    site; it also reads ``start``, the x of this site. ``advance`` is the increment of x. ``slope`` is the derivative of
+    ``relax`` in the direction of a variation of y, for Newton's method. ``tangents`` are the derivatives of ``relax``
+    in the direction of a variation of x, and of ``advance`` in the direction of a variation of y, if tangent maps were
+    requested.
     """
 
     relax: Kernel
@@ -660,10 +697,12 @@ class Equation:
 
 @dataclass(frozen=True)
 class RelativeSites:
-    """The relative coordinates in which steps of a lattice of bodies are made (`phigen.lattice.relative_bodies`).
+    """The relative coordinates in which the steps of a lattice of attracting bodies are made.
 
-    ``axes`` pairs the index of each position with that of its momentum or velocity. ``remainder`` is the index of the
-    part B. The sums over pairs in B read positions; its ``shifts`` further sums read velocities. ``mass`` is a
+    ``jacobi`` says that these are Jacobi coordinates, and not democratic heliocentric ones; ``momenta`` says that the
+    fields are positions and momenta, and not positions and velocities. ``axes`` pairs the index of each position with
+    that of its momentum or velocity. ``remainder`` is the index of the part B of H = A + B, whose forces are sums over
+    pairs: the first sums read positions, and ``shifts`` further sums read velocities. ``mass`` is the name of the
     parameter at sites.
     """
 
@@ -677,19 +716,19 @@ class RelativeSites:
 
 @dataclass(frozen=True)
 class Sweeps(_Scheduled):
-    """A step of a lattice, by sweeps over its sites.
+    """A step of a lattice, which consists of sweeps over its sites.
 
-    In a splitting each of the ``parts`` is a list of sweeps, which may run in any order; the ``schedule`` lists the
-    parts.
+    In a splitting each of the ``parts`` of H is a list of sweeps, which may run in any order. The ``schedule`` lists
+    the parts in the order of their flows. For a step with a generating function there is an ``equation`` instead of
+    parts, and the schedule lists the stages.
 
-    If some parts belong to one colour of a graph (``by_colour``), the flows of a step are those of all parts, repeated
-    for each colour. The ``schedule`` then contains these numbers instead of parts: 0 the first flow, 1 the flows in the
-    middle, 2 the last flow, 3 the flows in the middle in reverse order. If H depends on the time, the advance of the
-    time takes the place of the last flow, and the last flow is in the middle.
+    On a graph a part may belong to one colour (``by_colour``); the flows of all parts are then repeated for each
+    colour. In this case the numbers in the ``schedule`` are not parts: 0 is the first flow, 1 are the flows in the
+    middle in order, 2 is the last flow, and 3 are the flows in the middle in reverse order. If H depends on the time,
+    the advance of the time counts as the last flow, and the flow of the last part as one in the middle.
 
-    In the series there is an ``equation`` instead of parts, and the schedule lists its stages.
-
-    Bodies in ``relative`` coordinates are transformed to these before the flows, and back afterwards.
+    If bodies have ``relative`` coordinates, the fields are transformed to these coordinates before the flows, and back
+    after them.
     """
 
     sites: Sites
@@ -698,7 +737,7 @@ class Sweeps(_Scheduled):
     composition: str
     casimir_kinds: tuple[str, ...] = ()
     partners: Partners | None = None
-    by_colour: tuple[bool, ...] = ()  # graphs: whether a part belongs to one colour
+    by_colour: tuple[bool, ...] = ()  # graphs: whether a part updates the sites of one colour only
     equation: Equation | None = None
     rates: PartRates | None = None
     relative: RelativeSites | None = None
@@ -707,15 +746,16 @@ class Sweeps(_Scheduled):
 
     @property
     def swept(self) -> Sweeps:
-        """The step itself, since it consists of sweeps over sites."""
+        """The step itself, since it is the step of a lattice."""
         return self
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether a caller can make the sweeps of a step one by one, plane by plane: splittings on grids.
+        """Whether a caller can make the sweeps of a step one by one, on planes of the lattice: this is offered for
+        splittings on grids.
 
-        Noise is drawn in the sweep that reads it, so no sweep may read the noise of neighbours. A seam lies at the end
-        of the whole lattice, which a caller with a part of the lattice does not have.
+        Noise is drawn by the sweep that reads it, so no sweep may read the noise of a neighbour. A seam lies at the end
+        of the whole lattice, so a caller with a part of the lattice does not have it; hence there must be no seam.
         """
         reads_neighbour_increments = any(
             base in self.sites.increments and any(offset) for base, offset in self.sites.places.values()
@@ -725,10 +765,11 @@ class Sweeps(_Scheduled):
         )
 
     def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
-        """Return the access of a part on a grid: its extent behind and ahead along the first axis, and two bit masks of
-        fields.
+        """Return which values the sweeps of a part of H access on a grid: (distance behind, distance ahead, read,
+        updated).
 
-        The masks are the fields that it reads at these distances, and the fields that it updates.
+        The distances count along the first axis. ``read`` is the bit mask of the fields that are read at other
+        positions along this axis, and ``updated`` that of the fields that are updated.
         """
         places = [self.sites.places[s] for sweep in self.parts[part] for s in sweep.kernel.inputs["site"]]
         distant = [(f, offset[0]) for f, offset in places if offset[0]]
@@ -740,30 +781,30 @@ class Sweeps(_Scheduled):
 
     @property
     def sweeps(self) -> tuple[Sweep, ...]:
-        """The sweeps of all parts, each before its derivative."""
+        """The sweeps of all parts in order; each sweep is followed by its derivative, if there is one."""
         return tuple(s for part in self.parts for sweep in part for s in (sweep, sweep.tangent) if s)
 
     @property
     def tangents(self) -> tuple[tuple[Sweep, ...], ...]:
-        """The derivatives of the sweeps of each part; empty if they were not requested."""
+        """For each part the derivatives of its sweeps; empty if tangent maps were not requested."""
         if any(sweep.tangent is None for part in self.parts for sweep in part):
             return ()
         return tuple(tuple(sweep.tangent for sweep in part if sweep.tangent) for part in self.parts)
 
     @property
     def others(self) -> Partners:
-        """The sums over bonds or pairs; empty on grids."""
+        """The sums over bonds or pairs that are not part of a sweep; empty on grids."""
         return self.partners or Partners(Gather((), ()), Gather((), ()))
 
     @property
     def sums(self) -> int:
-        """The largest number of sums over other sites that are stored for each site."""
+        """The largest number of sums over bonds or pairs that are stored for each site at one time."""
         swept = [sweep.gather for sweep in self.sweeps if sweep.gather]
         return max(len(g.names) for g in (*swept, *self.others.gathers))
 
     @property
     def rate_kernels(self) -> tuple[Kernel, ...]:
-        """The kernels of the energies of parts; empty without a monitor."""
+        """The kernels of the energies of the two parts of H for the monitor ``log``; empty without this monitor."""
         return self.rates.kernels if self.rates else ()
 
     @property

@@ -1,8 +1,10 @@
-"""Transposed sweeps of lattices that collect: each site computes the contributions of its neighbours itself.
+"""Transposed sweeps of lattices in collecting form: each site computes the contributions of its neighbours to its
+cotangents.
 
-This is faster if the contributions are cheap, such as those of springs: the site reads the same values anyway, and only
-the cotangents of neighbours are additional. Expensive contributions, such as sines of sums over neighbours, are
-computed once, at the neighbour, which stores them for the site.
+In the other form a neighbour computes the contribution and stores it for the site. Collecting is faster if
+contributions are cheap, such as those of springs: the site reads the fields of its neighbours anyway, and only their
+cotangents are read in addition. Expensive contributions, such as sines of sums over neighbours, are computed once, by
+the neighbour.
 """
 
 from __future__ import annotations
@@ -16,13 +18,17 @@ from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, s
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import AROUND, Symbol
 
-#: Cost, in additions, of a value that a site stores for a neighbour: one loop writes it, another reads it.
+#: Cost, in units of an addition, of a value that a site stores for a neighbour: one loop writes it, and another loop
+#: reads it.
 STORED_VALUE_COST = 10
 
 
 def collecting(fields: Sequence[str], step: Sweeps, sweep: Sweep, transpose: Kernel) -> Kernel | None:
-    """Return the collecting form of the transpose of a sweep; None if nothing is stored for neighbours, or storing
-    is cheaper."""
+    """Return the transpose of a sweep in the form in which each site collects the contributions of its neighbours.
+
+    Returns None if there are no contributions of neighbours, if this form is not possible, or if it is more expensive
+    than storing the contributions.
+    """
     sites, contributions = step.sites, transpose.along("site")
     neighbour_terms = [
         (name, value) for name, value in contributions if any(sites.places[name][1]) and not value.is_zero
@@ -69,9 +75,10 @@ def _from_receiver(
     offset: Sequence[int],
     value: Expression,
 ) -> Expression | None:
-    """Return the contribution to the site at ``offset``, in symbols of that site.
+    """Return a contribution to the site at ``offset``, written in the symbols of that site.
 
-    None if that site does not read the values that the contribution needs.
+    ``value`` is the contribution in the symbols of the site that causes it. Returns None if the sweep has no symbol for
+    a value that the contribution needs.
     """
     renamed: dict[str, Expression] = {}
     for s in symbols_of(value):
@@ -89,14 +96,14 @@ def _from_receiver(
 
 
 def _by_cotangents(value: Expression) -> Expression:
-    """Return a value as a sum over cotangents, each times its factor.
+    """Return an expression that is linear in cotangents as a sum of the cotangents times their factors.
 
-    The contributions of both ends of a spring then have the same factor.
+    In this form the contributions of both ends of a spring have the same factor, which is computed once.
     """
     cotangents = [s for s in symbols_of(value) if isinstance(s, Symbol) and s.kind in ("change_bar", AROUND)]
     return total(e * symbol(s) for s, e in zip(cotangents, gradient(value, cotangents), strict=True))
 
 
 def _cost(values: Sequence[Expression]) -> int:
-    """Return the cost of computing some values, in additions."""
+    """Return the cost of computing some values, in units of an addition."""
     return sum(FUNCTIONS[e.op].cost if e.op in FUNCTIONS else bool(e.args) for e in topological(values))

@@ -1,4 +1,5 @@
-"""Properties of the sweeps of a lattice that select its code: elimination, blocking, reverse passes."""
+"""Properties of the sweeps of a lattice from which targets choose their code: band elimination, wavefront blocking,
+reverse passes."""
 
 from __future__ import annotations
 
@@ -10,20 +11,24 @@ from phigen.scheme.sweep_inverse import can_recompute_fields, once, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND
 
-#: Largest number of off-diagonals of a band matrix for which elimination is used.
+#: Largest number of off-diagonals on each side of a band matrix for which elimination is used.
 MAX_DIAGONALS = 64
 
 
 def reach(step: Sweeps) -> int:
-    """Return the largest distance of a neighbour in the equation of a stage, on a lattice with one axis."""
+    """Return the largest distance, in sites, of a neighbour that the implicit equation of a stage reads, on a lattice
+    with one axis."""
     relax = step.equation.relax if step.equation else None
     places = [step.sites.places[s] for s in relax.inputs["site"]] if relax else []
     return max((abs(offset[-1]) for f, offset in places if f not in step.sites.parameters), default=0)
 
 
 def band(step: Sweeps) -> int:
-    """Return the number of off-diagonals of the matrix of a stage, in units of sites; 0 if band elimination does not
-    apply."""
+    """Return the number of off-diagonals on each side of the Newton matrix of a stage; 0 if band elimination does not
+    apply.
+
+    A distance of one site counts as many off-diagonals as there are fields.
+    """
     if not step.equation or step.partners or len(step.sites.axes) > 1:
         return 0
     diagonals = (reach(step) + 1) * len(step.equation.relax.roots) - 1
@@ -31,40 +36,53 @@ def band(step: Sweeps) -> int:
 
 
 def beside_seams(sweep: Sweep) -> bool:
-    """Whether a sweep has a separate loop because of boundary seams: away from them, or only near them."""
+    """Whether a sweep is restricted by boundary seams: it omits the sites near seams, or updates only these."""
     return sweep.inside or sweep.window is not None
 
 
 def first_kind(sites: Sites, sweep: Sweep) -> int | None:
-    """Return the number of the first kind of sites near seams that a sweep updates; None for other sweeps."""
+    """Return the code for colour 0 of the sites near seams that a sweep updates; None for a sweep without a ``window``.
+
+    The runtime marks each site near seams with such a code: the bit mask of seams times the number of colours, plus the
+    colour.
+    """
     return None if sweep.window is None else sweep.window * sites.colours
 
 
 def wide(sites: Sites, sweep: Sweep) -> bool:
-    """Whether a sweep over a row may write whole SIMD vectors beyond its end: the halo there is updated afterwards."""
+    """Whether a sweep over a row may write beyond its end, up to a whole SIMD vector.
+
+    This is possible where the halo behind the row is filled after the sweep.
+    """
     return len(sites.axes) > 1 and sites.colours == 1 and not sweep.gather and not sweep.is_tangent
 
 
 def chosen_ends(step: Sweeps) -> set[str]:
-    """Return the values of ``chosen`` that occur in the sums of sweeps over bonds."""
+    """Return which sites of a bond must have the colour of a sweep, in all sums of the step: values of
+    `Ends.chosen`."""
     gathers = (sweep.gather for part in step.parts for sweep in part if sweep.gather)
     return {ends.chosen for gather in gathers for ends in gather.ends}
 
 
 def site_blocks(program: Program, step: Sweeps) -> bool:
-    """Whether Krylov methods are preconditioned with the diagonal blocks of the matrix at sites; only on grids."""
+    """Whether the Krylov methods for a stage are preconditioned with the diagonal blocks of the Newton matrix, one for
+    each site.
+
+    This is so on grids in the profile ``fast``, unless band elimination applies.
+    """
     return step.equation is not None and step.partners is None and not band(step) and program.profile == "fast"
 
 
 def waves(program: Program, step: Sweeps) -> bool:
-    """Whether wavefront blocking applies: to splittings on grids, whose flows read neighbours only."""
+    """Whether wavefront blocking applies: for splittings on grids, whose flows read only neighbours, in the profile
+    ``fast``."""
     is_splitting = step.equation is None and step.partners is None and not step.sites.seams
     return is_splitting and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
 
 
 @once
 def hands(program: Program, step: Sweeps) -> list[bool]:
-    """Return for each part of H whether its transpose passes cotangents to other sites."""
+    """Return for each part of H whether its transposed sweeps pass cotangents from a site to other sites."""
     passes: list[bool] = []
     if step.equation and step.adjoint:
         kernels = [kernel for kernel in step.adjoint.steps if "sums_bar" not in kernel.inputs]
@@ -79,9 +97,9 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
 
 
 def takes(program: Program, step: Sweeps) -> bool:
-    """Whether the loop of the next flow adds the cotangents that a flow passes to other sites of a grid.
+    """Whether the cotangents that a flow passes to other sites of a grid are added by the loop of the next flow.
 
-    This is so in the ``fast`` profile only, since the code is long.
+    Otherwise separate loops add them. This is used in the profile ``fast`` only, since the code is long.
     """
     if program.profile != "fast" or step.partners or step.sites.colours > 1 or not can_recompute_fields(program, step):
         return False
@@ -94,16 +112,17 @@ def takes(program: Program, step: Sweeps) -> bool:
 def handed_apart(program: Program, step: Sweeps) -> list[bool]:
     """Return for each part of H whether separate loops add the cotangents that its sweeps pass to other sites.
 
-    If the loop of the next flow adds them, this is only so for the first flow, which is the last of the reverse pass.
+    If the loop of the next flow adds them (`takes`), only the first flow of a step needs separate loops: it comes last
+    in the reverse pass.
     """
     first = step.schedule.flows[0][0] if takes(program, step) else None
     return [passes and first in (None, k) for k, passes in enumerate(hands(program, step))]
 
 
 def ways(step: Sweeps) -> list[tuple[int, int]]:
-    """Return for each flow of a step its part and the part of the flow after it.
+    """Return pairs of parts: for each flow of a step its part and the part of the next flow.
 
-    A last entry is for the first flow when it is merged with the last flow of the step before.
+    A last pair is for the first flow, merged with the last flow of the step before.
     """
     parts = [part for part, _ in step.schedule.flows]
     next_parts = [*parts[1:], parts[1 % len(parts)]]
@@ -111,8 +130,8 @@ def ways(step: Sweeps) -> list[tuple[int, int]]:
 
 
 def shares(step: Sweeps) -> bool:
-    """Whether loops over sites contribute to sums over all sites: to the cotangents of coefficients or of
-    parameters."""
+    """Whether the transposed sweeps contribute at each site to sums over all sites, the cotangents of coefficients or
+    of parameters."""
     kernels = step.adjoint.steps if step.adjoint else ()
     kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
     summed = [kernel.along(array) for kernel in kernels for array in (TABLE, "params") if array in kernel.inputs]
@@ -120,16 +139,16 @@ def shares(step: Sweeps) -> bool:
 
 
 def givers(step: Sweeps) -> bool:
-    """Whether the rows that pass cotangents to a row may differ from the rows that it reads, because of open ends."""
+    """Whether open ends can make the rows from which a row receives cotangents differ from the rows that it reads."""
     return any(step.sites.open[:-1])
 
 
 def starts_are_read(step: Sweeps) -> bool:
-    """Whether the transpose of a stage reads x at the start of the stage, in addition to y."""
+    """Whether the transpose of a stage reads x, the state at the start of the stage, in addition to the solution y."""
     relax = next((k for k in step.adjoint.steps if k.role is Role.TRANSPOSED_RELAX), None) if step.adjoint else None
     return relax is not None and not {*relax.inputs.get("start", ())}.isdisjoint(symbols_of(*relax.roots))
 
 
 def reads_sums(kernel: Kernel) -> bool:
-    """Whether a transposed kernel reads sums over bonds or pairs, and not only the cotangents of these sums."""
+    """Whether a transposed kernel reads the sums over bonds or pairs themselves, and not only their cotangents."""
     return not set(kernel.inputs["gathered"]).isdisjoint(symbols_of(*kernel.roots))

@@ -1,7 +1,8 @@
-"""Inverse sweeps of lattices: the fields before a flow, computed from those after it by the flow over the time −h.
+"""Inverse sweeps of lattices: the fields before a flow, computed from the fields after it by the flow over the time −h.
 
-Sums over bonds or pairs are the same before and after, since they read no field that the sweep updates. A damping force
-that adds a multiple of a field to the field itself is inverted by division; there is no inverse for other damping.
+A sum over bonds or pairs has the same value before and after a sweep, since it reads no field that the sweep updates.
+If a damping force adds a multiple of a field to this field, the inverse divides by a number. Other damping has no
+inverse.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ T = TypeVar("T")
 
 
 def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps], T]:
-    """Decorator that stores the last result: a printer makes dozens of calls for each pair of objects."""
+    """Decorator that stores the last result of a function of a program and its step.
+
+    A printer calls such functions dozens of times with the same two objects.
+    """
     last: list[tuple[Program, Sweeps, T]] = []
 
     @wraps(function)
@@ -39,7 +43,8 @@ def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps]
 
 @once
 def can_recompute_fields(program: Program, step: Sweeps) -> bool:
-    """Whether the transpose of a step can recompute the fields before its sweeps by the inverse flows."""
+    """Whether the reverse pass of a step can recompute the fields before each sweep by the inverse flow, instead of
+    storing them."""
     if not step.adjoint or step.equation:
         return False
     parities, sweeps = of_coefficients(step), [sweep for part in step.parts for sweep in part]
@@ -50,8 +55,11 @@ def can_recompute_fields(program: Program, step: Sweeps) -> bool:
 
 @once
 def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
-    """Return the transposes of the sweeps of each part, which recompute the fields and collect contributions if
-    possible."""
+    """Return for each part of H the transposed kernels of its sweeps.
+
+    Where possible, they recompute the fields before the sweep, and each site collects the contributions of its
+    neighbours.
+    """
     kernels = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
     invertible = can_recompute_fields(program, step)
     transposes_of_parts = []
@@ -66,10 +74,10 @@ def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
 
 
 def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
-    """Return the transpose without weights of open ends in values that are stored for neighbours.
+    """Return a transposed kernel without the factors 0 or 1 of open ends in the values that are stored for neighbours.
 
-    Each value is then the same for many neighbours. A neighbour that reads a value is on the lattice, and so is the
-    term, unless the term reaches further.
+    Without these factors, a value is often the same for many neighbours. A factor can be omitted if it is 1 at every
+    site whose neighbour reads the value; it stays if the term of H extends beyond this neighbour.
     """
 
     def without_weights(name: str, value: Expression) -> Expression:
@@ -83,7 +91,7 @@ def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
 
 
 def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
-    """Return a product without the weights that are 1 at every site that has a neighbour at ``offset``."""
+    """Return a product without the factors of open ends that are 1 wherever there is a neighbour at ``offset``."""
     if value.op in ("mul", "neg"):
         return rebuild(value, [_without_factors(e, offset) for e in value.args])
     if value.op != "symbol" or not isinstance(value.value, Symbol) or value.value.kind != PRESENT:
@@ -94,8 +102,10 @@ def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
 
 
 def recomputing_transpose(program: Program, step: Sweeps, sweep: Sweep, transpose: Kernel) -> Kernel:
-    """Return the transpose of a sweep that reads the fields after the sweep and recomputes those before,
-    `STATE_BEFORE`."""
+    """Return the transpose of a sweep for a reverse pass that has the fields after the sweep, but not those before it.
+
+    The kernel recomputes the fields before the sweep, as its output `STATE_BEFORE`.
+    """
     updated = [program.coordinates[f] for f in sweep.moved]
     changes = _changes(program, sweep, of_coefficients(step))
     values = iter(before(transpose.roots, changes))
@@ -109,7 +119,7 @@ def recomputing_transpose(program: Program, step: Sweeps, sweep: Sweep, transpos
 
 
 def _changes(program: Program, sweep: Sweep, parities: Mapping[str, int]) -> dict[str, Expression]:
-    """Return the increments of the inverse of a sweep, by field; empty if there is no inverse."""
+    """Return the increments of the inverse of a sweep, by the name of the field; empty if there is no inverse."""
     updated, changes = [program.coordinates[f] for f in sweep.moved], sweep.kernel.roots
     if all(parities.get(s, EVEN) for s in symbols_of(*changes)):
         return dict(zip(updated, over_negative_time(changes, parities), strict=True))
@@ -118,10 +128,9 @@ def _changes(program: Program, sweep: Sweep, parities: Mapping[str, int]) -> dic
 
 
 def _inverse_of_multiple(field: str, updated: Sequence[str], change: Expression) -> Expression | None:
-    """Return the increment of the inverse for a ``change`` that is a multiple of the field plus terms without updated
-    fields.
+    """Return the increment of the inverse of x ↦ x + cx + b, where x is a field and the ``change`` cx + b is given.
 
-    None for a change of another form.
+    Returns None if c or b depends on fields that the sweep updates.
     """
     (factor,), (constant_part,) = gradient(change, [field]), substitute([change], {field: ZERO})
     if not {*updated}.isdisjoint(symbols_of(factor, constant_part)):
@@ -130,10 +139,12 @@ def _inverse_of_multiple(field: str, updated: Sequence[str], change: Expression)
 
 
 def apart(transpose: Kernel) -> tuple[Kernel, Kernel] | None:
-    """Return two kernels for a transpose that recomputes fields: one for cotangents, and one for the fields.
+    """Return a transposed kernel that recomputes fields as two kernels: one computes cotangents, the other the fields
+    before.
 
-    None if the cotangents depend on sums over bonds or pairs. Otherwise only the second kernel reads these sums, so
-    they can be computed together with the cotangents of bonds or pairs, by the same functions.
+    Then only the second kernel reads the sums over bonds or pairs, and these can be computed in one loop with the
+    cotangents of the bonds or pairs. Returns None if the cotangents depend on these sums, or if no fields are
+    recomputed.
     """
     cotangent_outputs = tuple(o for o in transpose.outputs if o.name != STATE_BEFORE)
     state_outputs = tuple(o for o in transpose.outputs if o.name == STATE_BEFORE)

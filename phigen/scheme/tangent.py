@@ -1,9 +1,10 @@
-"""The tangent map of a step, Dx_{n+1}/Dx_n, by implicit differentiation: its kernels for each kind of step.
+"""Kernels for the tangent map of a step, DΦ = Dx_{n+1}/Dx_n, by implicit differentiation.
 
-*newton*: α(y, ∇S_h(y)) = x yields Dy = J⁻¹, and x' = x + d(y) yields DΦ = 1 + M J⁻¹ with J and M of
-`phigen.scheme.step`, so ``linearise`` is sufficient. *explicit*: the Jacobian of the increment. *path*: the equation p
-= ∇S_h(μ(x, p)) for p, with μ the mean of the path, yields (1 − Hess S_h μ_p) Dp = Hess S_h μ_x; the end m of the path
-yields DΦ = m_x + m_p Dp. Derivatives of end and mean come from the path of the tangent structure.
+*newton*: α(y, ∇S_h(y)) = x gives Dy = J⁻¹, and x' = x + d(y) gives DΦ = 1 + M J⁻¹, where J and M are the matrices of
+the kernel ``linearise``. So no further kernel is needed. *explicit*: DΦ = 1 + the Jacobian of the increment. *path*:
+let μ(x, p) be the mean and m(x, p) the end of the path. The equation p = ∇S_h(μ(x, p)) gives (1 − Hess S_h μ_p) Dp =
+Hess S_h μ_x, and then DΦ = m_x + m_p Dp. The derivatives of μ and m are those along a path with its variation
+(`tangent_path`).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from phigen.symbolic.symbols import momentum, variation
 def explicit_jacobian(
     explicit: Kernel, coordinates: Sequence[str], coefficients: Coefficients, name: str = "explicit_tangent"
 ) -> Kernel:
-    """Return the kernel of the Jacobian (n×n) of the increment of an explicit step, or of a flow."""
+    """Return the kernel of the Jacobian (n×n) of the increment of an explicit step or of a flow."""
     columns = [derivatives(explicit.roots, c) for c in coordinates]
     n = len(coordinates)
     flat = coefficients.hoist([columns[j][i] for i in range(n) for j in range(n)])
@@ -35,7 +36,7 @@ def explicit_jacobian(
 
 
 def curvature(system: System, generating: GeneratingFunction, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of ∇S_h and Hess S_h at the mean of a path."""
+    """Return the kernel of ∇S_h and Hess S_h at a point y, for steps along paths, where y is the mean of the path."""
     n = system.dimension
     flat = coefficients.hoist([*generating.slope, *(e for row in generating.hessian for e in row)])
     return Kernel(
@@ -47,10 +48,11 @@ def curvature(system: System, generating: GeneratingFunction, coefficients: Coef
 
 
 def tangent_path(system: System, coefficients: Coefficients) -> Recurrences:
-    """Return the recurrences of the path with its variation v under variations of its start and of p.
+    """Return the recurrences of a path ṁ = π(m)p together with its variation v, which is due to variations of its start
+    and of p.
 
-    (m, v) is the path of the tangent Poisson structure under the covector (p, w): v̇ = ∂_m(π(m)p) v + π(m) w.
-    Coordinates are the x, then ``v:x``; w is the momentum of v.
+    With the variation w of p, v̇ = ∂_m(π(m)p) v + π(m) w. The coordinates of the recurrences are the x, then the
+    ``v:x``; the symbol of w is the momentum of ``v:x``.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]
