@@ -1,1 +1,1 @@
-"""Compiling, loading and running generated solvers."""
+"""Compilation and loading of generated solvers, and the classes with which users run them."""

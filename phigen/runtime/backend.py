@@ -1,4 +1,4 @@
-"""Protocol of back ends: the loaded solver of one target, as the runtime calls it."""
+"""Protocol of back ends. A back end is the loaded solver of one target language, as the classes for users call it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from phigen.runtime.session import Session
 
 
 class Backend(Protocol):
-    """A loaded solver.
+    """The loaded solver of a system, in one target language.
 
-    States are float64 arrays whose last axis is the coordinates. ``parameters`` holds every parameter, in the order of
-    declaration. The caller has checked all arguments. A failing step raises `BackendError`. If the Hamiltonian depends
-    on the time, ``t0`` is the initial time and ``t`` (rows,) are the times of states; otherwise they are 0 and None.
+    States are float64 arrays whose last axis is the coordinates. ``parameters`` holds the value of every parameter, in
+    the order of declaration. The caller has checked all arguments. A failing step raises `BackendError`. If the
+    Hamiltonian depends on the time, ``t0`` is the initial time and ``t`` (rows,) are the times of states; otherwise
+    ``t0`` is 0 and ``t`` None.
     """
 
     target: str
@@ -33,41 +34,47 @@ class Backend(Protocol):
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> Session:
-        """Return a session at x0 (DIM,).
+        """Return a session, a trajectory that is computed step by step, whose state is x0 (DIM,) at the time t0.
 
         ``first`` (numbers,) is the initial attitude and position, by default the identity and the origin. ``draws``
-        select the random numbers of the noise.
+        selects the random numbers of the noise.
         """
         ...
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
-        """Return the session that `Session.saved` stored as the bytes ``saved``, by a back end of the same
-        `identity`."""
+        """Return the session that `Session.saved` stored as the bytes ``saved``.
+
+        They must come from a back end of the same `identity`.
+        """
         ...
 
     def with_gauge(self, gauge: Floats) -> Backend:
-        """Return a back end whose trajectories use a fixed gauge: one value for each Casimir of the gauge."""
+        """Return a back end whose trajectories all use the gauge ``gauge``: one number for each Casimir of the gauge.
+
+        The gauge are the multiples of Casimirs that are subtracted from H.
+        """
         ...
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
-        """Return final states (members, DIM), or frames (rows, members, DIM); ``threads`` None uses all cores.
+        """Return the final states (members, DIM) of an ensemble or, with a stride, its frames (rows, members, DIM).
 
-        ``attitudes`` (rows, members, numbers) contains the initial attitudes in its first row. The attitudes of the
-        frames are written into the other rows. Without frames it has two rows, and the second receives the final
-        attitudes.
+        ``threads`` is the number of threads, None for one per core. ``attitudes`` (rows, members, numbers) contains the
+        initial attitudes in its first row, and receives the attitudes of the frames in the other rows. Without a stride
+        it has two rows, of which the second receives the final attitudes.
         """
         ...
 
     @property
     def has_pullback(self) -> bool:
-        """Whether the generated code has the extra ``adjoint``."""
+        """Whether the solver was compiled with ``adjoint``, and so has `pullback`."""
         ...
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
-        """Return the stored states (rows, members, DIM), and the pullback of their cotangents ``bars`` to the start.
+        """Return the stored states (rows, members, DIM), and the cotangents of initial states and parameters.
 
-        The pullback consists of the cotangents of the initial states (members, DIM) and of the parameters (parameters,
-        members). Raises `MissingExtraError` without the extra ``adjoint``.
+        ``bars`` are the cotangents of the stored states. The cotangents of the initial states are (members, DIM), those
+        of the parameters (parameters, members). Raises `MissingExtraError` if the solver was compiled without
+        ``adjoint``.
         """
         ...
 
@@ -88,9 +95,13 @@ class Backend(Protocol):
         ...
 
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
-        """Return σπ∇g of each source of noise at the states (rows, DIM), shape (rows, sources, DIM)."""
+        """Return the vector field σπ∇g of each source of noise at the states (rows, DIM), shape (rows, sources, DIM).
+
+        σ is the amplitude of the source, and g its Hamiltonian.
+        """
         ...
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """Return dt/dτ at the states (rows, DIM), shape (rows,), for a solver with a monitor."""
+        """Return dt/dτ, the monitor g of dt = g dτ, at the states (rows, DIM), shape (rows,). Needs a solver with a
+        monitor."""
         ...

@@ -1,4 +1,4 @@
-"""Signatures of the functions of a generated C solver."""
+"""Types of the arguments and results of the functions of a generated C solver, for ctypes."""
 
 from __future__ import annotations
 
@@ -21,21 +21,22 @@ _SIGNATURES = {
 }
 
 
-# Signatures if the Hamiltonian depends on the time; they replace those of the same name.
+# Signatures of functions that take the time, if the Hamiltonian depends on it; they replace signatures of the same
+# name.
 _TIMED = {
     "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
     "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),
     "vector_field": (None, (_POINTER, _DOUBLE, _POINTER, _POINTER)),
 }
 
-# Signatures of functions of systems with noise.
+# Signatures of additional functions of systems with noise.
 _WORD, _LONG = ctypes.c_uint32, ctypes.c_uint64
 _NOISY = {
     "set_noise": (_INT, (_POINTER, _LONG, _WORD, _LONG)),
     "integrate_along": (_INT, (_POINTER, _DOUBLE, _SIZE, _POINTER)),
 }
 
-# Optional functions: present if the spec or the options of the build include them.
+# Signatures of optional functions, which the C has if the spec or the options of the build request them.
 _EXTRAS = {
     "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
     "ensemble_at": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _DOUBLE, _SIZE, _POINTER)),
@@ -57,17 +58,20 @@ _EXTRAS = {
     "noise_fields": (None, (_POINTER, _POINTER, _POINTER)),
     "observables": (None, (_POINTER, _POINTER, _POINTER)),
     "ensemble_of": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _LONG, _WORD, _LONG, _POINTER)),
-    "ensemble_attitudes": (_INT, ()),  # with the order of arguments of `_of_attitudes`
+    "ensemble_attitudes": (_INT, ()),  # the arguments depend on the system, see `_of_attitudes`
     "set_attitude": (_INT, (_POINTER, _POINTER, _POINTER)),
 }
 
 
 def functions_of(library: Any, interface: Interface) -> Any:
-    """Return a namespace of the functions of a library. Raises `ToolchainError` if a required one is missing."""
+    """Return a namespace of the functions of a solver's library, with the types of their arguments and results.
+
+    Raises `ToolchainError` if a required function is missing.
+    """
     offered = {name: s for name, s in _EXTRAS.items() if hasattr(library, f"{interface.name}_{name}")}
     dated = _dated(offered, interface) | (_NOISY if interface.noise else {})
     timed = _TIMED if interface.time else {}
-    if interface.time or "init_gauge" in offered:  # an additional argument: the time, or the gauge, of each member
+    if interface.time or "init_gauge" in offered:  # an additional argument: initial times, or gauges, of the members
         _, signature_each = _EXTRAS["ensemble_each"]
         offered |= (
             {"ensemble_each": (_INT, (*signature_each[:3], _POINTER, *signature_each[3:]))}
@@ -91,9 +95,9 @@ def functions_of(library: Any, interface: Interface) -> Any:
 
 
 def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """Return the signature of ensembles with attitudes; {} if the library has no such function.
+    """Return the signature of the function that integrates ensembles with attitudes; {} if the library lacks it.
 
-    There are further arguments for times or gauges of the members and for random numbers, if the system has them.
+    The function takes additional arguments if the members have initial times or gauges, or if the system has noise.
     """
     name = "ensemble_attitudes"
     times_or_gauges = (_POINTER,) if interface.time or "init_gauge" in offered else ()
@@ -104,7 +108,8 @@ def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str,
 
 
 def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """Return the signatures of functions with the time as an additional argument; {} if the system has no time."""
+    """Return the signatures of those functions that take the time as an additional argument; {} if H is independent of
+    time."""
     time_positions = {"observables": 1, "noise_fields": 1, "ensemble_of": 3} if interface.time else {}
     dated = {name: (offered[name], position) for name, position in time_positions.items() if name in offered}
     return {name: (result, (*a[:position], _DOUBLE, *a[position:])) for name, ((result, a), position) in dated.items()}

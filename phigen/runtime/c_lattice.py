@@ -1,4 +1,4 @@
-"""Back end and sessions over the generated C of a lattice, called through ctypes."""
+"""Loaded solver and sessions of a lattice in C, called through ctypes."""
 
 from __future__ import annotations
 
@@ -38,19 +38,20 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "vector_field": (None, (_POINTER, _POINTER)),
 }
 
-#: Signatures for graphs that differ from those for grids.
+#: Signatures of functions that have other arguments on graphs than on grids.
 _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "work_size": (_SIZE, (_POINTER, _SIZE)),
     "init": (_INT, (_POINTER,) * 6),
 }
 
-#: Additional functions if the Hamiltonian depends on the time, for grids and pairs and for graphs, and those for noise.
+#: Signatures of additional functions: if the Hamiltonian depends on the time (grids and pairs, then graphs), and with
+#: noise.
 _PASSED: dict[str, tuple[Any, tuple[Any, ...]]] = {"passed": (_INT, (_POINTER, _DOUBLE, _SIZE))}
 _IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 4 + (_DOUBLE, _POINTER))}
 _GRAPH_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
 _NOISY = {**_PASSED, "set_noise": (_INT, (_POINTER, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_uint64))}
 
-#: Optional functions: derivatives, observables, and caller-driven stepping.
+#: Signatures of optional functions: derivatives, saved states, caller-driven stepping, observables, and kicks.
 _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "tangent_size": (_SIZE, (_POINTER, _SIZE)),
     "integrate_tangent": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER)),
@@ -76,27 +77,28 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "resume_clock": (_INT, (_POINTER, _POINTER)),
 }
 
-#: Least number of values for which a tape has room: 2 MiB in double precision, the size of a core's cache.
+#: Least size of a tape, in numbers: 2 MiB in double precision, the size of a core's cache.
 MIN_TAPE_VALUES = 1 << 18
 
-#: Least number of states, from which segments of a run are recomputed, for which a tape has room.
+#: Least number of stored states for which a tape has room; the reverse pass recomputes the steps between them.
 MIN_CHECKPOINTS = 8
 
-#: Number of steps over which the tape size of a step is averaged: several steps may share one stored state.
+#: Number of steps over which the size of the tape for one step is averaged, since several steps may share one stored
+#: state.
 MEASURED_STEPS = 64
 
-#: Largest number of bytes of a tape (64 MiB), unless one of the two minima is larger.
+#: Largest size of a tape in bytes (64 MiB), unless `MIN_TAPE_VALUES` or `MIN_CHECKPOINTS` needs more.
 MAX_TAPE_BYTES = 1 << 26
 
-#: Site updates in one call of C. Python delivers keyboard interrupts between calls.
+#: Largest number of site updates (sites × steps) in one call of C, between which Python handles Ctrl-C.
 _UPDATES_PER_CALL = 1 << 26
 
 
 class SweepStage(ctypes.Structure):
-    """One sweep of a step, with the data that it reads and writes.
+    """One sweep of a step, an update of all sites, with the data that it reads and changes.
 
-    ``behind`` and ``ahead`` are the numbers of planes before and after the swept planes that the sweep reads. ``read``
-    and ``changed`` have a bit for each field.
+    To update the planes a … b − 1, the sweep reads the planes a − ``behind`` … b − 1 + ``ahead``. ``read`` and
+    ``changed`` are bit masks with a bit for each coordinate.
     """
 
     _fields_: ClassVar = [
@@ -112,7 +114,7 @@ class SweepStage(ctypes.Structure):
 
 
 class CLatticeSession:
-    """A session in C, with its own memory. See `phigen.runtime.lattice.LatticeSession`."""
+    """A `phigen.runtime.lattice.LatticeSession` in C, in memory that this object owns."""
 
     def __init__(
         self,
@@ -127,7 +129,8 @@ class CLatticeSession:
         self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
         self._observed = len(interface.observables), len(interface.observed_fields)
-        # the fields before the last flow of a step, and the compensation terms of both sets of fields
+        # one copy of the state: before the last flow of a step; with compensation, also the terms of this and the full
+        # state
         self._saved_states = 3 if interface.compensated else 1
         self._slow_steps = interface.slow_steps
         self._steps_per_call = max(1, _UPDATES_PER_CALL // math.prod(x0.shape[1:]))
@@ -146,7 +149,7 @@ class CLatticeSession:
         arrays = [a.ctypes.data for a in (packed, sizes, *([graph] if interface.graph else []), first)]
         begin, last = (functions.init_at, (t0,)) if interface.time else (functions.init, ())
         status = begin(self._address, *arrays, *last, self._work.ctypes.data)
-        del referenced  # C has copied the arrays that `packed` points to
+        del referenced  # C has copied the arrays to which ``packed`` points
         if status:
             raise BackendError(status_name(status), 0, x0[None])
         if interface.noise:
@@ -187,10 +190,10 @@ class CLatticeSession:
         return np.asarray(propagated, dtype=np.float64)
 
     def pull_back(self, h: float, steps: int, stride: int, bars: Floats, parameters_bar: int) -> tuple[Floats, Floats]:
-        """Return the rows of a run, and the pullback of their cotangents ``bars`` to the initial state.
+        """Return the states at the rows of a run, and the derivative by the initial state, in reverse mode.
 
-        The cotangent of row 0 is not included. ``parameters_bar`` is the address of a struct to which the cotangents of
-        the parameters are added.
+        The derivative is that of Σ ``bars`` · rows, where row 0 is not included. ``parameters_bar`` is the address of a
+        C struct to which the derivatives by the parameters are added.
         """
         row_bars = np.ascontiguousarray(bars[1:], dtype=self._real)
         rows, x0_bar = filled(f"{len(bars)} frames", bars.shape, self._real), np.empty(self._shape, self._real)
@@ -198,10 +201,10 @@ class CLatticeSession:
         state = x0_bar.nbytes
         tape_of_steps = int(self._c.trail_size(self._address, 1 + MEASURED_STEPS)) - single_step_tape
         tape_per_step = tape_of_steps // MEASURED_STEPS
-        # With a tape of this size, checkpoints and the tape of one segment fit if each segment is recomputed once.
+        # Size of a tape with room for stored states and for one segment, if each segment of the run is recomputed once.
         recomputing_tape = single_step_tape + 3 * math.isqrt(steps * state * tape_per_step)
-        # A tape of the whole run is worthwhile in two cases: steps are slow, or the tape is short because the inverse
-        # flow recomputes states.
+        # The tape of the whole run is preferred in two cases: recomputing steps is slow, or the tape is short because
+        # the inverse flow recomputes states.
         preferred_tape = full_tape if self._slow_steps or tape_per_step < state else recomputing_tape
         min_tape_bytes = max(MIN_TAPE_VALUES * x0_bar.itemsize, single_step_tape + MIN_CHECKPOINTS * 2 * state)
         size = max(min_tape_bytes, min(MAX_TAPE_BYTES, preferred_tape))
@@ -243,7 +246,8 @@ class CLatticeSession:
         return self._filled(self._c.observed_fields, shape) if shape[0] else np.empty(shape)
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays that `resume` needs beside the state to continue with the same bits."""
+        """Return the arrays that `resume` needs, in addition to the state, to continue this integration with the same
+        bits."""
         if not hasattr(self._c, "saved"):
             return {}
         clock = self._clock()
@@ -253,15 +257,15 @@ class CLatticeSession:
         return clock | ({"before": x[:fields].copy(), "far": full_range_flag} if fields else {"far": full_range_flag})
 
     def _clock(self) -> dict[str, Any]:
-        """Return the energy level and the physical time, for steps equal in τ; else nothing."""
+        """Return the energy level and the physical time, if a monitor (dt = g dτ) makes steps equal in τ; else {}."""
         return {"passed": self._filled(self._c.saved_clock, (5,))} if hasattr(self._c, "saved_clock") else {}
 
     def time(self) -> float:
-        """Return the physical time since the start, for steps equal in τ."""
+        """Return the physical time since the start, if a monitor (dt = g dτ) makes steps equal in τ, not in t."""
         return float(self._c.solver_time(self._address))
 
     def hold(self, level: float) -> None:
-        """Hold another energy level e, for steps equal in τ."""
+        """Set the energy level e of a lattice with a monitor; by default e is −H of the initial state."""
         self._set_clock(np.array([level, *self._clock()["passed"][1:]]))
 
     def _set_clock(self, clock: Floats) -> None:
@@ -282,7 +286,10 @@ class CLatticeSession:
             self._set_clock(arrays["passed"])
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes). Raises `BackendError` if it is not finite."""
+        """Replace the state by ``x`` (coordinates, *sizes); with a monitor, the energy level e becomes −H(x).
+
+        Raises `BackendError` if x is not finite.
+        """
         self._move("set_state", x)
 
     def kick(self, change: Floats) -> None:
@@ -299,40 +306,44 @@ class CLatticeSession:
             raise BackendError(status_name(status), self.steps, self.state()[None])
 
     def passed(self, h: float, steps: int) -> None:
-        """Advance the time and the random numbers by ``steps`` steps of size h without a change of the state."""
+        """Advance the time and the random numbers by ``steps`` steps of size h; the state is not changed."""
         self._expect_done(self._c.passed(self._address, h, steps))
 
     # --- caller-driven stepping: see NAME.h
 
     def set_planes(self, first: int, planes: int) -> None:
-        """Set the position of this part in a whole lattice, so that its sites have the random numbers of the whole.
+        """Declare that this solver has the planes from ``first`` on of a larger lattice with ``planes`` planes.
 
-        ``first`` is the number of the first plane of this part in the whole, which has ``planes`` planes.
+        Each site then draws the random numbers that it has in the larger lattice.
         """
         self._expect_done(self._c.set_planes(self._address, first, planes))
 
     def begin(self, h: float) -> None:
-        """Set the step size, before the first step or when it changes."""
+        """Set the step size, before the first step and whenever it changes."""
         self._expect_done(self._c.begin(self._address, h))
 
     def sweep(self, stage: int, full_range: int, first: int, end: int) -> None:
-        """Make one sweep of a step over the planes from ``first`` to ``end`` - 1."""
+        """Make one sweep of a step over the planes ``first`` … ``end`` − 1.
+
+        ``stage`` is the number of the sweep in the step; ``full_range`` is 1 for functions valid for all arguments,
+        else 0.
+        """
         self._expect_done(self._c.sweep(self._address, stage, full_range, first, end))
 
     def planes(self, field: int, first: int, end: int) -> Floats:
-        """Return a copy of the planes of a field from ``first`` to ``end`` - 1."""
+        """Return a copy of the planes ``first`` … ``end`` − 1 of one coordinate."""
         result = np.empty((end - first, *self._shape[2:]), self._real)
         self._expect_done(self._c.planes(self._address, field, first, end, result.ctypes.data))
         return result
 
     def put_planes(self, field: int, first: int, end: int, values: Floats) -> None:
-        """Replace the values of a field on the planes from ``first`` to ``end`` - 1."""
+        """Replace the values of one coordinate on the planes ``first`` … ``end`` − 1."""
         with np.errstate(over="ignore"):
             values = np.ascontiguousarray(values, dtype=self._real)
         self._expect_done(self._c.put_planes(self._address, field, first, end, values.ctypes.data))
 
     def holds(self, first: int, end: int) -> bool:
-        """Whether all values on the planes from ``first`` to ``end`` - 1 are finite."""
+        """Whether all values of the state on the planes ``first`` … ``end`` − 1 are finite."""
         return bool(self._c.holds(self._address, first, end))
 
     @staticmethod
@@ -347,9 +358,9 @@ class CLatticeSession:
 
 
 class CLattice:
-    """Back end over the shared library compiled from generated files (name → text).
+    """Solver of a lattice over the shared library of generated C files (name → text).
 
-    It implements `phigen.runtime.lattice.LatticeBackend`.
+    It is a `phigen.runtime.lattice.LatticeBackend`.
     """
 
     target = "c"
@@ -366,12 +377,13 @@ class CLattice:
         """Return the number of threads that share the work on a lattice of ``sites`` sites."""
         if not self.interface.is_shared(sites):
             return 1
-        # of the OpenMP library that the solver is linked with
+        # a function of the OpenMP library, which the solver is linked with; missing without OpenMP
         openmp_maximum = getattr(self._library, "omp_get_max_threads", None)
         return int(openmp_maximum()) if openmp_maximum else 1
 
     def stages(self) -> list[SweepStage]:
-        """Return the sweeps of a step in order. Without noise, a sweep that merges the last with the first follows.
+        """Return the sweeps of a step in order and, without noise, one more sweep, which merges the last with the next
+        first.
 
         Raises `ValueError` if the C has no caller-driven stepping.
         """
@@ -429,9 +441,9 @@ class CLattice:
 def _packed(
     interface: LatticeInterface, parameters: Mapping[str, Any], sizes: tuple[int, ...], bonds: int
 ) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
-    """Return the C struct of parameters, and copies of the arrays that it points to.
+    """Return the C struct of the parameters, and the arrays to which the struct points, by name of the parameter.
 
-    The caller must keep the copies alive as long as C uses the struct.
+    The caller must hold a reference to the arrays as long as C uses the struct.
     """
     real: Any = np.float32 if interface.single else np.float64
     arrays = {*interface.at_sites, *interface.at_bonds}

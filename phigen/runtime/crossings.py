@@ -1,10 +1,11 @@
-"""Poincaré sections: the zeros of a function g of the state along a trajectory, located by the integrator itself.
+"""Poincaré sections: the zeros of a function g of the state along a trajectory, located by steps of the solver.
 
-The states between two steps of size h are single steps of size θh, 0 < θ < 1, from the state before. The crossing is at
-the θ for which g vanishes to round-off. So the points lie on the leaf; nothing is interpolated.
+The state at a fraction θ of a step of size h, 0 < θ < 1, is computed by one step of size θh from the state before the
+step. The crossing is at the θ for which g vanishes to round-off. So the points have the Casimirs of the trajectory;
+nothing is interpolated.
 
-If the method has a collocation polynomial, a zero of g is first located on the polynomial. Newton's method then takes
-steps of size (θ − 1)h from the state after; their initial guess is also taken from the polynomial.
+If the method has a collocation polynomial, a zero of g is first located on this polynomial. Newton's method then
+improves θ, by steps of size (θ − 1)h back from the state after the step.
 """
 
 from __future__ import annotations
@@ -27,23 +28,24 @@ C = TypeVar("C", bound=Course)
 #: A function from states (rows, DIM), and their times (rows,) if H depends on the time, to values (rows,).
 Function = Callable[..., Floats]
 
-#: Default number of steps between two evaluations of g on arrays; a copy of the session is stored for each step.
+#: Default number of steps after which g is evaluated on the array of their states; until then a copy of the session is
+#: stored for each step.
 BLOCK = 64
-#: Number of values of g in each step where a collocation polynomial provides them: enough to find the extrema of a
-#: motion that makes half a turn in a step.
+#: Number of intervals into which a step is divided by values of g on a collocation polynomial: enough to find the
+#: extrema of a motion that makes half a turn in a step.
 SAMPLES = 4
-#: Half the distance, in steps, of the two points of a finite difference of g on a collocation polynomial: about the
-#: cube root of rounding.
+#: Half the distance, as a fraction of a step, between the two points of a finite difference of g on a collocation
+#: polynomial: about the cube root of the machine epsilon.
 _DIFFERENCE = 1e-5
-#: Largest number of Newton steps to a zero; two to four are usual.
+#: Largest number of iterations of Newton's method for a zero; two to four are usual.
 _MOST_NEWTON = 8
-#: Numbers of equal steps that lead to a point between two steps, tried in this order: a single step without a predictor
-#: may not converge.
+#: A point inside a step is reached by this number of equal smaller steps. The numbers are tried in this order, since a
+#: single step without a predictor may not converge.
 SUBSTEPS = (1, 2, 4, 8)
 #: Absolute tolerance of a fraction of a step: fractions closer than this give the same state.
 _RESOLUTION = 1e-18
 _ITERATIONS = 100
-#: Direction of a crossing → signs s for which s·g increases through zero.
+#: Direction of a crossing → signs s for which s·g increases through zero as time increases.
 SIGNS = {"rising": (1.0,), "falling": (-1.0,), "both": (1.0, -1.0)}
 _GOLDEN = (math.sqrt(5) - 1) / 2
 
@@ -63,13 +65,16 @@ class Section:
         return f"<Section of ({', '.join(self.coordinates)}): {len(self)} crossings>"
 
     def save(self, path: str | Path) -> None:
-        """Write ``t,x1,…`` to a ``.csv`` file, or arrays t, x and coordinates to a ``.npz``; raises `ValueError`."""
+        """Write the columns ``t,x1,…`` to a ``.csv`` file, or the arrays t, x and coordinates to a ``.npz``.
+
+        Raises `ValueError` for other suffixes.
+        """
         rows = np.column_stack([self.t, self.x])
         write(path, section_columns(self.coordinates), rows, {"coordinates": np.array(self.coordinates)})
 
 
 def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
-    """Return the columns of a table of crossings."""
+    """Return the columns of a table of crossings: the time, and the coordinates."""
     return trajectory_columns(coordinates, ())[:2]
 
 
@@ -77,15 +82,16 @@ def section_columns(coordinates: tuple[str, ...]) -> list[Column]:
 class CrossingFinder(Generic[C]):
     """Locates the zeros of g along a session with steps of size h, in a ``direction`` as time increases.
 
-    At most one crossing is located between two neighbouring points: steps or, with a collocation polynomial, points
-    inside steps. If g has the same sign at three points and an extremum between them, the extremum is located, since g
-    may change its sign twice there. A start with g = 0 counts as a crossing if g leaves zero in the direction.
+    g is evaluated at the ends of steps and, with a collocation polynomial, at points inside steps. At most one crossing
+    is located between two neighbouring points. If g has the same sign at three points and an extremum between them, the
+    extremum is located, since g may change its sign twice there. A start with g = 0 counts as a crossing if g leaves
+    zero in the direction.
 
-    ``latest`` is a copy of the session at the latest step, ``past`` are copies at the steps before. ``values`` are the
-    values of g at these steps and at the ``points`` of each step; ``first`` is the number of the first of these steps.
-    ``t0`` is the time of step 0; g receives times if it is ``timed``. ``places`` are sessions at the crossings of the
-    latest block, with their numbers of steps from the start. A ``block`` is the number of steps between two evaluations
-    of g on arrays.
+    ``latest`` is the session after the latest step, ``past`` are copies of it before that step and earlier ones.
+    ``values`` are the values of g, ``points`` of them for each step, from the step with the number ``first`` on. ``t0``
+    is the time of step 0; g receives times if it is ``timed``. ``places`` are the crossings of the latest block of
+    steps: pairs of the number of steps from the start, and a session at the crossing. A ``block`` is the number of
+    steps between two evaluations of g on arrays.
     """
 
     g: Function
@@ -279,8 +285,12 @@ class CrossingFinder(Generic[C]):
         return session
 
     def _crossing_between(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
-        """Return the crossing in interval j between the fractions ``low`` and ``high``: its number of steps, and a
-        session there."""
+        """Return the crossing in interval j, between two fractions of it: its number of steps, and a session at the
+        crossing.
+
+        The interval lies between two neighbouring points with values of g. ``at_low`` and ``at_high`` are the values of
+        g at the fractions ``low`` and ``high``.
+        """
         step, part = divmod(j, self.points)
         low, high = (part + low) / self.points, (part + high) / self.points
         if self.points > 1 and (polished := self._refined_on_polynomial(step, low, at_low, high, at_high)):
@@ -306,10 +316,9 @@ class CrossingFinder(Generic[C]):
     def _refined_on_polynomial(
         self, step: int, low: float, at_low: float, high: float, at_high: float
     ) -> tuple[float, C] | None:
-        """Return the zero of g in a step, as its fraction and a session there, starting from the zero on the
-        polynomial.
+        """Return the zero of g in a step, as a fraction of the step and a session at the zero; None if it is not found.
 
-        None if Newton's method does not converge to a zero, for instance at a double zero of g.
+        Newton's method starts from the zero on the collocation polynomial. It may not converge at a double zero of g.
         """
         fraction = root(lambda at: self._on_polynomial(step, [at])[0], low, at_low, high, at_high)
         value_before, value_after = self._on_polynomial(step, [fraction - _DIFFERENCE, fraction + _DIFFERENCE])
@@ -323,7 +332,7 @@ class CrossingFinder(Generic[C]):
             except BackendError:
                 return None
             value = self._sign * self._value(step_end, self.points * step, self.points * fraction)
-            if not abs(value) < best:  # rounding errors dominate, unless the last Newton step was not small
+            if not abs(value) < best:  # rounding errors have been reached, or Newton's method has failed
                 return zero if best <= abs(slope) * math.sqrt(self._session_after(step).rounding) else None
             best, zero = abs(value), (fraction, step_end)
             following = min(1.0, max(0.0, fraction - value / slope)) if slope else math.nan
@@ -333,13 +342,14 @@ class CrossingFinder(Generic[C]):
         return None
 
     def _clock(self, session: C, counted_time: float) -> float:
-        """Return the physical time of a session if its steps are equal in τ; otherwise return ``counted_time``."""
+        """Return the physical time of a session if a monitor (dt = g dτ) makes steps equal in τ; else
+        ``counted_time``."""
         elapsed = getattr(session, "time", lambda: math.nan)()
         return counted_time if math.isnan(elapsed) else float(elapsed)
 
 
 def root(f: Callable[[float], float], low: float, at_low: float, high: float, at_high: float) -> float:
-    """Return the zero of f between two points with values of different sign, to the resolution of f.
+    """Return the zero of f between two points at which f has different signs, to the resolution of f.
 
     Inverse quadratic interpolation where it is safe, else bisection: T. R. Chandrupatla, Adv. Eng. Software 28 (1997).
     """

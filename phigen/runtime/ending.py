@@ -1,4 +1,4 @@
-"""Ends of runs between two steps: at a given time, or at a zero of a function of the state."""
+"""Ends of runs that may lie inside a step: at a given time, or at a zero of a function of the state."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.session import Followed
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: Function from a session after the last whole step to a session at the end and its number of steps from the start.
+#: Function of a session after the last whole step: it returns a session at the end and its number of steps.
 Finish = Callable[[Any], tuple[Any, float]]
 
 
-#: Number of steps after the start within which a zero is ignored. A run that starts where another run stopped at a zero
-#: is within rounding of the zero, and would otherwise stop at once.
+#: A zero within this number of steps after the start does not end a run. A run that starts where another run stopped at
+#: a zero begins within rounding of the zero, and would otherwise stop at once.
 START = 1e-9
 
 
 @dataclass(frozen=True)
 class End:
-    """End of a run: after ``steps`` whole steps and, if ``part``, a part of a step, which ``finish`` makes.
+    """End of a run: after ``steps`` whole steps and, if ``part``, a shorter step, which ``finish`` makes.
 
     ``span`` is the time from the start to the end. ``stopped`` is true if a zero of a function ends the run.
     """
@@ -39,7 +39,7 @@ class End:
 
 
 def at_time(session: Followed, h: float, span: float) -> End:
-    """Return the end of a run over a ``span`` of time; the session is at its start."""
+    """Return the end of a run over the time ``span``, for a session at the start of the run."""
     steps, left = steps_until(session, h, span)
     part = abs(left) > EQUAL * abs(span)
 
@@ -53,21 +53,21 @@ def at_time(session: Followed, h: float, span: float) -> End:
 
 
 def after_steps(session: Followed, h: float, steps: int) -> End:
-    """Return the end after a number of whole steps.
+    """Return the end of a run after a number of whole steps, with the time until then.
 
-    The session is at its start, and is advanced to measure the time. If a step fails, the span is the time before that
-    step.
+    The session, which is at the start of the run, is advanced to measure this time. If a step fails, ``span`` of the
+    result is the time before that step.
     """
-    with suppress(BackendError):  # the run itself will report the failure
+    with suppress(BackendError):  # the run itself will meet the same error and report it
         session.advance(h, steps)
     return End(steps, lambda here: (here, float(steps)), session.time(), part=False)
 
 
 def where_zero(session: Followed, h: float, limit: int, g: Function, t0: float, *, timed: bool) -> End | None:
-    """Return the end at the first zero of g after the start, in either direction; None if there is none in ``limit``
-    steps.
+    """Return the end of a run at the first zero of g after the start; None if there is no zero within ``limit`` steps.
 
-    The session is at its start, and is advanced. The zero is located to round-off, by steps of the solver.
+    The session, which is at the start of the run, is advanced. g may rise or fall through the zero, which is located to
+    round-off by steps of the solver.
     """
     finder = CrossingFinder[Followed](g, h, t0, timed=timed, direction="both")
     try:
@@ -77,7 +77,7 @@ def where_zero(session: Followed, h: float, limit: int, g: Function, t0: float, 
                     clock = end_session.time()
                     span, steps = steps_at * h if math.isnan(clock) else clock, int(np.floor(steps_at))
                     return End(steps, _finish_at((end_session, steps_at)), span, steps_at > steps, stopped=True)
-    except BackendError:  # the run itself will report the failure
+    except BackendError:  # the run itself will meet the same error and report it
         pass
     return None
 

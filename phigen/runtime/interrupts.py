@@ -1,4 +1,4 @@
-"""Keyboard interrupts during long calls of C: the C polls a function and returns early if its result is not 0."""
+"""Ctrl-C during long calls of C: the C calls a function from time to time, and returns early if the result is not 0."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ _QUESTION = ctypes.CFUNCTYPE(ctypes.c_int)
 
 @contextmanager
 def interruptible(ask: Callable[[int | None], Any]) -> Iterator[None]:
-    """Return a context in which Ctrl-C ends a call of C early.
+    """Return a context in which Ctrl-C ends a call of C early, and raises `KeyboardInterrupt` at the end of the
+    context.
 
-    ``ask`` receives the address of a C function that returns nonzero after Ctrl-C, and None at the end; then
-    `KeyboardInterrupt` is raised. Outside the main thread, which alone receives signals, and if the program has its own
-    signal handler, ``ask`` is not called.
+    ``ask`` passes the address of a function to the C, which returns nonzero after Ctrl-C; it receives None at the end.
+    ``ask`` is not called, and Ctrl-C acts as usual, outside the main thread, which alone receives signals, and if the
+    program has its own signal handler.
     """
     signals: list[int] = []
     first = threading.current_thread() is threading.main_thread()

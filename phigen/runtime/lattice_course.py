@@ -1,4 +1,4 @@
-"""Courses of lattices: sessions that can be copied. Sections, retries, and ends and rows between steps need copies."""
+"""Integrations of lattices that can be copied, as sections, retries, and ends and rows inside a step need."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
 
-#: Number of steps during which branches share one saved state: saving costs as much as some twenty steps of 64 sites.
+#: Number of steps for which copies of a course share one saved state: saving costs as much as some twenty steps of 64
+#: sites.
 SHARED_STEPS = 16
 
 
 class LatticeCourse:
-    """A lattice being integrated (`phigen.runtime.session.Followed`); its state is (coordinates, *sizes).
+    """A lattice being integrated (`phigen.runtime.session.Followed`), with the state (coordinates, *sizes).
 
-    Steps of a branch, and of a course restored from `saved`, have the same bits as those of an uninterrupted
-    integration. A branch makes its session on first use, since sections branch at every step but use few of the
-    branches. Branches share a saved state for up to `SHARED_STEPS` steps; a branch that is used repeats the steps since
-    that state.
+    Steps of a copy made by `branch`, and of a course restored from `saved`, have the same bits as an uninterrupted
+    integration. A copy starts its session on first use, since sections make a copy at every step but use few of them.
+    Copies share a saved state for up to `SHARED_STEPS` steps; a copy that is used repeats the steps since that state.
     """
 
     def __init__(self, solver: LatticeSolver, beginning: Beginning) -> None:
@@ -36,15 +36,16 @@ class LatticeCourse:
         self._arrays: Mapping[str, Any] = {}
         self._sites: LatticeSession | None = solver.started(beginning)
         self._clock, self._before = Clock(beginning.t0), 0
-        self._ahead = 0  # number of steps that a course without a session must repeat after its saved arrays
-        self._anchor: Mapping[str, Any] = {}  # saved arrays that branches share; the step size has not changed since
+        self._ahead = 0  # number of steps to be repeated from the saved arrays when the session is started
+        self._anchor: Mapping[str, Any] = {}  # saved arrays that copies share; {} after a change of step size or state
         self._anchor_steps = 0
 
     @property
     def sites(self) -> LatticeSession:
-        """The session of the lattice, which is started or restored on first use."""
+        """The session of the lattice; a course without a session starts it from the saved arrays."""
         if self._sites is None:
-            # steps are counted from the last change of the step size, so that times and random numbers are the same
+            # The session begins at the last change of the step size, since times and random numbers are counted from
+            # there.
             arrays, clock, steps_before = self._arrays, self._clock, self._before
             draws = replace(self.at.draws, step=self.at.draws.step + steps_before)
             begin = Beginning(np.asarray(arrays["state"]), clock.h, self.at.values, clock.t, draws)
@@ -74,7 +75,7 @@ class LatticeCourse:
         return self.sites.state()
 
     def time(self) -> float:
-        """The physical time since the start for steps equal in τ, else NaN."""
+        """The physical time since the start if a monitor (dt = g dτ) makes steps equal in τ; else NaN."""
         return self.sites.time() if self.solver.interface.monitored else math.nan
 
     def element(self) -> Floats:
@@ -83,27 +84,30 @@ class LatticeCourse:
 
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps of size ``h``."""
-        sites = self.sites  # a restored session first repeats steps of the previous size
+        sites = self.sites  # a restored session repeats its steps here, which still have the previous size
         if h != self._clock.h:
             self._anchor = {}
             self._clock.set_step(h, self.steps)
         sites.advance(h, steps)
 
     def branch(self) -> LatticeCourse:
-        """Return an independent copy, which shares saved arrays with the course until it is used."""
+        """Return an independent copy; until it is used, it consists of saved arrays that it shares with other
+        copies."""
         steps = self.steps
         if not (self._anchor and 0 <= steps - self._anchor_steps < SHARED_STEPS):
             self._anchor, self._anchor_steps = self.saved(), steps
         twin, clock = object.__new__(LatticeCourse), self._clock
         twin.solver, twin.at, twin._before = self.solver, self.at, clock.counted
-        twin._clock = Clock(clock.t, clock.h, clock.counted)  # the step size at the saved state
+        twin._clock = Clock(clock.t, clock.h, clock.counted)  # the clock at the saved state
         twin._arrays, twin._sites, twin._ahead = self._anchor, None, steps - self._anchor_steps
         twin._anchor, twin._anchor_steps = {}, 0
         return twin
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes); nothing else changes. Raises `BackendError` if x is not
-        finite."""
+        """Replace the state by ``x`` (coordinates, *sizes); with a monitor, the energy level e becomes −H(x).
+
+        Raises `BackendError` if x is not finite.
+        """
         self._anchor = {}
         self.sites.place(x)
 
@@ -113,9 +117,9 @@ class LatticeCourse:
         self.sites.kick(change)
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
-        """Go on with other parameters, as a course that starts at the present state. Raises `StepError`.
+        """Continue with other parameters, like a course that starts at the present state. Raises `StepError`.
 
-        The state, the time and the random numbers are unchanged. For steps equal in τ the energy level is −H of the
+        The state, the time and the random numbers are unchanged. With a monitor, the energy level e becomes −H of the
         state.
         """
         sites, steps, draws = self.sites, self.steps, self.at.draws
@@ -129,7 +133,7 @@ class LatticeCourse:
         self._sites, self._clock, self._before, self._anchor = changed, clock, steps, {}
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays from which `restored` makes the same course."""
+        """Return the arrays from which `restored` makes this course again."""
         if self._sites is None and not self._ahead:
             return dict(self._arrays)
         sites, clock = self.sites, self._clock
@@ -155,22 +159,22 @@ class LatticeCourse:
 
 
 class ObservedCourse(Retrying):
-    """A course whose `state` consists of the observables of the spec (observables,), for sections, stops and rows.
+    """A course whose `state` is the array of the observables of the spec (observables,), as sections and stops need.
 
-    Failing steps are made in parts, as by `Retrying`.
+    A failing step is repeated as several smaller steps, see `Retrying`.
     """
 
     def state(self) -> Floats:
-        """Return the observables at the state, (observables,)."""
+        """Return the values of the observables at the present state, (observables,)."""
         return self.sites.observables()
 
     @property
     def sites(self) -> LatticeSession:
-        """The wrapped session, which has the state at the sites."""
+        """The session of the lattice, from which the state of all sites can be read."""
         return cast("LatticeCourse", self.session).sites
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays from which `restored` makes the same course."""
+        """Return the arrays from which `restored` makes this course again."""
         parts = np.array([self._extra, *self.retried])
         return {**cast("LatticeCourse", self.session).saved(), "parts": parts}
 

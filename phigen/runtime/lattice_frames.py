@@ -1,4 +1,4 @@
-"""Frames of lattices, in memory or streamed to disk, and the files that hold them."""
+"""Storage of the states of lattices (frames) in memory or in a file, while a run computes them."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver, LatticeTrajectory
     from phigen.runtime.lattice_rows import Past
 
-#: Suffixes of files to which frames are written one by one, and of files that are written at the end.
+#: Suffixes of files to which frames are written one by one, and of files that are written at the end of a run.
 STREAMS = (".npy", ".npz")
 WHOLE = (".csv", ".zarr")
-#: Largest number of columns of a table of states; spreadsheets show some hundreds of columns.
+#: Largest number of columns of a table of states, since programs for tables show some hundreds of columns.
 MAX_COLUMNS = 1000
 
 
 class FrameRows:
-    """Rows of states, with their energies and observables: a `phigen.runtime.lattice_run.Sink`."""
+    """Rows of a run with the state, its energy and its observables: a `phigen.runtime.lattice_run.Sink`."""
 
     def __init__(self, frames: Frames | GrowingFrames, seconds: float = 0.0) -> None:
         self.frames, self.seconds = frames, seconds
@@ -76,7 +76,7 @@ class FrameRows:
 
 
 class GrowingFrames:
-    """Frames in memory, whose number need not be known in advance."""
+    """States in memory, for runs whose number of frames is not known in advance."""
 
     path: Path | None = None
 
@@ -92,7 +92,10 @@ class GrowingFrames:
         return self._states[k]
 
     def put(self, k: int, state: Floats) -> None:
-        """Store frame k, the next. Raises `LimitError` if there is no memory for as many again."""
+        """Store the state of frame k, where k is the number of frames so far.
+
+        Raises `LimitError` if memory does not suffice for twice the number of frames.
+        """
         if k & (k - 1) == 0:
             expect_room(f"{2 * max(k, 1)} states at crossings", 2 * max(k, 1) * state.nbytes)
         self._states.append(state)
@@ -105,12 +108,15 @@ class GrowingFrames:
         """Do nothing: no frame is on the disk."""
 
     def restore(self, frames: Floats | None, count: int) -> None:
-        """Replace all frames by the first ``count`` of ``frames``."""
+        """Replace all frames by the first ``count`` of ``frames``, or by none if ``frames`` is None."""
         self._states = [] if frames is None else list(frames[:count])
 
 
 def identity_of(solver: LatticeSolver, beginning: Beginning, rows: Sequence[int | float]) -> dict[str, Any]:
-    """Return all settings that determine an integration, as plain data; ``rows`` describes its rows."""
+    """Return all settings that determine an integration, as plain data that a checkpoint stores.
+
+    ``rows`` are numbers that identify the rows of the integration.
+    """
     arrays = {name: np.asarray(value) for name, value in beginning.values.items() if np.ndim(value)}
     numbers = {name: float(value) for name, value in beginning.values.items() if not np.ndim(value)}
     hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": beginning.x}.items()}
@@ -126,7 +132,8 @@ def identity_of(solver: LatticeSolver, beginning: Beginning, rows: Sequence[int 
 
 
 class Frames:
-    """Storage of a known number of frames, in an array or in a file."""
+    """Storage of a known number of frames: an array in memory or, if there is a path, an array that is mapped to a
+    file."""
 
     def __init__(self, path: Path | None, shape: tuple[int, ...]) -> None:
         self.path = path
@@ -162,12 +169,13 @@ class Frames:
             self._array.flush()
 
     def restore(self, frames: Floats | None, count: int) -> None:
-        """Restore the first ``count`` frames, from an array or from the file of the interrupted run."""
+        """Read the first ``count`` frames of an interrupted run, from the array ``frames`` or, if None, from the
+        file."""
         if frames is not None:
             self.array[:count] = frames
         elif self._part is not None:
             try:
-                with opened(self._part):  # refuses pipes, on which open_memmap would block
+                with opened(self._part):  # raises an error for pipes, on which open_memmap would block
                     self._array = np.lib.format.open_memmap(self._part, "r+")
             except (OSError, ValueError) as error:
                 raise MismatchError(
@@ -177,17 +185,18 @@ class Frames:
                 raise MismatchError(f"{self._part} does not hold the frames of this run")
 
     def objection(self) -> str:
-        """Return the reason why a run without checkpoints may not write its frames to this file; "" if it may."""
+        """Return the reason why a run without checkpoints may not write its frames to the file; "" if it may."""
         return "" if self._part is None else checkpoint.objection_to_frames(self._part)
 
     def discard(self) -> None:
-        """Remove the file of a run that failed; its frames are copied to memory and stay readable."""
+        """Remove the file of a run that failed, and copy its frames to memory, where they can still be read."""
         if self._part is not None and self._array is not None:
             self._array = np.array(self._array)
             self._part.unlink(missing_ok=True)
 
     def finish(self, trajectory: LatticeTrajectory) -> None:
-        """Write the file of the frames under its final name; a ``.npz`` holds the rest of the trajectory too."""
+        """Give the file of the frames its final name; a ``.npz`` also gets times, energies and the other data of
+        ``trajectory``."""
         if self.path is None or self._part is None:
             return
         self.flush()
@@ -200,8 +209,10 @@ class Frames:
 
 
 def stream_path(path: str | Path) -> Path | None:
-    """Return the path of a file to which frames are written one by one; None for a table. Raises `ValueError` for
-    others."""
+    """Return the path if frames are written to such a file one by one; None if the file is written at the end.
+
+    Raises `ValueError` for suffixes of no known format.
+    """
     target = Path(path)
     if target.suffix in WHOLE:
         return None
@@ -212,14 +223,18 @@ def stream_path(path: str | Path) -> Path | None:
 
 
 def expect_columns(shape: tuple[int, ...]) -> None:
-    """Raise `ValueError` if states (coordinates, *sizes) have more numbers than a table has columns."""
+    """Raise `ValueError` if a state of the shape (coordinates, *sizes) has more numbers than a table may have
+    columns."""
     if (count := int(np.prod(shape))) > MAX_COLUMNS:
         message = f"a .csv of states would have {count} columns, more than {MAX_COLUMNS}"
         raise ValueError(f"{message}; frames go to .npz, and record: [energy, …] makes few columns")
 
 
 def site_names(coordinates: Sequence[str], sizes: Sequence[int]) -> tuple[str, ...]:
-    """Return the names of the numbers of a state: ``q_0_0``, …, field by field, the last axis fastest."""
+    """Return column names for the numbers of a state, such as ``q_0_0`` for q at the site (0, 0).
+
+    They are ordered by coordinate, then by site, with the last axis fastest.
+    """
     sites = ["_".join(map(str, site)) for site in np.ndindex(*sizes)]
     return tuple(f"{name}_{site}" for name in coordinates for site in sites)
 
@@ -233,7 +248,8 @@ def state_columns(interface: LatticeInterface, sizes: Sequence[int]) -> list[Col
 def write_whole(path: Path, trajectory: LatticeTrajectory) -> None:
     """Write a trajectory as ``.csv`` or ``.zarr``.
 
-    Raises `ValueError` if a table has too few columns for it, or the path is in use.
+    Raises `ValueError` if a state has more numbers than a ``.csv`` may have columns, or if the path is not a Zarr store
+    but exists.
     """
     if path.suffix == ".csv":
         write_table(path, trajectory)
@@ -253,9 +269,10 @@ def expect_store(path: Path) -> None:
 
 
 def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:
-    """Write the variables of `LatticeTrajectory.to_xarray` as arrays with names of dimensions.
+    """Write the variables of `LatticeTrajectory.to_xarray` as arrays of a Zarr store, with the names of their
+    dimensions.
 
-    An old store is replaced when the new one is complete.
+    An old store at the path is replaced only when the new store is complete.
     """
     expect_store(path)
     data = trajectory.to_xarray()
@@ -271,7 +288,7 @@ def _write_store(path: Path, trajectory: LatticeTrajectory) -> None:
     root.attrs.update({str(name): value for name, value in data.attrs.items()})
     if trajectory.origin:
         root.attrs["origin"] = trajectory.origin
-    zarr.consolidate_metadata(str(part))  # xarray warns about stores without consolidated metadata
+    zarr.consolidate_metadata(str(part))  # xarray warns about Zarr stores without consolidated metadata
     if path.exists():
         shutil.rmtree(path)
     part.rename(path)
@@ -288,6 +305,6 @@ def write_table(path: Path, trajectory: LatticeTrajectory) -> None:
 
 
 def add_member(archive: zipfile.ZipFile, name: str, value: Any) -> None:
-    """Add an array to a .npz file."""
+    """Add an array to a .npz file that is open as a zip archive."""
     with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
         np.lib.format.write_array(member, np.asarray(value), allow_pickle=False)

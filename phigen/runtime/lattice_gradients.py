@@ -1,4 +1,4 @@
-"""Pullback of cotangents through runs of lattices: one run, or an ensemble whose members may differ in parameters."""
+"""Derivatives in reverse mode of runs of lattices: one run, or an ensemble whose members may differ in parameters."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def pullback(
     t0: Floats,
     parameters: Mapping[str, Any],
 ) -> Pullback:
-    """Return the result of `LatticeSolver.pullback`, for arguments in the shapes that users pass."""
+    """Compute the pullback of runs of lattices: the implementation of `LatticeSolver.pullback`, with arguments not yet
+    checked."""
     steps = arguments.count(steps, "steps", 0)
     per_member = {
         name: np.asarray(value) for name, value in parameters.items() if has_members(solver.interface, name, value)

@@ -17,17 +17,18 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver, LatticeTrajectory
     from phigen.runtime.lattice_rows import Past
 
-#: Seconds between two checkpoints. Each writes a whole state, which for large lattices takes longer than a step.
+#: Seconds between two checkpoints. A checkpoint writes a whole state, which takes longer than a step of a large
+#: lattice.
 CHECKPOINT_SECONDS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class LatticeSeries:
-    """Numbers along one integration: ``t`` (rows,) and ``columns`` by name, (rows,) each.
+    """Numbers recorded along one integration: times ``t`` (rows,), and ``columns`` (rows,) by name, such as the energy.
 
     ``first`` and ``last`` are the states (coordinates, *sizes) at the start and at the end, after ``steps`` steps of
-    size ``h`` and possibly a part of a step. ``crossings`` are the same numbers at the crossings of the section of a
-    run. ``origin`` is a text on the provenance, for files.
+    size ``h`` and possibly a shorter step. ``crossings`` has the recorded quantities at the crossings of the run's
+    section. ``origin`` is the provenance text for files.
     """
 
     t: Floats
@@ -55,14 +56,14 @@ class LatticeSeries:
 
     @property
     def ends(self) -> LatticeTrajectory:
-        """Return the trajectory of two frames, the first and the last state."""
+        """The trajectory of two frames: the first and the last state."""
         return self.solver.ends_of(self)
 
     def save(self, path: str | Path) -> None:
-        """Write ``.csv`` (t and the columns) or ``.npz``, which also holds the first and the last state and the
+        """Write a ``.csv`` with t and the columns, or a ``.npz`` that also has the first and last state and the
         parameters.
 
-        Keys of an ``.npz`` are t, energy, casimir_NAME, observable_NAME, first, last, coordinates, axes, steps, h
+        The arrays of an ``.npz`` are t, energy, casimir_NAME, observable_NAME, first, last, coordinates, axes, steps, h
         and parameter_NAME. Raises `ValueError` for other suffixes.
         """
         interface = self.solver.interface
@@ -77,14 +78,14 @@ class LatticeSeries:
 
 
 def key_of(name: str, interface: LatticeInterface) -> str:
-    """Return the key of a column in a ``.npz``."""
+    """Return the name of the array in a ``.npz`` for a recorded quantity, such as ``casimir_C`` for the Casimir C."""
     if name in interface.observables:
         return f"observable_{name}"
     return f"casimir_{name}" if name in interface.casimirs else name
 
 
 def recordable(interface: LatticeInterface) -> tuple[str, ...]:
-    """Return the names of all numbers that a run may record."""
+    """Return the names of the quantities that a run may record: those that are one number for a state."""
     summed = (name for name, kind in zip(interface.casimirs, interface.casimir_kinds, strict=True) if kind != "sites")
     return ("energy", *summed, *interface.observables)
 
@@ -99,7 +100,7 @@ def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
 
 
 class NumberRows:
-    """Rows of the numbers called ``names``, without states: a `phigen.runtime.lattice_run.Sink`."""
+    """Rows of a run with the quantities called ``names``, but no states: a `phigen.runtime.lattice_run.Sink`."""
 
     def __init__(self, interface: LatticeInterface, names: Sequence[str]) -> None:
         self.about, self.names, self.seconds = interface, names, CHECKPOINT_SECONDS
@@ -110,7 +111,7 @@ class NumberRows:
 
     @property
     def columns(self) -> dict[str, Floats]:
-        """The numbers (rows,) by name."""
+        """The recorded values (rows,) by name."""
         values = np.array(self.rows).reshape(len(self.rows), len(self.names))
         return {name: values[:, k] for k, name in enumerate(self.names)}
 
@@ -128,7 +129,7 @@ class NumberRows:
 
 
 def _recorded_columns(session: LatticeSession, interface: LatticeInterface, names: Sequence[str]) -> list[float]:
-    """Return the recorded numbers of a session, in the order of the columns; other numbers are not computed."""
+    """Return the quantities called ``names`` at the state of a session, in this order; no others are computed."""
     from phigen.runtime.lattice import reduced
 
     values = {"energy": session.hamiltonian()} if "energy" in names else {}
@@ -141,7 +142,7 @@ def _recorded_columns(session: LatticeSession, interface: LatticeInterface, name
 
 
 def expect_table(path: str | Path) -> Path:
-    """Return the path if its suffix is that of a table. Raises `ValueError` for other suffixes."""
+    """Return the path if its suffix is .csv or .npz. Raises `ValueError` for other suffixes."""
     if Path(path).suffix.lower() not in SUFFIXES:
         raise ValueError(f"columns go to files that end in {' or '.join(SUFFIXES)}, not {str(path)!r}")
     return Path(path)

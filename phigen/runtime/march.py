@@ -1,4 +1,5 @@
-"""Long integrations in pieces. Rows can be stored or drawn, and the run interrupted, after each piece."""
+"""Long integrations that yield their rows in pieces, after each of which rows can be stored or drawn, or the run
+ended."""
 
 from __future__ import annotations
 
@@ -13,18 +14,19 @@ from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.session import Session
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: Approximate limits of a piece: seconds between reports to the user, number of steps, and number of rows in memory.
+#: A piece ends after about this time in seconds, so that the user sees progress, or at the limits of the next line.
 _SECONDS = 0.2
 _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Rows and crossings of a section from one piece of an integration.
+    """A piece of an integration: its rows, and the crossings of a section that occurred in it.
 
-    ``numbers`` (rows,) are the numbers of the steps, with a fraction for a state between two steps; ``x`` (rows, DIM)
-    are the states. ``crossings`` are pairs of a time and a state (DIM,). ``passed`` (rows,) is the physical time since
-    the start for steps equal in τ, else NaN. ``turned`` (rows, numbers) are attitudes and positions.
+    ``numbers`` (rows,) are the numbers of steps since the start, with a fraction for a state inside a step; ``x``
+    (rows, DIM) are the states. ``crossings`` are pairs of a time and a state (DIM,). With a monitor (dt = g dτ),
+    ``passed`` (rows,) is the physical time since the start, else NaN. ``turned`` (rows, numbers) are attitudes and
+    positions.
     """
 
     numbers: Floats
@@ -34,7 +36,8 @@ class Piece:
     turned: Floats
 
 
-#: The physical time of a row since the start, and the numbers of its attitude and position.
+#: Data of a row besides its state: with a monitor the physical time since the start (else NaN), and the numbers of its
+#: attitude and position.
 Mark = tuple[float, Floats]
 
 
@@ -51,10 +54,10 @@ def march(
 ) -> Iterator[Piece]:
     """Advance a session to ``steps`` steps of size h, and yield every ``stride``-th state and the last, in pieces.
 
-    If ``goes_on``, a part of a step follows, so the last whole step is not yielded as the last state of the run. The
+    If ``goes_on``, a shorter step follows, so the state after the last whole step is not yielded as the last state. The
     length of a piece depends on the speed of the machine; the rows do not. ``see_tangent`` receives the derivative
-    (DIM, DIM) of each step. ``is_started`` is true if the initial state was yielded before. Raises `BackendError` after
-    a piece that ends with the state before the failing step.
+    (DIM, DIM) of each step. ``is_started`` is true if the initial state was yielded before. If a step fails,
+    `BackendError` is raised after a piece that ends with the state before that step.
     """
     size = 1
     if not is_started:
@@ -86,7 +89,8 @@ def march(
 
 
 def standing(session: Session, number: float) -> Piece:
-    """Return a piece with one row: the state of a session, ``number`` steps after the start."""
+    """Return a piece with one row, the present state of a session. ``number`` is its number of steps since the
+    start."""
     return _piece_of_rows([(session, number)], len(session.state()), len(session.element()))
 
 
@@ -107,11 +111,11 @@ def march_at(
     finder: CrossingFinder[Session] | None = None,
     see_tangent: Callable[[Floats], None] | None = None,
 ) -> Iterator[Piece]:
-    """Advance a session to ``steps`` steps, and yield the states at given times after the start, in pieces.
+    """Advance a session to ``steps`` steps, and yield the states at the times ``spans`` after the start, in pieces.
 
-    The session makes whole steps; a copy makes the part of a step to a state between two steps. ``see_tangent``
-    receives the derivatives of the whole steps. ``spans`` are the remaining times; steps after the last time yield no
-    rows. Raises `BackendError` after a piece.
+    The session makes whole steps; a copy of it makes the shorter step to a state inside a step. ``see_tangent``
+    receives the derivatives of the whole steps. Steps after the last time yield pieces without rows. If a step fails,
+    `BackendError` is raised after the piece with the states before.
     """
     sizes = len(session.state()), len(session.element())
     rows: list[tuple[Session, float]] = []
@@ -157,9 +161,9 @@ def march_at(
 def _session_at_time(
     session: Session, h: float, steps: int, span: float, advance: Callable[[int], object]
 ) -> tuple[Session, float]:
-    """Return a session at a time after the start, and its number of steps with a fraction.
+    """Return a session at the time ``span`` after the start, and its number of steps, with a fraction inside a step.
 
-    The argument ``session`` is advanced by the whole steps before that time.
+    The argument ``session`` is advanced by ``advance`` over the whole steps before that time.
     """
     clock = session.time()
     elapsed = session.steps * h if np.isnan(clock) else clock
@@ -180,9 +184,10 @@ def _states(
     finder: CrossingFinder[Session] | None,
     see_tangent: Callable[[Floats], None] | None,
 ) -> Iterator[tuple[int, Sequence[Floats] | Floats, Sequence[Mark], list[tuple[float, Floats]]]]:
-    """Yield, for each block of steps, its first step number, its states and marks, and its crossings.
+    """Advance a session to ``target`` steps. Yield, for each block of steps, first step number, states, marks and
+    crossings.
 
-    With a finder or with tangents every step is included, else every ``stride``-th and the last.
+    With a finder or with ``see_tangent``, all steps of the block are yielded, else every ``stride``-th and the last.
     """
     marks: list[Mark] = []
 

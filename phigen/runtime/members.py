@@ -18,24 +18,24 @@ if TYPE_CHECKING:
 
 Part = TypeVar("Part")
 
-#: The number of members in a part of an ensemble is a multiple of this number, and hence of every SIMD width. So each
-#: member is in the same SIMD batch for any number of parts, and its bits do not change.
+#: Ensembles are divided into parts whose numbers of members are multiples of this number, and hence of every SIMD
+#: width. So a member is in the same SIMD batch for any number of parts, and the bits of its result do not change.
 PART_GRANULARITY = 32
 
-#: Number of steps (members × steps) that take longer than starting a further thread.
+#: Number of steps, summed over members, that take longer than the start of another thread.
 _STEPS_PER_THREAD = 20_000
 
-#: Largest number of members, and of steps of members, in one call of C. Python delivers keyboard interrupts between
-#: calls.
+#: Largest numbers of members, and of steps summed over members, in one call of C: Python handles Ctrl-C between calls.
 _MEMBERS_PER_CALL, _STEPS_PER_CALL = 1024, 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Arguments of an ensemble: initial states (members, DIM), and numbers of shape () for all members or (members,).
+    """Arguments of an ensemble: initial states (members, DIM), and ``h``, ``t0`` and parameters, as arrays.
 
-    ``paths`` (members,) select the random numbers of each member; seed and first step are those of ``draws``. An
-    integration stores the states after every ``stride`` steps, or only the final states if ``stride`` is 0.
+    An array of shape () holds for all members, an array (members,) has a value for each. ``paths`` (members,) select
+    the random numbers of each member, together with the seed and the first step of ``draws``. The states after every
+    ``stride`` steps are stored, or only the final states if ``stride`` is 0.
     """
 
     x0: Floats
@@ -52,7 +52,7 @@ class Members:
 
     @property
     def alike(self) -> bool:
-        """Whether members differ in their states only."""
+        """Whether members differ in their initial states only, and have equal step sizes, times and parameters."""
         return not any(np.ndim(value) for value in (self.h, self.t0, *self.parameters.values()))
 
     def part(self, selection: slice | NDArray[np.intp]) -> Members:
@@ -80,15 +80,16 @@ class Members:
         return of_member(self.h), parameters, of_member(self.t0)
 
     def frames(self) -> Floats:
-        """Return an array (rows, members, DIM) for the states of the rows, with the initial states in row 0."""
+        """Return an array (rows, members, DIM) for the states to be stored; row 0 has the initial states, all others
+        are unset."""
         frames = np.empty((len(row_steps(self.steps, self.stride)), *self.x0.shape))
         frames[0] = self.x0
         return frames
 
     def checked(self, states: Floats, failures: Mapping[int, str], step: int = -1) -> Floats:
-        """Return the states.
+        """Return the states if no member has failed. Otherwise raise `BackendError` with the states and the failures.
 
-        Raises `BackendError` if some members failed; frames after their failure are NaN.
+        ``step`` is the number of successful steps, −1 if unknown.
         """
         if not failures:
             return states
@@ -104,9 +105,10 @@ def cores() -> int:
 
 
 def parts(members: Members, threads: int) -> Iterator[slice]:
-    """Yield the parts of an ensemble, each of which is integrated by one call.
+    """Yield the parts of an ensemble, as slices of its members; each part is integrated by one call of C.
 
-    There are at least four parts for each thread. A part is so short that keyboard interrupts are delivered in time.
+    With several threads there are at least four parts for each thread. Parts are short, since Python handles Ctrl-C
+    only between two calls.
     """
     count = len(members)
     batches = _STEPS_PER_CALL // max(members.steps, 1) // _MEMBERS_PER_CALL
@@ -119,7 +121,7 @@ def parts(members: Members, threads: int) -> Iterator[slice]:
 def shared_out(members: Members, threads: int | None, make: Callable[[slice], None]) -> None:
     """Call ``make`` for each part of an ensemble, in at most ``threads`` threads (None: one for each core).
 
-    Short ensembles use fewer threads, since starting a thread costs more than their steps.
+    Ensembles with few steps use fewer threads, since the start of a thread costs more than these steps.
     """
     useful_threads = min(len(members) * members.steps // _STEPS_PER_THREAD, -(-len(members) // PART_GRANULARITY))
     threads = max(1, min(cores() if threads is None else threads, useful_threads))
@@ -127,7 +129,8 @@ def shared_out(members: Members, threads: int | None, make: Callable[[slice], No
 
 
 def in_threads(threads: int, make: Callable[[Part], None], parts: Iterable[Part]) -> None:
-    """Call ``make`` for each part, in ``threads`` threads."""
+    """Call ``make`` for each part, in ``threads`` threads. If a call raises, parts that have not begun are
+    cancelled."""
     if threads == 1:
         for part in parts:
             make(part)
@@ -142,7 +145,7 @@ def in_threads(threads: int, make: Callable[[Part], None], parts: Iterable[Part]
 
 
 def one_by_one(backend: Backend, members: Members, threads: int | None = 1) -> Floats:
-    """Return the final states or frames of an ensemble, which is integrated by one session for each member."""
+    """Return the final states or frames of an ensemble, integrated member by member with a session for each."""
     final, failures = members.x0.copy(), dict[int, str]()
     frames = members.frames() if members.stride else None
     marks = row_steps(members.steps, members.stride or max(members.steps, 1))

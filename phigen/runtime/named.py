@@ -1,4 +1,4 @@
-"""Properties that solvers of ordinary systems and of lattices share: names of runs and coordinates, target, order."""
+"""Properties that solvers of ordinary systems and of lattices share, such as target, order and names of coordinates."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ N = TypeVar("N", bound=Interface)
 
 
 class Named(Generic[B, N]):
-    """Base class of solvers: a back end of some target, and the interface with its names and order."""
+    """Base class of `Solver` and `LatticeSolver`: a loaded solver, and the interface with its names and its order."""
 
     backend: B
     interface: N
-    #: The spec that was compiled; None for a back end that was loaded without one.
+    #: The spec that was compiled; None for generated code that was loaded without its spec.
     spec: Spec | None = None
 
     @property
     def runs(self) -> tuple[str, ...]:
-        """The names of the runs of the spec, as arguments of `run`."""
+        """The names of the runs of the spec, which `run` takes as its argument."""
         return tuple(self.spec.runs) if self.spec else ()
 
     @property
     def target(self) -> str:
-        """The target of the solver, such as ``c`` or ``numpy``."""
+        """The target language or device of the solver, such as ``c`` or ``numpy``."""
         return self.backend.target
 
     @property

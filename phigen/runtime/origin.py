@@ -1,9 +1,9 @@
-"""Origins of files: the spec and the run that a table, store, figure or film was made from.
+"""Provenance of files: the spec and the run from which a table, store, figure or film was made.
 
 An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``, followed by the command if that is not ``phigen
-run``. It is an array ``origin`` of a ``.npz``, an attribute of a Zarr store, and part of the metadata of figures, films
-and pages. A ``.csv`` has no place for it that all readers skip. Its origin is in the companion ``FILE-metadata.json``,
-the place that the W3C recommendation "Metadata Vocabulary for Tabular Data" gives to the metadata of a table.
+run``. It is stored in an array ``origin`` of a ``.npz``, in an attribute of a Zarr store, and in the metadata of
+figures, films and pages. A ``.csv`` has no place for metadata that all programs skip. Its origin is in the file
+``FILE-metadata.json`` beside it, where the W3C recommendation "Metadata Vocabulary for Tabular Data" puts metadata.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ _FORM = re.compile(rb"phigen origin: (\S+) (\S+) ([0-9a-f]{16})(?![0-9a-f])(?: b
 
 @dataclass(frozen=True)
 class Origin:
-    """A run of a spec, with a `phigen.spec.identity.digest` of the equations and observables of the spec.
+    """Provenance of a file: the names of a spec and of its run, and a hash of the equations and observables of the
+    spec.
 
     ``command`` is the command of phigen that wrote the file. For sweeps ``run`` is the name of the sweep.
     """
@@ -49,8 +50,10 @@ class Origin:
         return f"the {self._kind} {self.run} of {self.spec}"
 
     def difference(self, requested: Origin) -> str:
-        """Return the difference of another origin as the end of the sentence "the file holds …"; "" if both are
-        equal."""
+        """Return how a file of the origin ``requested`` differs from this origin; "" if both origins are equal.
+
+        The text is the end of a sentence that begins with "the file holds".
+        """
         if self.command != requested.command:
             return f"a result of phigen {requested.command}, not of phigen {self.command}"
         if (self.spec, self.run) != (requested.spec, requested.run):
@@ -62,17 +65,19 @@ class Origin:
 
 
 def origin_of(spec: Spec, run: Run | SweepSettings | None, command: str = "run") -> Origin:
-    """Return the origin of the files of a command about a run or a sweep; None stands for a spec without runs."""
+    """Return the origin of files that a command writes about a run or a sweep; ``run`` is None for a spec without
+    runs."""
     return Origin(spec.name, run.name if run else "-", digest(spec), command)
 
 
 def companion(path: Path) -> Path:
-    """Return the path of the file with the metadata of a ``.csv``."""
+    """Return the path of the JSON file beside a ``.csv`` that has its metadata."""
     return path.with_name(f"{path.name}-metadata.json")
 
 
 def mark(path: Path, origin: Origin) -> None:
-    """Write the origin of a ``.csv`` into its companion. Other files already contain their origin."""
+    """Write the origin of a ``.csv`` into the metadata file beside it; do nothing for other files, which contain their
+    origin."""
     if path.suffix.lower() != ".csv":
         return
     columns = [{"titles": title, "datatype": "double"} for title in _header(path)]
@@ -98,8 +103,8 @@ def read_origin(path: Path) -> Origin | None:
 
 
 def _of_table(path: Path) -> Origin | None:
-    """Return the origin in the companion of a ``.csv``; None unless the companion describes a table with these
-    columns."""
+    """Return the origin in the metadata file of a ``.csv``; None unless that file lists the columns of this
+    ``.csv``."""
     try:
         described = json.loads(companion(path).read_text(encoding="utf-8"))
         titles = [column["titles"] for column in described["tableSchema"]["columns"]]

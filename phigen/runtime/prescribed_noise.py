@@ -8,7 +8,7 @@ from phigen.runtime.session import Session
 
 
 class PrescribedNoise(Forwarding[Session]):
-    """Session whose k-th step uses row k of the prescribed increments (steps, draws)."""
+    """Session in which step k uses row k of the prescribed increments (steps, draws) in place of random numbers."""
 
     def __init__(self, session: Session, increments: Floats) -> None:
         super().__init__(session)

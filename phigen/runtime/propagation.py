@@ -1,7 +1,7 @@
-"""A run of a solver as a function of arrays with leading axes, with its Jacobian and its vector–Jacobian product.
+"""A run of a solver as a function of arrays, with its Jacobian and its vector–Jacobian product.
 
 `phigen.jax` and `phigen.torch` register these functions with their frameworks. Arguments and results are NumPy arrays;
-each element of the leading axes is one member of an ensemble.
+each element of their leading axes is one member of an ensemble.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ Values = Mapping[str, ArrayLike]
 class Propagation:
     """A run of ``steps`` steps of size ``h`` from the time ``t0`` on, as a function of initial states and parameters.
 
-    The result is the final states, or with a ``stride`` all rows of `Solver.integrate`.
+    The value of the function is the final states or, with a ``stride``, all rows of `Solver.integrate`.
 
-    States have the shape (…, DIM), rows (…, rows, DIM), parameters a shape that broadcasts to (…). For a lattice DIM
+    States have the shape (…, DIM), rows (…, rows, DIM), parameters a shape that broadcasts to (…). For a lattice, DIM
     stands for (coordinates, *sizes), and parameters at sites or bonds have axes of sites or bonds after (…). ``shared``
     are arguments that all members have in common, such as the bonds of a graph.
     """
@@ -54,7 +54,7 @@ class Propagation:
             arguments.count(self.stride, "stride", 1)
 
     def _expect_shared(self, lattice: LatticeInterface) -> None:
-        """Raise `TypeError` for a graph without bonds, and for shared arguments with unknown names."""
+        """Raise `TypeError` if a graph has no ``bonds``, or if a shared argument is not the name of a parameter."""
         if lattice.graph and self.shared.get("bonds") is None:
             raise missing_bonds()
         arguments.expect_known([n for n in self.shared if n != "bonds" or not lattice.graph], lattice.parameters)
@@ -66,27 +66,28 @@ class Propagation:
 
     @property
     def rows(self) -> int:
-        """The number of rows of the result with a stride."""
+        """The number of rows of the trajectory of a member."""
         return len(row_steps(self.steps, self.stride or max(1, self.steps)))
 
     @property
     def axes(self) -> int:
-        """The number of axes of a state."""
+        """The number of axes of the state of one member: 1, or for a lattice 1 + the number of its axes."""
         return 1 + len(self.solver.interface.axes) if isinstance(self.solver, LatticeSolver) else 1
 
     def axes_of(self, parameter: str) -> int:
-        """Return the number of axes of a parameter of one member."""
+        """Return the number of axes that the value of a parameter has for one member: 0 for a number."""
         if not isinstance(self.solver, LatticeSolver):
             return 0
         interface = self.solver.interface
         return len(interface.axes) if parameter in interface.at_sites else int(parameter in interface.at_bonds)
 
     def shape(self, start: tuple[int, ...]) -> tuple[int, ...]:
-        """Return the shape of the result for initial states of shape ``start``."""
+        """Return the shape of the result of `run` for initial states of shape ``start``."""
         return start if self.stride is None else (*start[: -self.axes], self.rows, *start[-self.axes :])
 
     def expect(self, start: tuple[int, ...], parameters: Mapping[str, tuple[int, ...]]) -> None:
-        """Raise `ValueError` for shapes of arguments that do not fit, `TypeError` for unknown names of parameters."""
+        """Raise `ValueError` if the shapes of states and parameters do not fit, and `TypeError` for unknown
+        parameters."""
         arguments.expect_known(parameters, self.solver.interface.parameters)
         if isinstance(self.solver, LatticeSolver):
             state = self.solver.state(np.zeros(start[-self.axes :]), "x0")
@@ -104,7 +105,7 @@ class Propagation:
                 raise ValueError(f"parameter {name!r} must have a shape that broadcasts to {members}, not {shape}")
 
     def run(self, x0: ArrayLike, parameters: Values) -> Floats:
-        """Return the final states, or all rows with a stride."""
+        """Integrate all members, and return their final states (…, DIM) or, with a stride, all rows (…, rows, DIM)."""
         start, members, values = self._members(x0, parameters)
         states = self.solver.ensemble(members, self.h, self.steps, self.stride, t0=self.t0, parameters=values)
         if self.stride is not None:
@@ -112,8 +113,10 @@ class Propagation:
         return states.reshape(self.shape(start))
 
     def transposed(self, x0: ArrayLike, parameters: Values, cotangent: ArrayLike) -> tuple[Floats, dict[str, Floats]]:
-        """Return the cotangents of x0 and of the parameters, in the shapes of these, from the cotangent of the
-        result."""
+        """Return the cotangents of x0 and of the parameters, in the shapes of x0 and parameters.
+
+        ``cotangent`` is the cotangent of the result of `run`, in the shape of this result.
+        """
         start, members, values = self._members(x0, parameters)
         rows = () if self.stride is None else (self.rows,)
         bars = np.asarray(cotangent, dtype=np.float64).reshape(-1, *rows, *start[-self.axes :])
@@ -128,9 +131,10 @@ class Propagation:
         return pulled_back.x0_bar.reshape(start), of_parameters
 
     def jacobian(self, x0: ArrayLike, parameters: Values) -> tuple[Floats, dict[str, Floats]]:
-        """Return the derivatives of the result by x0, with a further axis (DIM,), and by each parameter, in its shape.
+        """Return the derivatives of the result of `run` by x0 and, by name, by each parameter.
 
-        One reverse pass is made for each component of a member's result. Lattices have no Jacobian.
+        The derivative by x0 has the shape of the result and a last axis (DIM,), the derivative by a parameter the shape
+        of the result. Each component of a member's result takes one reverse pass. Not for lattices.
         """
         start, members, values = self._members(x0, parameters)
         shape = self.shape((len(members), start[-1]))
@@ -147,7 +151,8 @@ class Propagation:
         }
 
     def _members(self, x0: ArrayLike, parameters: Values) -> tuple[tuple[int, ...], Floats, dict[str, Floats]]:
-        """Return the leading axes of the states, the initial states (members, DIM), and the parameters (members, …)."""
+        """Return the shape of x0, the initial states as an array (members, DIM), and the parameters as arrays (members,
+        …)."""
         x, values = np.asarray(x0, dtype=np.float64), dict[str, Any](self.shared)
         for name, value in parameters.items():
             array = np.asarray(value, dtype=np.float64)
@@ -156,7 +161,7 @@ class Propagation:
         return x.shape, x.reshape(-1, *x.shape[-self.axes :]), values
 
     def _member_shape(self, parameter: str, state: tuple[int, ...]) -> tuple[int, ...]:
-        """Return the shape of a parameter of one member."""
+        """Return the shape of a parameter for one member; ``state`` is the shape of x0."""
         if not self.axes_of(parameter) or not isinstance(self.solver, LatticeSolver):
             return ()
         if parameter in self.solver.interface.at_sites:
@@ -165,7 +170,7 @@ class Propagation:
 
 
 def _summed(values: Floats, shape: tuple[int, ...]) -> Floats:
-    """Return ``values`` summed over broadcast axes, so that they have ``shape``: the transpose of broadcasting."""
+    """Return the transpose of broadcasting: ``values`` summed over broadcast axes, so that the result has ``shape``."""
     extra = values.ndim - len(shape)
     values = values.sum(axis=tuple(range(extra)))
     ones = tuple(k for k, length in enumerate(shape) if length == 1 and values.shape[k] != 1)

@@ -1,4 +1,4 @@
-"""Sessions that repeat a failing step in several smaller steps, for the argument ``retry``."""
+"""Sessions that repeat a failing step as several smaller steps, for the argument ``retry`` of `integrate`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from phigen.runtime.session import Followed
 
 
 class Retrying(Forwarding[Followed]):
-    """Session that repeats a failing step in 2, 4, …, 2^``most`` equal parts.
+    """Session that repeats a failing step as 2, 4, … equal smaller steps, at most 2^``most``.
 
-    Each part is a step of the method, a Poisson map that stays on the leaf. The composition of the parts is not the map
-    of a whole step; ``retried`` lists the numbers of the steps made in parts. ``steps`` counts whole steps.
+    Each smaller step is a step of the method: a Poisson map that keeps the Casimirs. The composition of the smaller
+    steps is another map than the whole step. ``retried`` lists the numbers of the steps that were divided. ``steps``
+    counts whole steps.
     """
 
     def __init__(self, session: Followed, limit: int) -> None:
         super().__init__(session)
         self.most = limit
         self.retried: list[int] = []
-        self._extra = 0  # steps of the session minus whole steps: a step in n parts adds n - 1
+        self._extra = 0  # steps of the session minus whole steps: n - 1 is added for a step made as n smaller steps
 
     @property
     def steps(self) -> int:
@@ -28,7 +29,7 @@ class Retrying(Forwarding[Followed]):
         return self.session.steps - self._extra
 
     def advance(self, h: float, steps: int) -> None:
-        """Make ``steps`` whole steps. Raises `BackendError` if a step fails in every number of parts."""
+        """Make ``steps`` whole steps. Raises `BackendError` if a step fails for every number of smaller steps."""
         while steps > 0:
             begin = self.steps
             try:

@@ -1,4 +1,4 @@
-"""Sections in specs: conversion of an expression to a function of states."""
+"""Poincaré sections of specs: conversion of their expressions to functions of arrays of states."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from phigen.symbolic.expression import Expression
 def function_of(
     section: Expression, coordinates: Sequence[str], parameters: Mapping[str, float], time: str = ""
 ) -> Function:
-    """Return an expression as a function of states (rows, DIM), and of times (rows,) if the spec has a time.
+    """Return an expression as a function of states (rows, DIM) and, if the spec has a time, of times (rows,).
 
-    The values have the shape (rows,).
+    The function returns the values (rows,) of the expression.
     """
 
     def g(states: Floats, *t: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Solvers of ordinary systems: they check arguments, call a back end, and return trajectories."""
+"""Solvers of ordinary systems: they check arguments, call generated code, and return trajectories."""
 
 from __future__ import annotations
 
@@ -41,9 +41,10 @@ _ADVICE = {
 class Marks:
     """Data at the rows of a trajectory other than the states.
 
-    ``tau`` (rows,) is τ since the start. ``passed`` (rows,) is the physical time since the start if steps are equal in
-    τ. ``turned`` (rows, numbers) are attitudes and positions. ``steps`` is the number of all steps, ``retried`` are the
-    numbers of steps made in parts.
+    ``tau`` (rows,) is h times the number of steps. With a monitor (dt = g dτ) this is the rescaled time τ, and
+    ``passed`` (rows,) is the physical time since the start. ``turned`` (rows, numbers) are attitudes and positions.
+    ``steps`` is the number of all steps. ``retried`` are the numbers of those steps that failed and were repeated as
+    smaller steps.
     """
 
     tau: Floats
@@ -192,7 +193,10 @@ class Solver(Named[Backend, Interface]):
         return self._rows(run_, self._beginning(start, "x0", float(run_.step), values, {}, t0, noise_arguments))
 
     def _rows(self, run: Run, beginning: Beginning) -> Trajectory:
-        """Return the trajectory of a run that ends at a zero of a function, or has rows at given times."""
+        """Return the trajectory of a run that ends at a zero of a function, or has rows at given times.
+
+        `integrate` cannot make such rows.
+        """
         names = self.interface
         stop = function_of(run.stop, names.coordinates, beginning.values, names.time) if run.stop is not None else None
         session = self._started(beginning)
@@ -211,7 +215,8 @@ class Solver(Named[Backend, Interface]):
         return trajectory()
 
     def _until(self, course: Retrying, span: float, stride: int, beginning: Beginning) -> Trajectory:
-        """Return the trajectory of `integrate` over a ``span`` of time."""
+        """Return the trajectory of `integrate` over the time ``span``, with a last step that is shortened to end at
+        that time."""
         rows: list[tuple[Floats, float, float, Floats, int, tuple[int, ...]]] = []
 
         def see(session: Retrying, tau: float) -> None:
@@ -302,8 +307,9 @@ class Solver(Named[Backend, Interface]):
     ) -> tuple[Floats, Floats]:
         """Return the state (DIM,) one step after ``x`` (DIM,), and its derivative by ``x`` (DIM, DIM).
 
-        Row i of the derivative is the gradient of the new coordinate i. It is exact to round-off, for a fixed gauge if
-        the solver chooses one. Raises `StepError`, and `TypeError` if the solver was compiled without ``tangent=True``.
+        Row i of the derivative is the gradient of the new coordinate i. It is exact to round-off; the gauge, the
+        multiples of Casimirs that the solver subtracts from H, is held fixed. Raises `StepError`, and `TypeError` if
+        the solver was compiled without ``tangent=True``.
         """
         beginning = self._beginning(x, "x", h, parameters, by_keyword, t0, {"seed": seed, "step0": step0})
         session = self._started(beginning)
@@ -325,7 +331,7 @@ class Solver(Named[Backend, Interface]):
     ) -> Iterator[tuple[Floats, Floats]]:
         """Yield the state (DIM,) after each step of a trajectory, and the derivative (DIM, DIM) of that step.
 
-        The steps are those of `integrate`. Raises the same as `step_tangent`.
+        The steps are those of `integrate`. Raises the errors of `step_tangent`.
         """
         beginning = self._beginning(
             x0, "x0", h, parameters, by_keyword, t0, {"seed": seed, "member": member, "step0": step0}
@@ -352,9 +358,9 @@ class Solver(Named[Backend, Interface]):
         """Return the zeros of ``g`` along the trajectory of ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
         ``g`` maps states (rows, DIM), and their times (rows,) if the Hamiltonian depends on the time, to values
-        (rows,). Each zero is located to round-off by steps of the solver from the state before it. ``direction`` is
-        ``rising``, ``falling`` or ``both``. A start with g = 0 counts if g leaves zero in that direction. Raises
-        `StepError`, whose ``trajectory`` is the `Section` until the failure.
+        (rows,). Each zero is located to round-off by steps of the solver, of the size that leads to the zero.
+        ``direction`` is ``rising``, ``falling`` or ``both``. A start with g = 0 counts if g leaves zero in that
+        direction. Raises `StepError`, whose ``trajectory`` is the `Section` until the failure.
         """
         arguments.expect_no_noise("section", self.interface)
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0)
@@ -394,11 +400,11 @@ class Solver(Named[Backend, Interface]):
 
         ``X0`` may be one state (DIM,) for all members. Parameters, ``h`` and the initial time ``t0`` are numbers, or
         arrays (members,). With a ``stride`` the result is (rows, members, DIM): the states at steps 0, stride,
-        2·stride, … and at the last. With noise, member k takes the random numbers of ``member`` + k, from ``step0`` on;
-        to continue an ensemble, pass the number of its steps as ``step0``. Members are shared out between ``threads``,
-        by default one for each core; the result has the same bits for any number of threads. Raises `StepError` if a
-        member fails: its ``members`` are the failed ones, its ``trajectory`` the array of states, in which failed
-        members have their last state, or NaN in the rows after it.
+        2·stride, … and at the last. With noise, member k uses the random numbers of ``member`` + k, from ``step0`` on;
+        to continue an ensemble, pass the number of its steps as ``step0``. Members are divided among ``threads``, by
+        default one for each core; the result has the same bits for any number of threads. Raises `StepError` if a
+        member fails: its ``members`` are the failed members, and its ``trajectory`` the array of states, in which
+        failed members have their last state or, with a stride, NaN in the rows after the failure.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         members = self._members(X0, h, steps, stride, t0, noise_arguments, parameters, by_keyword)
@@ -421,13 +427,13 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, ArrayLike] | None = None,
         **by_keyword: ArrayLike,
     ) -> Turned:
-        """Return the states of `ensemble` with attitudes and positions: (x, attitude, position).
+        """Return the states of `ensemble` together with attitudes and positions: (x, attitude, position).
 
-        Attitudes are quaternions (4,) or matrices (n, n), positions are (3,), or None if the spec has none. Their
-        leading axes are those of x: (members, …), with a ``stride`` (rows, members, …). ``attitude0`` and ``position0``
-        are initial values, one for all members or (members, …), by default the identity and the origin. Each member has
-        the same bits as in `integrate`. Raises the same as `ensemble`, with all three results in ``trajectory``, and
-        `TypeError` if the spec does not say ``reconstruct``.
+        An attitude is a quaternion (4,) or a matrix (n, n), a position (3,); position is None if the spec has none.
+        Arrays of attitudes and positions have the leading axes of x: (members, …), with a ``stride`` (rows, members,
+        …). ``attitude0`` and ``position0`` are initial values, one for all members or (members, …), by default the
+        identity and the origin. Each member has the same bits as in `integrate`. Raises the errors of `ensemble`, with
+        all three results in ``trajectory``, and `TypeError` if the spec does not say ``reconstruct``.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         requested = self._members(X0, h, steps, stride, t0, noise_arguments, parameters, by_keyword)
@@ -464,15 +470,16 @@ class Solver(Named[Backend, Interface]):
     ) -> Pullback:
         """Return the state after ``steps`` steps, and the derivatives of its scalar product with a ``cotangent``.
 
-        The result is (x1, x0_bar, parameters_bar): the state, its product's derivative by ``x0``, and those by the
-        parameters, by name. ``x0`` is (DIM,) or (members, DIM); x1 and the cotangent have its shape. One state (DIM,)
-        with arrays of parameters is the initial state of all members, and x0_bar has a row for each. With a ``stride``,
-        x1 and the cotangent are (rows, …), for all rows of `integrate`. Parameters, h and t0 are numbers or (members,);
-        the derivative by a number that all members share is the sum over members. ``threads`` are as for `ensemble`.
+        The result is (x1, x0_bar, parameters_bar): the final state, the derivative of the product by ``x0``, and its
+        derivatives by the parameters, by name. ``x0`` is (DIM,) or (members, DIM); x1 and the cotangent have the shape
+        of x0. One state (DIM,) with arrays of parameters is the initial state of all members; x0_bar then has a row for
+        each member. With a ``stride``, x1 and the cotangent are (rows, …), for all rows of `integrate`. Parameters, h
+        and t0 are numbers or (members,); the derivative by a number that all members share is the sum over members.
+        ``threads`` is explained at `ensemble`.
 
-        Derivatives are exact to round-off. A gauge is held fixed, but the dependence of e = −H(x0) on x0 with a monitor
-        is included. There are no derivatives of times and attitudes. Raises `StepError`, and `TypeError` if the solver
-        was compiled without ``adjoint=True``.
+        Derivatives are exact to round-off. The gauge, the multiples of Casimirs that are subtracted from H, is held
+        fixed. With a monitor, the energy level e = −H(x0) is differentiated by x0. There are no derivatives of times
+        and attitudes. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
         """
         values = arguments.together(parameters, by_keyword)
         threads = threads if threads is None else arguments.count(threads, "threads", 1)
@@ -490,8 +497,8 @@ class Solver(Named[Backend, Interface]):
     ) -> Jacobian:
         """Return the state (DIM,) after ``steps`` steps from ``x0`` (DIM,), and its derivatives by x0 and parameters.
 
-        The derivative by x0 is (DIM, DIM), with row i for coordinate i; those by parameters are (DIM,), by name. Takes
-        one `pullback` for each coordinate, with the same conventions and errors.
+        The derivative by x0 is (DIM, DIM), with row i for coordinate i; derivatives by parameters are (DIM,), by name.
+        One `pullback` is made for each coordinate, with the same conventions and errors.
         """
         start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
         for name, value in arguments.together(parameters, by_keyword).items():
@@ -539,7 +546,10 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **by_keyword: float,
     ) -> Floats:
-        """Return π∇H at the states ``x`` (…, DIM), the same shape; ``t`` as for `hamiltonian`."""
+        """Return π∇H at the states ``x`` (…, DIM), an array of the same shape.
+
+        If H depends on the time, ``t`` are the times of the states, a number or an array (…).
+        """
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
         when = arguments.times(t, self.interface, states.shape[:-1], by_keyword)
@@ -553,7 +563,10 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **by_keyword: float,
     ) -> Floats:
-        """Return σπ∇g of each source of noise at the states ``x`` (…, DIM), shape (…, sources, DIM)."""
+        """Return the vector field σπ∇g of each source of noise at the states ``x`` (…, DIM), shape (…, sources, DIM).
+
+        σ is the amplitude of the source, and g its Hamiltonian.
+        """
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
         when = arguments.times(t, self.interface, states.shape[:-1], by_keyword)
@@ -570,7 +583,7 @@ class Solver(Named[Backend, Interface]):
     ) -> dict[str, Floats]:
         """Return the observables of the spec at the states ``x`` (…, DIM), by name, each of shape (…).
 
-        ``t`` as for `hamiltonian`.
+        If the spec has a time, ``t`` are the times of the states, a number or an array (…).
         """
         states = arguments.states(x, "x", self.interface)
         rows = states.reshape(-1, self.interface.dimension)
@@ -646,7 +659,10 @@ class Solver(Named[Backend, Interface]):
     def _integrate_members(
         self, requested: Members, threads: int | None, make: Callable[[Members, int | None], Floats]
     ) -> Floats:
-        """Return the states of members that ``make`` integrates. Raises `StepError` if members fail."""
+        """Return the states of an ensemble, which ``make`` integrates. Raises `StepError` if members fail.
+
+        ``make`` receives the members and the number of threads.
+        """
         max_threads = threads if threads is None else arguments.count(threads, "threads", 1)
         try:
             return make(requested, max_threads)
@@ -682,10 +698,10 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float],
         start: Floats | None = None,
     ) -> StepError:
-        """Return the exception for users after a failure in the back end.
+        """Return the `StepError` that users get for a failure in the generated code.
 
         Its message names the step and the parameters. ``trajectory`` are the results up to the failure. ``start``
-        (DIM,) is the initial state, for ensembles that of the first failed member.
+        (DIM,) is the initial state; for ensembles, the initial state of the first member that failed.
         """
         name = self.interface.name
         if error.status == "BAD_ARGUMENT":
@@ -716,5 +732,6 @@ class Solver(Named[Backend, Interface]):
         return StepError(message, step=error.step, status=error.status, trajectory=trajectory, members=error.members)
 
     def values(self, mapped: Mapping[str, float] | None, by_keyword: Mapping[str, float]) -> dict[str, float]:
-        """Return the values of all parameters. Raises the same as `arguments.parameters`."""
+        """Return the values of all parameters by name, from a mapping and keyword arguments; the errors are those of
+        `arguments.parameters`."""
         return arguments.parameters(self.interface, mapped, by_keyword)

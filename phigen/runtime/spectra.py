@@ -24,18 +24,18 @@ if TYPE_CHECKING:
 
 #: Smallest number of frames for a spectrum: with fewer, the Hann window is zero everywhere.
 LEAST_FRAMES = 4
-#: Largest accepted variation of the time between frames, relative to that time.
+#: Times between frames count as equal if they differ by less than this fraction.
 _EQUAL = 1e-6
 
 
 @dataclass(frozen=True)
 class DynamicSpectrum:
-    """Dynamic structure factor S(q, ω) of some fields of a grid.
+    """Dynamic structure factor S(q, ω) of some coordinates f of a grid.
 
     ``values`` (*sizes, frequencies) are S over the wave numbers ``q`` of each of the ``axes`` and the frequencies
     ``omega``. Wave numbers are in radians per site, in ascending order from −π; frequencies are ascending too. A wave
-    cos(qr − ωt) is at (q, ω) and (−q, −ω). The sum of all values is the mean of Σ f² over sites and time, weighted with
-    the window.
+    cos(qr − ωt) contributes at (q, ω) and (−q, −ω). The sum of all values is the mean of Σ f² over sites and time,
+    weighted with the window in time.
     """
 
     q: tuple[Floats, ...]
@@ -49,14 +49,16 @@ class DynamicSpectrum:
         return f"<DynamicSpectrum of {', '.join(self.of)}: q of {', '.join(self.axes)} and ω, {shape} values>"
 
     def variables(self, name: str, prefix: str = "") -> dict[str, tuple[tuple[str, ...], Floats]]:
-        """Return the dimensions and the values of S, called ``name``, and of ``q_AXIS`` and ``omega``, with a
-        ``prefix``."""
+        """Return the arrays of the spectrum as a dict: name → (names of dimensions, values).
+
+        S has the given ``name``; the wave numbers ``q_AXIS`` and the frequencies ``omega`` have the ``prefix``.
+        """
         names = [f"{prefix}q_{axis}" for axis in self.axes] + [f"{prefix}omega"]
         coordinates = zip(names, [*self.q, self.omega], strict=True)
         return {name: (tuple(names), self.values)} | {n: ((n,), values) for n, values in coordinates}
 
     def save(self, path: str | Path) -> None:
-        """Write a Zarr store: arrays ``S``, ``q_AXIS`` and ``omega``, which xarray opens too.
+        """Write a Zarr store with the arrays ``S``, ``q_AXIS`` and ``omega``; xarray can open it too.
 
         Raises `MissingPackageError` without zarr.
         """
@@ -64,7 +66,7 @@ class DynamicSpectrum:
         root = zarr.open_group(str(path), mode="w", zarr_format=2)
         for name, (dimensions, values) in self.variables("S").items():
             attributes = {"_ARRAY_DIMENSIONS": list(dimensions)}
-            # 0 is a value, not a missing one
+            # By default, xarray would read zeros as missing values.
             root.create_array(name, data=values, fill_value=None, attributes=attributes)
         root.attrs["of"] = list(self.of)
         zarr.consolidate_metadata(str(path))
@@ -93,7 +95,8 @@ class Correlation:
 
 @dataclass(frozen=True)
 class Transforms:
-    """Settings of the spectrum and of the correlation that a run asks for; None for those that it does not ask for."""
+    """The settings with which a run requests a spectrum and a correlation; None for a result that it does not
+    request."""
 
     spectrum: SpectrumChoice | None = None
     correlation: CorrelationChoice | None = None
@@ -102,14 +105,14 @@ class Transforms:
         return bool(self.spectrum or self.correlation)
 
     def expect_frames(self, t: Floats, h: float) -> None:
-        """Raise `ValueError` if frames at the times ``t`` do not suit the requested spectrum or correlation."""
+        """Raise `ValueError` if frames at the times ``t`` do not suffice for the requested spectrum or correlation."""
         if self.spectrum:
             equal_times(t, h, _number(self.spectrum.after))
         if self.correlation:
             expect_frames(t, h, _number(self.correlation.after))
 
     def of(self, run: LatticeTrajectory) -> tuple[DynamicSpectrum | None, Correlation | None]:
-        """Return spectrum and correlation of a trajectory."""
+        """Return the requested spectrum and correlation of a trajectory; None for a result that is not requested."""
         spectrum_request, pair = self.spectrum, self.correlation
         structure_factor = (
             spectrum(run, spectrum_request.of, after=_number(spectrum_request.after)) if spectrum_request else None
@@ -127,8 +130,9 @@ def _number(value: Fraction | None) -> float | None:
 def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None = None) -> DynamicSpectrum:
     """Return S(q, ω) of some coordinates, over the frames from the time ``after`` on, with a Hann window in time.
 
-    Frames must be equally spaced in time; a last frame that is not is left out. Open axes are treated as periodic.
-    Raises `ValueError` for graphs and pairs, unknown coordinates, and fewer than four frames.
+    Frames must be equally spaced in time; if only the last frame is at a shorter distance, it is left out. Open axes
+    are treated as periodic. Raises `ValueError` for lattices that are not grids, unknown coordinates, and fewer than
+    four frames.
     """
     fields = [_index(run, name) for name in ([of] if isinstance(of, str) else of)]
     _expect_grid(run, "a spectrum")
@@ -142,7 +146,7 @@ def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None =
     total = np.zeros((count, *sizes))
     for k in fields:
         windowed = np.array(run.x[first : first + count, k]) * window.reshape(-1, *[1] * len(sizes))
-        # Sign e^{+iωt} in time: a wave that moves to larger r has q and ω of the same sign.
+        # The sign of e^{+iωt} is chosen so that a wave that moves to larger r has q and ω of the same sign.
         total += np.abs(np.fft.fftn(np.fft.ifft(windowed, axis=0), axes=range(1, 1 + len(sizes)))) ** 2
     total /= float(np.prod(sizes)) ** 2
     values = np.moveaxis(np.fft.fftshift(total), 0, -1)
@@ -156,8 +160,9 @@ def correlation(
 ) -> Floats:
     """Return the correlations ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ for d = 0 … ``up_to`` sites along an axis, (up_to + 1,).
 
-    Means are over all sites (along an open axis over those with r + d on the lattice), and over the frames from the
-    time ``after`` on. Raises `ValueError` for graphs and pairs, and for unknown coordinates or axes.
+    f is the coordinate ``of``, g the coordinate ``other``. Means are over all sites (along an open axis over those with
+    r + d on the lattice), and over the frames from the time ``after`` on. Raises `ValueError` for lattices that are not
+    grids, and for unknown coordinates or axes.
     """
     _expect_grid(run, "a correlation")
     if axis not in run.axes:
@@ -182,10 +187,10 @@ def correlation(
 
 
 def equal_times(t: Floats, h: float, after: float | None) -> Floats:
-    """Return the times of the frames of a spectrum: those not before ``after``, without a last one at a shorter
-    distance.
+    """Return the times of the frames from which a spectrum is computed: frames from the time ``after`` on.
 
-    Raises `ValueError` for fewer than four frames, and for unequal distances in time.
+    If the last frame is at a shorter distance, it is left out. Raises `ValueError` for fewer than four frames, and for
+    unequal distances in time.
     """
     frames = _later(t, h, after)
     if len(frames) > 2 and abs(frames[-1] - 2 * frames[-2] + frames[-3]) > _EQUAL * abs(frames[1] - frames[0]):
@@ -198,13 +203,13 @@ def equal_times(t: Floats, h: float, after: float | None) -> Floats:
 
 
 def expect_frames(t: Floats, h: float, after: float | None) -> None:
-    """Raise `ValueError` if no frame is at or after a time."""
+    """Raise `ValueError` if there is no frame from the time ``after`` on; ``t`` are the times of the frames."""
     if not len(_later(t, h, after)):
         raise ValueError(f"there are no frames from t = {after!r} on")
 
 
 def _later(t: Floats, h: float, after: float | None) -> Floats:
-    """Return the times of the frames from ``after`` on, in the direction of the run."""
+    """Return those of the times ``t`` that are not before ``after``, in the direction of the run, which h gives."""
     sign = np.sign(h)
     return t if after is None else t[sign * t >= sign * after - 1e-9 * abs(h)]
 

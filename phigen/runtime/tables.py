@@ -1,7 +1,7 @@
 """Tables of floats in files that grow by appended rows: ``.csv`` text, or ``.npz`` arrays of NumPy.
 
-Flushed rows survive the end of the process, and a table can be resumed after them. A ``.csv`` can be read at any time.
-The rows of a ``.npz`` are collected in ``FILE.part``, as rows of doubles, until the table is closed.
+Rows that were flushed are not lost if the process ends, and the table can be continued after them. A ``.csv`` can be
+read at any time. The rows of a ``.npz`` are collected as doubles in ``FILE.part``, until the table is closed.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from phigen.writing import naming, replacing
 
 SUFFIXES = (".csv", ".npz")
 
-_ROWS = 1 << 14  # number of rows that are copied at a time
+_ROWS = 1 << 14  # number of rows that are copied at a time from FILE.part into a .npz
 
 
 @dataclass(frozen=True)
 class Column:
-    """Adjacent columns of a table: ``names`` in the first line of a ``.csv``, the array ``key`` in a ``.npz``.
+    """Adjacent columns of a table: ``names`` are their titles in a ``.csv``, ``key`` is the name of their array in a
+    ``.npz``.
 
     The array has shape (rows,) if it is ``flat``, else (rows, len(names)).
     """
@@ -37,14 +38,15 @@ class Column:
 
 
 class TableFile(Protocol):
-    """A table that is being written."""
+    """Protocol of a table that is being written to a file."""
 
     def append(self, rows: Floats) -> None:
-        """Write rows (rows, columns)."""
+        """Write ``rows`` (rows, columns) after the rows so far."""
         ...
 
     def flush(self) -> int:
-        """Write buffered rows to disk, and return the size of the file in bytes, from which `opened` can resume."""
+        """Write buffered rows to disk, and return the size of the file in bytes, which `opened` takes to continue the
+        table."""
         ...
 
     def close(self, scalars: Mapping[str, Any]) -> None:
@@ -52,16 +54,16 @@ class TableFile(Protocol):
         ...
 
     def clean(self) -> None:
-        """Remove the files that only serve to resume."""
+        """Remove auxiliary files, from which an interrupted table would be continued."""
         ...
 
     def discard(self) -> None:
-        """Remove all files of the table."""
+        """Remove all files of the table, for a run that failed."""
         ...
 
 
 def opened(path: str | Path, columns: Sequence[Column], size: int | None = None) -> TableFile:
-    """Return a new table, or one that is resumed after the first ``size`` bytes, a result of `TableFile.flush`.
+    """Return a new table or, with ``size``, a table that continues after the first ``size`` bytes of an existing file.
 
     Raises `ValueError` for suffixes that are not in `SUFFIXES` and for files shorter than ``size``, and `OSError`.
     """
@@ -73,7 +75,7 @@ def opened(path: str | Path, columns: Sequence[Column], size: int | None = None)
 
 
 def write(path: str | Path, columns: Sequence[Column], rows: Floats, scalars: Mapping[str, Any]) -> None:
-    """Write a whole table."""
+    """Write a complete table to a file, and close it."""
     table = opened(path, columns)
     table.append(rows)
     table.close(scalars)
@@ -97,19 +99,19 @@ class CsvTable:
             return _flushed(self._file)
 
     def close(self, scalars: Mapping[str, Any]) -> None:
-        """See `TableFile`; scalars are not written."""
+        """Close the file; ``scalars`` are not written, since a ``.csv`` has no place for them."""
         with naming(self._path):
             self._file.close()
 
     def clean(self) -> None:
-        """See `TableFile`; a ``.csv`` has no further files."""
+        """Do nothing, since a ``.csv`` has no auxiliary files."""
 
     def discard(self) -> None:
         _discarded(self._file, self._path)
 
 
 class NpzTable:
-    """A `TableFile` of NumPy arrays, one for each of the columns."""
+    """A `TableFile` that becomes a ``.npz`` with one array for each of the ``columns``."""
 
     def __init__(self, path: Path, columns: Sequence[Column], size: int | None) -> None:
         self._path, self._part, self._columns = path, path.with_name(path.name + ".part"), columns
