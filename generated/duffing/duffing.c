@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 273abb033dba05e6b92e781485b497deca682c26aea02500a4604079fdc951d7
+ * body-sha256: cd8ba7843f2af1f5ff4d5d575575a57a5e80fa9e564f553d0884ae7dae0d284a
  */
 #include "duffing.h"
 #include <float.h>
@@ -355,7 +355,7 @@ static duffing_status duffing_stage(duffing_solver *s)
 duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return duffing_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         duffing_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

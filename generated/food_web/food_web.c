@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 649aa075b0ff659034d04f0be863b9665b7ec48903e17d05e50e755f0ae7cedb
+ * body-sha256: c37fc98f6fb367cced4c6daeeeda27d9a8e4f6b933034b2b35db6b286f327a67
  */
 #include "food_web.h"
 #include <limits.h>
@@ -414,7 +414,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
 static food_web_status food_web_set_step(food_web_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return food_web_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return food_web_OK;
+    if (s->prepared && h == s->h) return food_web_OK;
     s->open = 0;
     food_web_prepare_step(&s->params, h, s->coef);
     s->h = h;

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 9549df8ede83f9762c065355e6011600d93cbc46b9fbd9ca0a7a4b8cee78ba92
+ * body-sha256: 043de3432a274f93110ca0eee49d4c0a48e7b3e658aaa5eeffad1b8c35afe869
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -662,7 +662,7 @@ static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return guiding_centre_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
             guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
         s->h = h;

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0) and the monitor dt/dtau; The
  *   solver
- * body-sha256: bea06dd15f99ed0e83351562046189e7b149d94108e87583ea17b8be59528242
+ * body-sha256: 8f1fd9d90725ef76302726e432dba52057355b5a79a10fa0c661c28de0af7977
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -283,7 +283,7 @@ kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return kepler_eccentric_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         kepler_eccentric_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
     }

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: d987a349afebd033dad87316b5e3767165c25695686c9d1c78ba689904be9f49
+ * body-sha256: 7583f87a16831329ba6db78d7aab6e362c59df88fe3994541fd0a25705868947
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -510,7 +510,7 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, double point[k
     kowalevski_gauss_history *past = &s->history;
     const int older = past->latest;
     past->latest = kowalevski_gauss_EARLIER - 1 - older;
-    if (memcmp(&s->h, &past->h, sizeof s->h) != 0) past->count = 0; /* predictors read steps of one size */
+    if (s->h != past->h) past->count = 0; /* predictors read steps of one size */
     past->h = s->h;
     past->kicked = 0;
     kowalevski_gauss_lanes last[kowalevski_gauss_UNKNOWNS];
@@ -573,7 +573,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
     kowalevski_gauss_lanes *now = increments;
     kowalevski_gauss_progress progress = { HUGE_VAL, 0, 0 };
     for (int i = 0; i < kowalevski_gauss_NODES; ++i) factors[0][i] = s->h * kowalevski_gauss_weights[i];;
-    if (past->count == 0 || memcmp(&s->h, &past->h, sizeof s->h) != 0) {
+    if (past->count == 0 || s->h != past->h) {
         memset(z, 0, sizeof z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h))
             kowalevski_gauss_predict_at(past, s->h / past->h, z);
@@ -661,7 +661,7 @@ static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s
 kowalevski_gauss_status kowalevski_gauss_integrate(kowalevski_gauss_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return kowalevski_gauss_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         kowalevski_gauss_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 464ca233067566cbfd77bbcdfb200cd6309bfdd65569b392120b885f2eae0adf
+ * body-sha256: fec6d3ea5526885a2c0e02d5051e7861c218cf6d84330ac5185912b5e23b678a
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -104,7 +104,7 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return pendulum_euler_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         pendulum_euler_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

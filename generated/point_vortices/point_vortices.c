@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: cfd35b0704850aff2010bcc4799475611c3f7102e491300058e737daaaf121d4
+ * body-sha256: 264638b41fc604cf6859e70851455e4ae7f1041eab833f443fc2dc6271eb3e59
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -391,7 +391,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
 static point_vortices_status point_vortices_set_step(point_vortices_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return point_vortices_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return point_vortices_OK;
+    if (s->prepared && h == s->h) return point_vortices_OK;
     point_vortices_prepare_step(&s->params, h, s->coef);
     s->h = h;
     s->t_before_h = s->t;

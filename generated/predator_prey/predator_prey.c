@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 5c676f41b768bf1c2f5d2171106ca20b1dbbaa015196f952b0b5f81143ad61b4
+ * body-sha256: 56c629e99f63de30e8b49f2c2e763b647b7424e35632600059da9d41d3811263
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -321,7 +321,7 @@ static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return predator_prey_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         predator_prey_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

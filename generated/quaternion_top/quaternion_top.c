@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 376dc816b804dde560d117153d4f43564872a61c2acd775c4d0202234b8aaf52
+ * body-sha256: bce451d1b2ddccbaa5adf4dff751324f8751eea7838fcd9dca155094aac47287
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -900,7 +900,7 @@ static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return quaternion_top_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         quaternion_top_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members: implicit
  *   steps; Ensembles
- * body-sha256: aea8971fe9d9bf00362595adbccdde30b33b0be98865b919ef3a1e14c1c7fcb4
+ * body-sha256: 409c5d9690e615726ad501d37020bbe1acb0ce8c79531a61a9722a9134edd24b
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -880,7 +880,7 @@ static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         rigid_body_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

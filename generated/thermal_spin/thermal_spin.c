@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 8faf9efa40b3aa52af8395eb4d19bd65e77c434063b0df245fad388fcac16e12
+ * body-sha256: 7feb17bc4946116d0d2de3f5baa088eacfd913d54c22ba113cafb7d7a999dd25
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -456,7 +456,7 @@ thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double 
     const double *dw)
 {
     if (s == NULL || !isfinite(h)) return thermal_spin_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) != 0) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         thermal_spin_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

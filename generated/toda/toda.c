@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 4699aab1d9db80b524db8ca534cc11a3db7e4fd911f98ff0a594661f6e3a6dd9
+ * body-sha256: 74ba4f859f396b1abeafc27ba12a36e3d16c0a6f9f8a96984c29711513d98f8f
  */
 #include "toda.h"
 #include <math.h>
@@ -311,7 +311,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
 static toda_status toda_set_step(toda_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return toda_OK;
+    if (s->prepared && h == s->h) return toda_OK;
     s->open = 0;
     toda_prepare_step(&s->params, h, s->coef);
     s->h = h;

@@ -572,7 +572,6 @@ MEMORY = Choice(
             "memset(&history, 0, sizeof history)",
         ),
         "EMPTY(s)": ("phi_empty(&s);", "memset(&s, 0, sizeof s);"),
-        "DIFFERS(a, b)": ("!(a == b)", "memcmp(&a, &b, sizeof a) != 0"),
         "DEFAULT_PARAMETERS": ("", "if (params == NULL) params = &phi_default_params;"),
     },
 )

@@ -182,7 +182,7 @@ static void phi_remember(phi_solver *s, double point[PHI_POINT], const double en
 #if PHI_STAGED
     const int older = past->latest;
     past->latest = PHI_EARLIER - 1 - older;
-    if (PHI_DIFFERS(s->h, past->h)) past->count = 0; /* predictors read steps of one size */
+    if (s->h != past->h) past->count = 0; /* predictors read steps of one size */
 #endif
     past->h = s->h;
     past->kicked = 0;
@@ -243,7 +243,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
     PHI_ITERATES(now, increments)
     phi_progress progress = { HUGE_VAL, 0, 0 };
     PHI_SET_FACTORS(s->h, factors);
-    if (past->count == 0 || PHI_DIFFERS(s->h, past->h)) {
+    if (past->count == 0 || s->h != past->h) {
         PHI_CLEAR_STAGES(z);
         if (past->count > 0 && fabs(s->h) <= fabs(past->h)) phi_predict_at(past, s->h / past->h, z);
 #if PHI_STAGED

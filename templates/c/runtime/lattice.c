@@ -140,7 +140,7 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
 static phi_status phi_set_step(phi_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
-    if (s->prepared && memcmp(&h, &s->h, sizeof h) == 0) return PHI_OK;
+    if (s->prepared && h == s->h) return PHI_OK;
     PHI_NOT_OPEN(s)
     phi_prepare_step(&s->params, h, s->coef);
     s->h = h;

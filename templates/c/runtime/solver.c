@@ -50,7 +50,7 @@ PHI_ABOUT_RUN
 PHI_RUN(phi_solver *s, double h, size_t steps PHI_AND_RECORD)
 {
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
-    if (PHI_DIFFERS(h, s->h)) { /* coefficients depend on the step size */
+    if (h != s->h) { /* coefficients depend on the step size */
         PHI_EACH_STAGE
             phi_prepare(&s->params PHI_AND_GAUGE(s->gauge), PHI_FRACTION(h), PHI_OF(s->coef, stage));
 #include "state_reset.h"
