@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 53c2f9d52d07302fba0a31854ae88a82245b5f37ba41d6fa3b91b5d23b3e2410
+ * body-sha256: afa46dedf2ef472b4c8a1090d8c3c6524690c202cb5b12276a92f32c65982ff8
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -177,7 +177,7 @@ static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrd
 
 #define heisenberg_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
 
-/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^6. */
+/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^8. */
 static inline double heisenberg_sin_lane(double u)
 {
     const double shifted = u * 0.3183098861837907 + heisenberg_ROUNDER, k = shifted - heisenberg_ROUNDER;
@@ -199,7 +199,7 @@ static inline double heisenberg_sin_lane(double u)
     memcpy(&bits, &value, sizeof bits);
     bits ^= parity << 63;
     memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
+    return value + (fabs(u) <= 1e8 ? 0.0 : (double)NAN);
 }
 
 /* sin(t), for loops over sites: a branch-free polynomial. NaN for |t| > 0.5. */

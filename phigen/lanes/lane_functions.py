@@ -19,7 +19,8 @@ SMALL_ARGUMENT_FUNCTIONS = tuple(
     f.name for f in sorted(FUNCTIONS.values(), key=lambda f: (f.written and f.name) or "") if f.near
 )
 
-#: Functions with a vector version for all arguments. The vector versions of exp beyond 700 and of log at 0 fail.
+#: Functions with a vector version for all arguments, or for |u| ≤ 10⁸ (sin and cos, whose reduction modulo π is exact
+#: up to there). The vector versions of exp beyond 700 and of log at 0 fail.
 FULL_RANGE_FUNCTIONS = (*SMALL_ARGUMENT_FUNCTIONS, "cos")
 
 #: Exponents of powers that remain after lowering and need no function.

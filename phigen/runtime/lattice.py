@@ -66,6 +66,9 @@ if TYPE_CHECKING:
     from phigen.spec.model import Run, Spec
     from phigen.symbolic.expression import Expression
 
+#: Values of the state beyond which a failure may be due to angles above 10⁸, where loops of C have no sin and cos.
+_LARGE_ANGLE = 5e7
+
 
 class LatticeSession(Protocol):
     """Protocol of a lattice that is integrated step by step. If a step fails, `BackendError` is raised, and the state
@@ -1121,6 +1124,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         advice = "the state left the range of the formulas; a smaller step helps, unless the solution ends here"
         if error.step == 0 and error.status == "NOT_FINITE" and (so_far is not None or not self.interface.time):
             advice = self._undefined(error.states[-1], values, None if so_far is None else float(so_far.t[0])) or advice
+        if error.status == "NOT_FINITE" and len(error.states) and np.abs(error.states[-1]).max() > _LARGE_ANGLE:
+            advice += "; loops of C compute sin and cos of angles up to 1e8"
         return StepError(f"{name}: {step_text}: {error.status}, {advice}", **facts)
 
     def _undefined(self, x: Floats, values: Mapping[str, Any], t: float | None) -> str:

@@ -611,6 +611,17 @@ def test_a_step_whose_coefficients_are_not_finite_fails_as_one_whose_state_is_no
         assert failure.value.status == "NOT_FINITE"
 
 
+def test_rotors_turn_by_angles_up_to_the_limit_of_the_functions() -> None:
+    text = "lattice: {axes: [i]}\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+    compilation = compile_text(f"{text}hamiltonian: p**2/2 - cos(q[i+1] - q) - cos(q)\n")
+    x = np.array([9.9e7 + np.arange(20.0), np.full(20, 3.0)])
+    runs = [lattice_solver_of(compilation, target).integrate(x, 0.05, 40) for target in ("c", "numpy")]
+    np.testing.assert_allclose(runs[0].x[-1][1], runs[1].x[-1][1], rtol=0, atol=1e-6)  # angles are rounded to 1.5e-8
+    assert abs(runs[0].energy[-1] - runs[0].energy[0]) < 1e-3
+    with pytest.raises(StepError, match="compute sin and cos of angles up to 1e8"):
+        lattice_solver_of(compilation, "c").integrate(x + 2e6, 0.05, 40)
+
+
 def test_a_start_where_h_is_not_defined_is_said_with_its_site() -> None:
     x = np.ones((1, 8))
     x[0, 5] = -1.5

@@ -8,7 +8,7 @@ from phigen.symbolic.special import SPECIAL
 from phigen.targets.c.amalgamation import Amalgam
 
 #: Largest argument, and units of the last place; sums of exponentials lose one or two.
-RANGES = {"log": (1e308, 2), "exp": (600.0, 2), "expm1": (600.0, 3), "sin": (1e6, 2), "cos": (1e6, 2)}
+RANGES = {"log": (1e308, 2), "exp": (600.0, 2), "expm1": (600.0, 3), "sin": (1e8, 2), "cos": (1e8, 2)}
 SINGLE = {"log": (3e38, 2), "exp": (80.0, 2), "expm1": (80.0, 2), "sin": (8192.0, 2), "cos": (8192.0, 2)}
 
 #: Where functions are compared, for −1 ≤ t ≤ 1.

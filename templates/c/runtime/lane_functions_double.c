@@ -79,12 +79,12 @@ static inline double phi_log_lane(double u)
 }
 
 #if PHI_CALLS_SIN && !PHI_CALLS_COS
-/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^6. */
+/* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^8. */
 static inline double phi_sin_lane(double u)
 {
     const double shifted = u * 0.3183098861837907 + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
 #elif PHI_CALLS_COS
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^6. */
+/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^8. */
 static inline double phi_turned_sin(double u, double offset)
 {
     const double shifted = (u * 0.3183098861837907 + offset) + PHI_ROUNDER, k = (shifted - PHI_ROUNDER) - offset;
@@ -108,7 +108,7 @@ static inline double phi_turned_sin(double u, double offset)
     memcpy(&bits, &value, sizeof bits);
     bits ^= parity << 63;
     memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
+    return value + (fabs(u) <= 1e8 ? 0.0 : (double)NAN);
 }
 
 #endif
