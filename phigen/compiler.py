@@ -218,9 +218,17 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
 
 def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None) -> Compilation:
     """Compile a system by the scheme of its spec; ``early_realisation`` is the result of `_realised_early`."""
+    _expect_inputs_to_change(spec)
     if early_realisation:
         return _compile_series(spec, source, clock, early_realisation)
     return SCHEME_COMPILERS[spec.scheme](spec, source, clock)
+
+
+def _expect_inputs_to_change(spec: Spec) -> None:
+    """Raise `SpecError` if ``without`` leaves out the function that changes the inputs of the spec."""
+    if spec.inputs and "parameters" in spec.extras.without:
+        message = f"inputs need {spec.name}_set_parameters, which `without` leaves out"
+        raise SpecError([spec.diagnostic(("inputs",), message, "remove inputs, or the parameters of `without`")])
 
 
 def _compile_series(
@@ -256,7 +264,7 @@ def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
     """
     compilations: dict[str, Compilation] = {}
     failures: dict[str, SpecError] = {}
-    for scheme in ("series",) if _is_of_series(spec) else ("splitting", "gauss", "series"):
+    for scheme in _candidates(spec):
         alone = replace(spec, scheme=scheme)
         least = min(map(_expected, compilations.values()), default=math.inf)
         try:
@@ -270,10 +278,18 @@ def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
     return replace(compilations[best], spec=spec, choice=_choice(best, compilations, failures))
 
 
-def _is_of_series(spec: Spec) -> bool:
-    """Whether options of the spec apply only to the scheme series."""
+def _candidates(spec: Spec) -> tuple[str, ...]:
+    """Return the schemes to which all options of the spec apply."""
     names_options = spec.birealisation.kind != "auto" or spec.terms is not None
-    return names_options or spec.extras.modified_hamiltonian > 0
+    if names_options or spec.extras.modified_hamiltonian > 0:
+        return ("series",)
+    return ("gauss", "series") if _settings_of_the_solve(spec) else ("splitting", "gauss", "series")
+
+
+def _settings_of_the_solve(spec: Spec) -> list[str]:
+    """Return the settings of the inner solve that the spec chooses."""
+    chosen = [key for key in ("tolerance", "max_iterations") if ("solver", key) in spec.locations]
+    return [key for key in chosen if key != "tolerance" or spec.solver.tolerance is not None]
 
 
 def _choice(best: str, compilations: Mapping[str, Compilation], failures: Mapping[str, SpecError]) -> str:
@@ -390,6 +406,7 @@ def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:
     """Compile a lattice, for any sizes, to a plan of sweeps over its sites."""
     if spec.scheme == "gauss":
         expect_offered(spec)
+    _expect_inputs_to_change(spec)
     from phigen.lattice.cell_building import expect_coloured
     from phigen.lattice.sweep_plans import build_sweeps, plan_sweeps
 
@@ -408,8 +425,7 @@ def _expect_no_settings_of_the_solve(spec: Spec) -> None:
     message = "not for lattices, whose steps are exact flows, or are solved to round-off"
     diagnostics = [
         spec.diagnostic(("solver", key), f"solver: {key} is {message}", f"remove {key}")
-        for key in ("tolerance", "max_iterations")
-        if ("solver", key) in spec.locations and not (key == "tolerance" and spec.solver.tolerance is None)
+        for key in _settings_of_the_solve(spec)
     ]
     if diagnostics:
         raise SpecError(diagnostics)
