@@ -69,9 +69,15 @@ def test_a_card_is_measured_by_one_command(small, monkeypatch, tmp_path):
     assert "target cuda, beside one core of" in text
     assert [row["blocks"] for row in cells(text, "### Ensembles")] == ["1", "4"]
     assert {d["bench_BLOCKS"] for d in compiled if "bench_BLOCKS" in d} == {1, 4}
-    for row in (*cells(text, "### Ensembles"), *cells(text, "### Cubic")):
-        assert all(float(row[column].replace(",", "")) for column in row if column in ("members", "one core"))
-        assert float(row["difference from C"]) < 1e-12
+    for title, counted, rates, ratio in (
+        ("### Ensembles", "members", ("one core, ps", "ps a member and step"), "core / device"),
+        ("### Cubic", "spins", ("steps of spins a second", "one core"), "device / core"),
+    ):
+        for row in cells(text, title):
+            assert int(row[counted].replace(",", "")) > 0
+            core_over_device = float(row[rates[0]]) / float(row[rates[1]])
+            assert float(row[ratio]) == pytest.approx(core_over_device, rel=0.02)
+            assert float(row["difference from C"]) < 1e-12
 
 
 @pytest.mark.slow
