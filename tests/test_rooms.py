@@ -81,7 +81,6 @@ REGULAR_EXPRESSIONS = {
     "phigen/targets/c/macros.py": "lines of the runtime that name phrases",
     "phigen/targets/c/amalgamation.py": "lines of the runtime that call hooks, and its prefix",
     "phigen/targets/c/layout.py": "lines of finished C, where they may be broken",
-    "phigen/targets/c/misra.py": "comparisons of bytes in solvers of the profile certified",
     "phigen/targets/c/lattice/loops.py": "descriptions of kernels, for their comments",
     "phigen/targets/js/printing.py": "names of kernels and arrays, for identifiers",
     "phigen/targets/js/runtime.py": "lines of the runtime that include or import",
