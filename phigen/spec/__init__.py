@@ -13,14 +13,14 @@ if TYPE_CHECKING:
 
 __all__ = ["load", "loads", "schema", "starter"]
 
-# Modules are imported inside the functions, so that importing phigen.spec.model is fast. No module may have the name of
-# a function here: its import would replace the function.
+# Each function imports its modules when it is called, so that importing phigen.spec.model is fast. No module of this
+# package may be called load, loads, schema or starter: importing it would replace the function of that name.
 
 
 def load(path: str | PathLike[str]) -> Spec:
     """Return the spec in a file.
 
-    Raises `SpecError` with all errors, in the order of the file, or `LimitError` if a limit is exceeded.
+    Raises `SpecError` with all errors, in the order of the file; `LimitError` if all of them are exceeded limits.
     """
     from phigen import resources
     from phigen.errors import Diagnostic, SpecError
@@ -44,7 +44,7 @@ def load(path: str | PathLike[str]) -> Spec:
 
 
 def loads(text: str, file: str = "<string>") -> Spec:
-    """Return the spec in a text; ``file`` is its name in messages. Raises as `load` does."""
+    """Return the spec in a text. Messages show ``file`` as the name of the text. Raises the errors of `load`."""
     from phigen.spec.validate import validate
 
     return validate(text.encode("utf-8", "surrogatepass"), file)
@@ -58,7 +58,7 @@ def schema() -> dict[str, Any]:
 
 
 def starter(name: str, *, lattice: bool = False) -> str:
-    """Return a commented spec to start from. Raises `SpecError` if the name is not allowed for a spec."""
+    """Return the YAML text of a commented example spec. Raises `SpecError` if no spec may have this name."""
     from phigen.spec.first_spec import starter as build
 
     return build(name, lattice=lattice)

@@ -9,15 +9,15 @@ from typing import Any
 from phigen.symbolic.expression import Expression, fold
 from phigen.symbolic.numeric import Numbers, evaluate_precisely
 
-#: Number of digits of the evaluation: sufficient for correct rounding after the cancellations of usual formulas.
+#: Decimal digits of the evaluation. A double has 16; the others are reserve for cancellations inside the formula.
 DIGITS = 77
 
 
 def nearest_double(expression: Expression) -> Fraction | None:
     """Return the double nearest to an expression without symbols, or None if it is not a finite real number.
 
-    The expression is first evaluated in doubles; the evaluation stops at the first overflow. With 77 digits,
-    ``exp(exp(exp(100)))`` would never end.
+    The expression is evaluated in doubles, and then with 77 digits. An overflow in doubles ends the evaluation, because
+    ``exp(exp(exp(100)))`` with 77 digits would never end.
     """
     floats = Numbers({}, float, math, math.pow)
     try:

@@ -1,6 +1,6 @@
 """Coordinates, time, parameters and definitions: the names of a spec, and the expressions that use them."""
 
-# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
+# `return reader.error(…)` reports an error and returns None, which stands for a value that could not be read.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ RENAME = "choose another name"
 class Declarations:
     """The declared names of a spec, and methods that parse expressions with these names.
 
-    ``incomplete`` says that some names could not be read. Unknown names are then not reported, since they may be among
-    these.
+    ``incomplete`` says that some coordinates could not be read. Then an unknown name is not reported, since it may be
+    one of these coordinates.
     """
 
     reader: Reader
@@ -47,26 +47,26 @@ class Declarations:
     incomplete: bool = False
     nodes: dict[str, Scalar] = field(default_factory=dict)  # where each name is declared
     within: tuple[Any, ...] = ("poisson",)  # the path of keys to the Poisson structure that is being read
-    # names that are not allowed in this structure: message and hint
+    # names that expressions must not use; each with the message and the hint of the error
     refused: dict[str, tuple[str, str]] = field(default_factory=dict)
     lattice: Lattice | None = None
-    indexed: bool = True  # whether the expression being read may name neighbours
+    indexed: bool = True  # whether expressions may contain names with an index, such as x[i+1]
 
     # --- lattices
 
     @property
     def relation(self) -> str:
-        """Relation between sites; "" for an ordinary spec."""
+        """Relation between the sites: ``grid``, ``graph`` or ``pairs``; "" if the spec has no lattice."""
         return self.lattice.relation if self.lattice else ""
 
     @property
     def neighbours(self) -> Neighbours:
-        """The symbols of all quantities with a value at every site."""
+        """Symbols of the coordinates and of the parameters that have a value at every site, and of their neighbours."""
         at_sites = (n for n, p in self.parameters.items() if p.at == "sites")
         return Neighbours((*self.coordinates, *at_sites), self.lattice.axes if self.lattice else ())
 
     def _at_bonds(self, names: Mapping[str, Expression]) -> dict[str, tuple[str, str]]:
-        """Return the names that have a value at bonds only, with a message and a hint for their use at sites."""
+        """Return the names that have a value at bonds only, each with the message and hint for its use at a site."""
         bond_parameters = {n for n, p in self.parameters.items() if p.at == "bonds"}
         bond_names = (
             {n for n, e in names.items() if bond_parameters.intersection(symbols_of(e))} if bond_parameters else set()
@@ -74,7 +74,7 @@ class Declarations:
         return {n: (f"{n!r} has a value at every bond, not at sites", "use it in bonds:") for n in bond_names}
 
     def _counters(self) -> dict[str, tuple[str, str]]:
-        """Return the names of indices and sizes, which are not allowed in a density, with messages and hints."""
+        """Return the names of indices and sizes (i, N_i), each with the message and the hint if a density uses it."""
         reason = "this expression must be the same for all sites"
         hint = "a parameter at: sites has a value for each site"
         index_names = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
@@ -84,7 +84,10 @@ class Declarations:
         }
 
     def indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
-        """Return the names that may have an index: those that depend on the site."""
+        """Return the record of the names that may have an index, those among ``names`` that depend on the site.
+
+        None if no name may have an index. With ``ends``, an index is an end of a bond, otherwise an offset on a grid.
+        """
         if self.lattice is None or not self.indexed:
             return None
         neighbours = self.neighbours
@@ -98,9 +101,9 @@ class Declarations:
         return Indices(neighbours, varying, {**same, **at_bonds}, ends)
 
     def bond_scope(self, *, dated: bool = False) -> AllowedNames:
-        """Return the names for brackets along bonds, whose sites are the ends a and b.
+        """Return the names that a formula of a bond or pair may use; its sites are the ends a and b, as in ``x[a]``.
 
-        If ``dated``, the time is included, for densities of bonds and pairs.
+        ``dated`` includes the time, which densities of H may depend on, and brackets may not.
         """
         scope = self.dated_scope() if dated else self.scope()
         names = scope.names
@@ -114,13 +117,13 @@ class Declarations:
         return AllowedNames(common_names, refused, open=self.incomplete, indices=indices)
 
     def site_numbers(self) -> AllowedNames:
-        """Return the names for values at sites: the indices, counted from 0, and the sizes."""
+        """Return the names that formulas of values at sites may use: indices (i, from 0) and sizes (N_i)."""
         indices = self.lattice.indices if self.lattice and self.relation != "graph" else ()
         names = {n: symbol(n) for i in indices for n in (i, f"N_{i}")}
         return AllowedNames(names, self.numbers().refused)
 
     def neighbour(self, node: Scalar, ends: tuple[str, ...] = ()) -> tuple[str, Offset] | None:
-        """Return the coordinate that a key names, and its offset; None after an error, which is reported."""
+        """Return the coordinate that a key such as ``x[i+1]`` names, and its offset; None after a reported error."""
         if "[" not in node.text:
             index = self.coordinate(node)
             return None if index is None else (self.coordinates[index], self.neighbours.origin)
@@ -141,7 +144,10 @@ class Declarations:
     # --- scopes
 
     def scope(self, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Return everything declared except the time, for functions on phase space and for densities of sites."""
+        """Return the names that functions on phase space and densities of sites may use; without the time.
+
+        ``extra`` has further names with their expressions.
+        """
         names = {n: symbol(n) for n in (*self.coordinates, *self.parameters)}
         names |= {n: e for n, e in self.definitions.items() if n not in self.dated} | dict(extra or {})
         bonds = self._at_bonds(names)
@@ -150,7 +156,7 @@ class Declarations:
         return AllowedNames(allowed_names, refused, open=self.incomplete, indices=self.indices(allowed_names))
 
     def dated_scope(self) -> AllowedNames:
-        """Return everything declared, for functions on phase space that may depend on the time."""
+        """Return the names that functions on phase space may use if they may depend on the time."""
         scope = self.scope()
         dated = {n: self.definitions[n] for n in self.dated} | ({self.time: symbol(self.time)} if self.time else {})
         bonds = self._at_bonds(dated)
@@ -160,15 +166,15 @@ class Declarations:
         return replace(scope, names=names, refused=refused, indices=self.indices(names))
 
     def _timeless(self) -> dict[str, tuple[str, str]]:
-        """Return the message and hint that refuse the time where an expression must not depend on it."""
+        """Return the time and the definitions that depend on it, with the message and hint that refuse each."""
         hint = "only the Hamiltonian, invariants, sections and exact solutions may"
         refused = {n: (f"this must not depend on the time, as {n!r} does", hint) for n in sorted(self.dated)}
         return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
 
     def constants(self, value_name: str, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Return parameters and definitions of parameters only.
+        """Return the names that a constant may use: parameters, and definitions that depend on parameters only.
 
-        ``value_name`` names the value in messages about other names.
+        Messages about other names call the constant ``value_name``. ``extra`` has further names with their expressions.
         """
         names = {n: symbol(n) for n in self.parameters}
         names |= {n: e for n, e in self.definitions.items() if n not in self.varying | self.dated}
@@ -182,7 +188,7 @@ class Declarations:
         return AllowedNames(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
     def dated_constants(self, value_name: str) -> AllowedNames:
-        """Return parameters, the time, and definitions that depend on these only; see `constants`."""
+        """Return the names of `constants`, the time, and definitions that depend on parameters and the time only."""
         scope = self.constants(value_name)
         dated = {n: self.definitions[n] for n in self.dated - self.varying}
         dated |= {self.time: symbol(self.time)} if self.time else {}
@@ -190,15 +196,16 @@ class Declarations:
         return replace(scope, names={**scope.names, **dated}, refused=refused)
 
     def numbers(self) -> AllowedNames:
-        """Return the names for defaults and initial values: constants, but nothing that the spec declares."""
+        """Return the names that defaults and initial values may use: pi and E, but nothing that the spec declares."""
         declared = (*self.coordinates, *self.parameters, *self.definitions, *filter(None, [self.time]))
         hint = "formulas of values may contain indices and sizes, such as i and N_i" if self.lattice else ""
         return AllowedNames({}, {n: (f"expected a number; {n!r} is not constant", hint) for n in declared})
 
     def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
-        """Return the declarations for an inner structure with other coordinates.
+        """Return the declarations for a structure inside this one, with other coordinates: a block or a pull-back.
 
-        Messages about names of the outer structure begin with ``message``.
+        ``within`` is its path of keys. If it uses a coordinate that only the outer structure has, the error is
+        ``message``, followed by that name.
         """
         excluded = [c for c in self.coordinates if c not in coordinates]
         gone = {n for n, e in self.definitions.items() if any(s in excluded for s in symbols_of(e))}
@@ -213,7 +220,7 @@ class Declarations:
     # --- values
 
     def formula(self, node: Scalar | None, scope: AllowedNames) -> Expression | None:
-        """Return the expression in a scalar; None after its errors, which are reported at their columns."""
+        """Return the expression that a scalar contains; None if it has errors, which are reported at their columns."""
         if node is None:
             return None
 
@@ -254,7 +261,10 @@ class Declarations:
         return (TIMED_ARGUMENTS if self.time else ARGUMENTS) | (NOISY_ARGUMENTS if self.noisy else frozenset())
 
     def declare(self, node: Scalar, kind: str) -> bool:
-        """Return whether expressions may use the name. If the name is not free, an error is reported."""
+        """Declare a name of this ``kind`` (coordinate, parameter, …); report an error if the name is not free.
+
+        Returns whether expressions may use the name.
+        """
         name, first = node.text, self.nodes.get(node.text)
         if name in SPEC_FUNCTIONS:
             self.reader.error(node, f"the {kind} {name!r} has the name of a function", RENAME)
@@ -263,12 +273,12 @@ class Declarations:
             self.reader.error(node, f"the name {name!r} is declared twice; the first is in {first_place}")
         elif kind == "parameter" and name in self.arguments:
             self.reader.error(node, f"a parameter cannot be called {name!r}", argument_hint(name))
-            # the name is declared all the same, so that its uses are not reported as errors too
+            # the name is declared in spite of the error, so that expressions with this name are not reported too
             self.nodes[name] = node
             return True
         elif self.lattice and name in (*self.lattice.indices, *(f"N_{i}" for i in self.lattice.indices)):
             self.reader.error(node, f"the {kind} {name!r} has the name of an index or size of the lattice", RENAME)
-        # "bonds" is an argument of solvers
+        # "bonds" is the name of an argument of generated solvers
         elif self.lattice and self.lattice.graph and name in (self.lattice.graph, "bonds"):
             self.reader.error(node, f"the {kind} {name!r} has the name of the bonds of the lattice", RENAME)
         else:
@@ -278,7 +288,7 @@ class Declarations:
 
 
 def declare(raw: Raw, reader: Reader) -> Declarations:
-    """Read ``coordinates``, ``time``, ``parameters`` and ``definitions``."""
+    """Return the names that ``coordinates``, ``time``, ``parameters`` and ``definitions`` declare; report errors."""
     declared = Declarations(reader, lattice=_lattice(raw.get("lattice"), reader), noisy="noise" in raw)
     coordinates = raw.get("coordinates")
     declared.incomplete = coordinates is None or None in coordinates
@@ -294,7 +304,7 @@ def declare(raw: Raw, reader: Reader) -> Declarations:
 
 
 def _lattice(raw: Raw | None, reader: Reader) -> Lattice | None:
-    """Read ``lattice:``, the relation between sites; None for an ordinary spec."""
+    """Return the relation between sites that ``lattice:`` declares; None if the spec has no lattice."""
     if raw is None:
         return None
     nodes = [node for node in raw.get("axes", ()) if node is not None]
@@ -315,7 +325,7 @@ def _lattice(raw: Raw | None, reader: Reader) -> Lattice | None:
         )
         reader.problems.add(message, reader.locations["lattice", "boundary"], "a single word holds for all axes")
     graph = raw.get("graph")
-    if not (axes or graph or "pairs" in raw):  # the reason was reported before
+    if not (axes or graph or "pairs" in raw):  # after an error, which was reported when the key was read
         return Lattice(("i",), ("periodic",))
     return Lattice(axes, tuple(b or "periodic" for b in boundary), graph.text if graph else "", "pairs" in raw)
 
@@ -352,7 +362,7 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
         if number is not None and bounded.refuses(number):
             message = f"is {bounded.bound} by declaration, but its value is {options['value'].text}"
             declared.reader.error(options["value"], f"the parameter {name!r} {message}")
-        # A wrong value was reported. The name is declared all the same, so that its uses are not reported too.
+        # A wrong value was reported. The parameter gets the value 1, so that expressions with it are not reported too.
         value = Fraction(1) if number is None else number
         description, unit = options.get("description", ""), options.get("unit", "")
         is_small = options.get("small", False)
@@ -362,7 +372,7 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
 
 
 def _expect_place(name: str, domain: str, declared: Declarations) -> None:
-    """Report a parameter with values at sites or bonds if the spec has no sites or bonds."""
+    """Report a parameter that is declared at sites or bonds (``domain``) if the spec has no sites or no bonds."""
     relations = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(domain)
     if relations and declared.relation not in relations:
         needs = "a lattice with a graph" if domain == "bonds" and declared.relation else "specs with lattice:"
@@ -374,7 +384,7 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
     sources = {name: node for name, (key, node) in entries.items() if declared.declare(key, "definition")}
     uses = {name: names_in(node.text) if node else [] for name, node in sources.items()}
     coordinates = set(declared.coordinates)
-    # Placeholders: only the members of a cycle, which is an error, can refer to one.
+    # Until a definition is read, a symbol stands for it. Only definitions in a cycle, an error, refer to the symbol.
     scope = declared.dated_scope()
     names = {**scope.names, **{name: symbol(name) for name in sources}}
     for name in _in_order(uses, entries, declared.reader):
@@ -384,20 +394,24 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
             declared.dated.add(name)
         definition_scope = replace(scope, names=names, indices=declared.indices(names))
         expression = declared.formula(sources[name], definition_scope)
-        # After an error the name is declared all the same, so that its uses are not reported too.
+        # After an error a symbol stands for the definition, so that expressions with its name are not reported too.
         declared.definitions[name] = names[name] = symbol(name) if expression is None else expression
 
 
 def _in_order(
     uses: Mapping[str, list[str]], keys: Mapping[str, tuple[Scalar, Node | None]], reader: Reader
 ) -> list[str]:
-    """Return the definitions, each after those that it uses. Cycles are reported and broken."""
+    """Return the names of the definitions, sorted so that each comes after the definitions that it uses.
+
+    ``uses`` maps each name to the names in its expression, ``keys`` to its key in the file. A cycle is reported, and
+    then broken at its first definition.
+    """
     graph = {name: [u for u in used_names if u in uses] for name, used_names in uses.items()}
     while True:
         try:
             return list(TopologicalSorter(graph).static_order())
         except CycleError as error:
-            members: list[str] = error.args[1][:-1][::-1]  # each member uses the next one
+            members: list[str] = error.args[1][:-1][::-1]  # in this order, each definition uses the next one
             start = members.index(min(members, key=list(graph).index))
             cycle = [*members[start:], *members[:start], members[start]]
             reader.error(keys[cycle[0]][0], f"definitions in a cycle: {shown(' → '.join(cycle), 200)[1:-1]}")

@@ -54,7 +54,8 @@ MATRIX = ListOf(ListOf(FORMULA, least=1), least=1)
 BASIS = ShapedText(r"E[1-9][0-9]*", "the name of a basis element", "basis elements are E1, E2, …")
 
 RANDOM = MapOf(NAME, CONSTANT, least=1)
-#: A number, a formula of the indices, or a file; a list; or a mapping {random: …, seed: …, scale: …, mean: …}.
+#: Values at sites or bonds: a scalar (number, formula of the indices, or name of a file), a list, or a mapping
+#: {random: …, seed: …, scale: …, mean: …}.
 VALUES = Either({Scalar: CONSTANT, Sequence: ListOf(CONSTANT, least=1), Mapping: RANDOM})
 PARAMETER = Record(
     "a parameter",
@@ -117,8 +118,10 @@ _FORMS: dict[str, tuple[Kind, str]] = {
 
 
 def _structure(subject: str, nested: int, *further_keys: RecordKey) -> Record:
-    """Return the kind of a Poisson structure in one of its forms; products and pull-backs may be ``nested`` this
-    deep."""
+    """Return the record of keys for a Poisson structure, which is given in exactly one form (matrix, brackets, …).
+
+    Products and pull-backs may be nested to the depth ``nested``. ``subject`` is the name of the record in messages.
+    """
     forms = [RecordKey(form, *described) for form, described in _FORMS.items()]
     if nested:
         names = ListOf(NAME, least=1)
@@ -162,7 +165,7 @@ def _structure(subject: str, nested: int, *further_keys: RecordKey) -> Record:
 
 
 BOUNDARY = OneOf(("periodic", "open"))
-#: Largest depth of nested products and pull-backs.
+#: Largest depth to which products and pull-backs of Poisson structures may be nested.
 NESTED = 2
 POISSON = _structure("poisson", NESTED)
 KIND = OneOf(BIREALISATIONS)
@@ -274,7 +277,7 @@ SOURCE = Record(
     ),
 )
 
-#: Hints for keys of specs, and for the time, in runs.
+#: Hints for keys that stand inside a run, but belong to the whole spec or have another name there.
 _BESIDE_RUNS = {
     key: f"{key}: belongs beside runs, to the whole spec"
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")
@@ -376,7 +379,7 @@ RUN = Record(
     elsewhere=_BESIDE_RUNS,
 )
 
-#: Words that a sweep may store; whether their observables exist is checked later.
+#: A word under ``keep`` of a sweep, such as final or mean(M). Whether the observable M exists is checked later.
 KEPT_WORD = ShapedText(
     r"\w+|\w+ *\( *\w+ *\)",
     "a result of a sweep",
@@ -418,7 +421,7 @@ SWEEP = Record(
 )
 
 
-#: Hints for keys of runs outside of runs.
+#: Hints for keys that stand at the top of a spec, but belong inside a run.
 _IN_RUNS = {f.key: f"{f.key}: belongs to a run, runs: {{NAME: {{{f.key}: …}}}}" for f in RUN.fields}
 _IN_RUNS["step"] += "; monitor: adapts steps to the motion"
 _IN_RUNS["precision"] = "order: sets the order of the error; real: float is single precision"

@@ -9,10 +9,12 @@
     atom     = number | name | indexed | function "(" sum ("," sum)* ")" | "(" sum ")" | choice
     choice   = "if" "(" sum ("<" | "<=" | ">" | ">=") sum "," sum "," sum ")"
 
-Choices and the other piecewise functions are for observables and ``stop`` alone. Names with an index, ``x[i+1]``, are
-for lattices: `phigen.spec.indices`. Precedences are Python's: ``-x**2`` is −(x²) and ``2**3**2`` is 2⁹. Nothing is ever
-evaluated as Python; decimals are exact rationals; constants and exponents are bounded before anything is computed with
-them.
+Piecewise functions, of which ``if`` is one, are allowed in observables and ``stop`` only. Names with an index, such as
+``x[i+1]``, are allowed in lattices; `phigen.spec.indices` reads them. Precedences are those of Python: ``-x**2`` is
+−(x²) and ``2**3**2`` is 2⁹.
+
+Nothing is ever evaluated as Python. Decimals are exact rationals. The size of constants and exponents is checked before
+anything is computed with them.
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ OTHER_FUNCTIONS = {"ln": "log", "fabs": "abs", "arcsin": "asin", "arccos": "acos
 
 
 class Report(Protocol):
-    """Function that receives an error at a character of the expression's text."""
+    """Function that receives an error in an expression; ``index`` is the character of the text where it is."""
 
     def __call__(self, message: str, index: int, hint: str = "", *, limit: bool = False) -> None: ...
 
@@ -62,9 +64,10 @@ class Report(Protocol):
 class AllowedNames:
     """The names that an expression may use.
 
-    ``refused`` has names that exist but are not allowed here, each with a message and a hint. If ``open``, every other
-    name counts as declared. ``indices`` describes the names that may have an index, None if there are none.
-    ``piecewise`` allows functions without a derivative (`phigen.spec.names.PIECEWISE_FUNCTIONS`).
+    ``names`` maps each allowed name to its expression. ``refused`` has names that exist but are not allowed here, each
+    with a message and a hint. If ``open``, unknown names are accepted as symbols. ``indices`` describes the names that
+    may have an index, None if there are none. ``piecewise`` allows functions without a derivative
+    (`phigen.spec.names.PIECEWISE_FUNCTIONS`).
     """
 
     names: Mapping[str, Expression]
@@ -74,7 +77,10 @@ class AllowedNames:
     piecewise: bool = False
 
     def lookup(self, name: str) -> Expression | None:
-        """Return the expression that a name stands for, or None. Declared names take precedence over constants."""
+        """Return the expression that a name stands for; None if the name is unknown or refused.
+
+        A declared name takes precedence over the constants pi and E.
+        """
         if name in self.names:
             return self.names[name]
         if name in self.refused:
@@ -82,7 +88,7 @@ class AllowedNames:
         return CONSTANTS.get(name) or (symbol(name) if self.open and name not in SPEC_FUNCTIONS else None)
 
     def unknown(self, name: str) -> tuple[str, str]:
-        """Return the message and the hint for a name that `lookup` does not know."""
+        """Return the message and the hint for a name for which `lookup` returns None."""
         if name in self.refused:
             return self.refused[name]
         if name.lower() in ("nan", "inf", "infinity"):
@@ -117,13 +123,14 @@ _CHARACTER_HINTS = {
     ":": "expressions are not Python",
 }
 
-#: Replacements for wrong operator characters: reading continues with these, so that all errors are reported.
+#: Operators that are meant by wrong characters. After the error, reading continues with the operator that is meant, so
+#: that later errors of the expression are reported too.
 _MEANT = {"^": "**", "−": "-", "–": "-", "·": "*", "×": "*"}
 
 
 @dataclass(frozen=True)
 class Token:
-    """A lexical element; ``kind`` is number, name, operator or end."""
+    """A lexical element at the character ``index`` of the text; ``kind`` is number, name, operator or end."""
 
     kind: str
     text: str
@@ -135,10 +142,7 @@ class _AbandonedError(Exception):
 
 
 def tokens(source: str, report: Report) -> list[Token] | None:
-    """Return the tokens of an expression, the last one of the kind ``end``.
-
-    None if some text cannot be read, which is reported.
-    """
+    """Return the tokens of an expression, of which the last has the kind ``end``; None after a reported error."""
     if len(source) > limits.EXPRESSION_LENGTH:
         message = f"the expression has {len(source)} characters, more than the limit of {limits.EXPRESSION_LENGTH}"
         report(message, 0, "name parts of it under definitions", limit=True)
@@ -164,7 +168,7 @@ def tokens(source: str, report: Report) -> list[Token] | None:
 
 
 def names_in(source: str) -> list[str]:
-    """Return the names in an expression, in order. Errors are not reported."""
+    """Return the names in an expression, in the order of the text, with repetitions. Errors are not reported."""
     token_list = tokens(source, lambda message, index, hint="", *, limit=False: None)
     return [t.text for t in token_list or [] if t.kind == "name"]
 
@@ -172,7 +176,7 @@ def names_in(source: str) -> list[str]:
 def parse(source: str, scope: AllowedNames, report: Report) -> Expression | None:
     """Return the expression that a text stands for; None after errors, which are passed to ``report``.
 
-    Reading ends at a syntax error. Unknown names and undefined values are all reported.
+    Reading ends at the first syntax error; until then, all unknown names and undefined values are reported.
     """
     failed = False
 
@@ -194,7 +198,7 @@ def parse(source: str, scope: AllowedNames, report: Report) -> Expression | None
 class Parser:
     """Parser from tokens to an expression, with a method for each rule of the grammar."""
 
-    nothing = symbol(Symbol("unknown", ""))  # placeholder for an expression with an error
+    nothing = symbol(Symbol("unknown", ""))  # stands for a part with an error while the other parts are read
 
     def __init__(self, source_tokens: list[Token], scope: AllowedNames, report: Report) -> None:
         self.tokens, self.scope, self.report = source_tokens, scope, report
@@ -215,7 +219,7 @@ class Parser:
         return token
 
     def advance(self) -> Token:
-        """Return the current token and go to the next one; the end token is never passed."""
+        """Return the current token and go to the next one, except at the end token, which stays current."""
         token = self.here
         self.position += token.kind != "end"
         return token
@@ -250,7 +254,7 @@ class Parser:
         return result
 
     def misplaced(self) -> _AbandonedError:
-        """Return the error for a token after a complete operand."""
+        """Report a token that cannot stand after a complete operand, and return the exception to raise."""
         token, previous = self.here, self.tokens[self.position - 1]
         if token.text in ("[", "]"):
             return self.bracket(token)
@@ -336,7 +340,7 @@ class Parser:
         raise self.abandon(f"unexpected {token.text!r}", token.index, hint)
 
     def bracket(self, token: Token) -> _AbandonedError:
-        """Return the error for a bracket that is not an index."""
+        """Report the token ``[`` or ``]`` where no index may stand, and return the exception to raise."""
         follows = token.text == "[" and self.position and self.tokens[self.position - 1].kind == "name"
         hint = "neighbours, x[i+1], are for specs with lattice:" if follows else "an expression is a scalar: use ( )"
         return self.abandon(f"the character {token.text!r} does not belong in an expression", token.index, hint)
@@ -352,7 +356,7 @@ class Parser:
 
     def number(self, token: Token) -> Expression:
         mantissa, _, exponent = token.text.lower().partition("e")
-        # The length is checked before the conversion: 1e999999999 would fill the memory.
+        # The number of digits is checked before the conversion, since the integer 1e999999999 would fill the memory.
         digits = len(mantissa) + abs(int(exponent or 0)) if len(exponent) < 6 else math.inf
         value = Fraction(token.text) if digits <= 2 * len(str(limits.DENOMINATOR)) else None
         if value is None or not limits.number_is_bounded(value):
@@ -399,7 +403,10 @@ class Parser:
         return self.applied(token, arguments)
 
     def piecewise(self, token: Token, opening: Token) -> Expression:
-        """Read the arguments of a piecewise function whose name was read before."""
+        """Read the arguments of a piecewise function, and return its value as an expression in ``choose`` or ``sign``.
+
+        ``token`` is the name of the function, ``opening`` its parenthesis; both have been read.
+        """
         name = token.text
         if not self.scope.piecewise:
             hint = "H, brackets, Casimirs and what steps depend on need derivatives"
@@ -416,7 +423,7 @@ class Parser:
         return _PIECEWISE[name](*arguments)
 
     def condition(self) -> Expression:
-        """Read a comparison, and return an expression that is positive where the comparison is true."""
+        """Read a comparison, and return an expression that is positive exactly where the comparison is true."""
         left = self.sum()
         token = self.accept("<", "<=", ">", ">=")
         if token is None:
@@ -439,7 +446,7 @@ class Parser:
         return sqrt(first) if function == "sqrt" else call(function, *arguments)
 
     def raised(self, base: Expression, exponent: Fraction, token: Token) -> Expression:
-        """Return base ** exponent; a power that is undefined or too large is refused before it is computed."""
+        """Return base ** exponent; if this is undefined or too large, report it, and return 1 without computing it."""
         if abs(exponent) > limits.EXPONENT:
             message = f"the exponent {_brief(exponent)} is out of range"
             self.report(
@@ -462,7 +469,10 @@ class Parser:
         return self.bounded(power(base, exponent), token)
 
     def bounded(self, result: Expression, token: Token) -> Expression:
-        """Return the result unless constant folding made a constant or an exponent that is out of range."""
+        """Return the result of an operation; if a constant or exponent in it is out of range, report it, and return 1.
+
+        Constant folding can make such constants, as in 1e30*1e30.
+        """
         parts = [result, *result.args]
         for part in [*parts, *(a for p in parts[1:] for a in p.args)]:
             if part.is_number and not limits.number_is_bounded(part.value):
@@ -479,7 +489,7 @@ class Parser:
         return result
 
 
-#: Piecewise functions in terms of ``choose(a, b, c)``, which is b where a > 0, else c. heaviside(0) is 1.
+#: Piecewise functions as expressions; ``choose(a, b, c)`` is b where a > 0, else c. So heaviside(0) is 1.
 _PIECEWISE: Mapping[str, Callable[..., Expression]] = {
     "sign": lambda a: call("sign", a),
     "heaviside": lambda a: call("choose", neg(a), number(Fraction(0)), ONE),
@@ -499,7 +509,7 @@ def _defined(function: str, *arguments: Fraction) -> bool:
 
 
 def constant(expression: Expression) -> Fraction | None:
-    """Return the value of an expression without symbols: exact if it is rational, else the nearest double.
+    """Return the value of an expression without symbols: exact if it was folded to a rational, else the nearest double.
 
     None if the value is not a finite real number.
     """

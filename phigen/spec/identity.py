@@ -1,4 +1,4 @@
-"""Digest of those parts of a spec that determine the meaning of the columns of its output."""
+"""Digest of a spec by which two files of results are recognised as columns of the same quantities."""
 
 from __future__ import annotations
 
@@ -10,25 +10,29 @@ from phigen.spec.model import Spec
 from phigen.spec.problems import Problems
 from phigen.spec.yaml_source import Mapping, Node, Scalar, Sequence, read
 
-#: Keys of a spec that determine the meaning of columns. Values of parameters, methods and runs are not among them:
-#: files with other values hold the same quantities.
+#: Keys of a spec that determine the meaning of the columns of its output. Parameters, the method and the runs are left
+#: out: if they change, the numbers in the columns change, but each column holds the same quantity.
 DETERMINING = (
     "coordinates", "time", "definitions", "poisson", "hamiltonian", "forces", "damping", "noise", "casimirs",
     "observables", "lattice", "monitor", "reconstruct",
 )  # fmt: skip
-#: Number of hexadecimal digits of a digest: the specs of one person do not share 64 bits by chance.
+#: Number of hexadecimal digits of a digest. With 16 digits (64 bits), two different specs of one user practically never
+#: have the same digest.
 DIGITS = 16
 
 
 def digest(spec: Spec) -> str:
-    """Return a digest of the equations, Casimirs and observables of a spec, without its comments and layout."""
+    """Return a digest of the keys `DETERMINING` of a spec (equations, Casimirs, observables, …).
+
+    Comments and the layout of the file do not change the digest.
+    """
     root = read(spec.source, Problems(spec.file, spec.source))
     parts = {key.text: _plain(value) for key, value in root.entries.values() if key.text in DETERMINING}
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:DIGITS]
 
 
 def _plain(node: Node) -> Any:
-    """Return the texts of a YAML value, in lists and dictionaries."""
+    """Return a YAML value as nested lists of its texts. A mapping becomes a list of pairs, which keeps its order."""
     if isinstance(node, Scalar):
         return node.text
     if isinstance(node, Sequence):

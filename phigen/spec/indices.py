@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 class Indices:
     """Names that may have an index, and the indices that they may have.
 
-    ``names`` maps names with values at sites to the expression at the site itself. ``refused`` has messages and hints
-    for names without values at sites. On a grid an index is an offset from the site; on a bond it is one of ``ends``.
+    ``names`` maps each name that has a value at every site to its expression at the site itself. ``refused`` has the
+    messages and hints for names without values at sites. On a grid an index is an offset from the site; on a bond it is
+    one of ``ends``.
     """
 
     neighbours: Neighbours
@@ -35,7 +36,10 @@ class Indices:
     ends: tuple[str, ...] = ()
 
     def read(self, parser: Parser, token: Token) -> Expression:
-        """Return the value of a name with an index; the parser is at the bracket."""
+        """Read the index after a name; return the expression of the name at that neighbour or at that end of a bond.
+
+        ``token`` is the name; the current token of the parser is ``[``.
+        """
         opening = parser.advance()
         if not (self.ends or self.neighbours.axes):
             message = f"{token.text}[…]: sites of this lattice have no neighbours by index"

@@ -1,11 +1,11 @@
 """Kinds of values in a spec: each kind reads a node and describes itself as JSON Schema.
 
-`fields.py` builds the table of the format from kinds; the validator and the schema both come from that table. Reading
-checks the shape only: texts of expressions stay `Scalar` nodes, which are parsed when the names are known. A value with
-an error is reported and read as None, which is never a valid value.
+`fields.py` builds the table of the format from kinds. The validator and the schema are both made from that table.
+Reading checks the shape only: the text of an expression stays a `Scalar` node, which is parsed later, when the declared
+names are known. A value with an error is reported and read as None, which is never a valid value.
 """
 
-# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
+# `return reader.error(…)` reports an error and returns None, which stands for a value that could not be read.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from phigen.spec.yaml_source import Mapping as MappingNode
 from phigen.spec.yaml_source import Node, Scalar, describe, is_unprintable, kind_of
 from phigen.spec.yaml_source import Sequence as SequenceNode
 
-#: YAML reads dates as text, whose parse as an expression would be a difference: 2026-01-01 is 2024.
+#: A date. As an expression, 2026-01-01 would be the difference 2024, so dates are refused where expressions stand.
 _DATE = re.compile(r"\s*[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}([Tt\s]|$)")
 
 _LISTS = "lists are written [a, b]"
@@ -35,7 +35,7 @@ Schema = dict[str, Any]
 
 @dataclass
 class Reader:
-    """Results of reading in addition to the values: the errors, and the place and the purpose of every part."""
+    """Record of what is read: the errors, and the place and the purpose of every value, by its path of keys."""
 
     problems: Problems
     locations: dict[Path, Location] = field(default_factory=dict)
@@ -47,14 +47,13 @@ class Reader:
 
 
 def label(path: Path) -> str:
-    """Return ``key: `` for the innermost key around a value, with which messages begin."""
+    """Return the beginning of messages about a value: ``key: ``, with the innermost key of its path."""
     keys = [part for part in path if isinstance(part, str)]
     return f"{keys[-1]}: " if keys else ""
 
 
 def list_hint(node: Node) -> str:
-    """Return the hint for a node where a list is required: the list of its number, its name, or the names of its
-    mapping."""
+    """Return the hint for a node that should be a list: how its value, or the names of its mapping, look as a list."""
     if isinstance(node, MappingNode):
         names = [key.text for key, _ in node.entries.values()][:3]
         return f"{_LISTS}; of names only: [{', '.join(names)}]" if names else _LISTS
@@ -84,7 +83,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Text(Kind):
-    """Text for readers, of one or several lines."""
+    """Prose, such as a title or a description, of one line or, with ``lines``, of several lines."""
 
     lines: bool = False
     expected = "text"
@@ -111,7 +110,10 @@ class Text(Kind):
 
 @dataclass(frozen=True)
 class ShapedText(Kind):
-    """A text of a certain form; the ``example`` is part of the error message."""
+    """A text that matches ``pattern``; ``expected`` is what messages call it.
+
+    ``hint`` is the hint for a text of another form, ``example`` that for a node that is no text.
+    """
 
     pattern: str
     expected: str = "a name"
@@ -167,11 +169,11 @@ class OneOf(Kind):
 
 @dataclass(frozen=True)
 class Integer(Kind):
-    """An integer in a range, written as a number."""
+    """An integer between given bounds, written in digits."""
 
     least: int
     most: int
-    limit: bool = False  # whether a number above the largest exceeds a limit
+    limit: bool = False  # whether a number above the largest is a LimitError
 
     expected = "an integer"
 
@@ -246,7 +248,7 @@ class ListOf(Kind):
     def read(self, node: Node, path: Path, reader: Reader) -> list[Any] | None:
         if isinstance(node, MappingNode) and isinstance(self.item, ShapedText):
             self.mismatch(node, path, reader, list_hint(node))
-            # The keys are read as the list: they are the right names, and their uses are not reported.
+            # The keys of the mapping are read as the list. So their names are declared, and uses of them are no errors.
             node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
         if not isinstance(node, SequenceNode):
             is_matrix = isinstance(self.item, ListOf) and isinstance(node, MappingNode)
@@ -312,16 +314,16 @@ class RecordKey:
     kind: Kind
     description: str
     required: bool = False
-    default: Any = None  # for the schema; the defaults of the validator are those of the model
+    default: Any = None  # default that the schema shows to users; the validator uses those of model.py
 
 
 @dataclass(frozen=True)
 class Record(Kind):
-    """A mapping with fixed keys. It is read as key → value; keys with errors are left out.
+    """A mapping with fixed keys. It is read as a dictionary, from which keys with errors are left out.
 
-    At most one of the keys in ``one`` may be present (with ``exactly``, exactly one). A key in ``instead`` also
-    satisfies this requirement, and may be combined with one of them. ``some`` refuses an empty mapping. ``example`` is
-    part of the error for another kind of value. ``elsewhere`` says where keys belong that are not allowed here.
+    At most one of the keys in ``one`` may be present. ``exactly`` requires one of them, or a key in ``instead``; keys
+    in ``instead`` may be combined with those in ``one``. ``some`` refuses an empty mapping. ``example`` is shown in the
+    error if the value is no mapping. ``elsewhere`` has hints for keys that belong to another part of the spec.
     """
 
     what: str
@@ -355,8 +357,10 @@ class Record(Kind):
         return values
 
     def _read_value(self, known: RecordKey, key: Scalar, item: Node, path: Path, reader: Reader) -> Any:
-        """Return the value of a known key. A misspelt word is an error; its value is then the word that it
-        resembles."""
+        """Return the value of a known key.
+
+        If the value must be one of several words, a misspelt word is reported, and read as the word that it resembles.
+        """
         inner = (*path, known.key)
         reader.locations[inner] = place(key, item)
         reader.purposes[inner] = known.description
@@ -366,11 +370,11 @@ class Record(Kind):
         return value
 
     def _read_unknown(self, name: str, node: MappingNode, path: Path, reader: Reader) -> tuple[str, Any]:
-        """Report an unknown key, and return the missing key that it stands for, with its value; None if it is
-        unreadable.
+        """Report an unknown key. Return the key that was probably meant, "" if none was, and the value under that key.
 
-        So names that the value declares are known, and errors inside the value are reported. A synonym of a key has no
-        value: under the name of another program, values often have another form.
+        So the names that the value declares are known, and errors inside the value are reported. The value is None if
+        it cannot be read, or if the unknown key is a synonym from another program (`MEANT`): there, values often have
+        another form.
         """
         key, item = node.entries[name]
         hint, meant = self._hint(name, node), self._resembled_key(name, node)
@@ -388,8 +392,10 @@ class Record(Kind):
         return meant, value
 
     def _resembled_key(self, name: str, node: MappingNode) -> str:
-        """Return the key of this record that an unknown name resembles and that is not present yet; "" if there is
-        none."""
+        """Return the key of this record that an unknown name resembles; "" if there is none.
+
+        A key that is not in the mapping yet is preferred to one that is present.
+        """
         keys = [f.key for f in self.fields]
         key = intended(name, keys, MEANT)
         if key in node.entries and key != MEANT.get(name):
@@ -398,16 +404,16 @@ class Record(Kind):
         return key
 
     def _hint(self, name: str, node: MappingNode) -> str:
-        """Return the hint for an unknown key: where the key belongs, or the name that was probably meant."""
+        """Return the hint for an unknown key: where it belongs, else the key that was probably meant, else all keys."""
         meant, keys = MEANT.get(name, name), [f.key for f in self.fields]
         misplaced = self.elsewhere.get(name) or ("" if meant in keys else self.elsewhere.get(meant, ""))
         key = self._resembled_key(name, node)
         return misplaced or (f"did you mean {key!r}?" if key else "") or self.instructions()
 
     def instructions(self, node: Node | None = None) -> str:
-        """Return the hint for a node that is not a mapping: the form of the mapping.
+        """Return the hint that shows the form of the mapping: an example and the keys.
 
-        If the node is the name of a key, the hint shows this key.
+        If ``node`` is the name of a key, without a value, the hint shows how to write this key instead.
         """
         named_field = next((f for f in self.fields if isinstance(node, Scalar) and f.key == node.text), None)
         if named_field is not None and isinstance(named_field.kind, Record) and named_field.kind.example:
@@ -416,9 +422,9 @@ class Record(Kind):
         return f"{example}keys: " + ", ".join(f.key for f in self.fields)
 
     def check_presence(self, node: MappingNode, reader: Reader) -> None:
-        """Report missing keys, and keys that exclude each other."""
+        """Report keys that are required and missing, and keys that exclude each other."""
         keys = [f.key for f in self.fields]
-        strange = set(node.entries) - set(keys)  # keys that were reported before
+        strange = set(node.entries) - set(keys)  # unknown keys, which were reported before
         present_keys = {*node.entries, *(self._resembled_key(name, node) for name in strange)}
         for key_field in self.fields:
             if key_field.required and key_field.key not in present_keys:
@@ -458,7 +464,7 @@ class Record(Kind):
 
 @dataclass(frozen=True)
 class Either(Kind):
-    """A value of the first kind whose node type fits, from ``{node type: kind}``."""
+    """A value of one of several kinds; ``kinds`` maps the type of the YAML node (scalar, list, mapping) to its kind."""
 
     kinds: Mapping[type[Node], Kind]
 
@@ -477,5 +483,5 @@ class Either(Kind):
 
 
 def place(key: Scalar, value: Node) -> Location:
-    """Return the place for messages about a part: that of the value if it is a scalar, else that of its key."""
+    """Return the place for messages about an entry of a mapping: its value if this is a scalar, else its key."""
     return value.location if isinstance(value, Scalar) and not value.is_null else key.location

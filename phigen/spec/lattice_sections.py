@@ -1,6 +1,6 @@
 """The parts of a spec that only lattices have: relations of sites, densities, brackets along bonds, runs."""
 
-# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
+# `return reader.error(…)` reports an error and returns None, which stands for a value that could not be read.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -21,13 +21,16 @@ from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import ZERO, Expression, symbol, symbols_of
 
 KINDS = ("sites", "sum", "product")
-#: Keys of densities of H other than that of sites, and the relation between sites that each requires.
+#: Keys under ``hamiltonian:`` for densities of H of two sites, and the relation between sites that each key requires.
 COUPLINGS = {"bonds": "graph", "pairs": "pairs"}
 _WANTED = {"graph": "lattice: {graph: NAME}", "pairs": "lattice: {pairs: all}"}
 
 
 def densities(raw: Any, declared: Declarations) -> tuple[Expression, Expression]:
-    """Return the densities of H of a site, and of a bond or pair, from ``hamiltonian:``, an expression or a mapping."""
+    """Return the density of H of a site, and that of a bond or pair, which is 0 if the spec has none.
+
+    ``raw`` is the value of ``hamiltonian:``, an expression or a mapping; H is the sum of both densities.
+    """
     if not isinstance(raw, dict):
         return declared.formula(raw, declared.dated_scope()) or ZERO, ZERO
     sites, coupling = declared.formula(raw.get("sites"), declared.dated_scope()), ZERO
@@ -48,7 +51,7 @@ def densities(raw: Any, declared: Declarations) -> tuple[Expression, Expression]
 
 
 def casimirs(raw: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, Expression], dict[str, str]]:
-    """Return the densities of Casimirs, and their kinds (of sites, sum, product) for those with a kind in the spec."""
+    """Return the densities of the Casimirs, and the kinds (``sites``, ``sum``, ``product``) that the spec states."""
     formulas, kinds = {}, {}
     for name, (key, entry) in raw.items():
         options = entry if isinstance(entry, dict) else {"value": entry}
@@ -63,15 +66,16 @@ def casimirs(raw: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, 
 
 
 def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapping[str, str], **parts: Any) -> Lattice:
-    """Return the lattice with the parts that were read later.
+    """Return the lattice with the kinds of its Casimirs, and with further ``parts`` that were read after it.
 
-    A Casimir without a kind in the spec is one of each site if it has no neighbours.
+    If the spec states no kind, a density without neighbours is a Casimir at every site, and the sum of any other
+    density over the sites is a Casimir.
     """
     local = {name: "sum" if any("[" in s for s in symbols_of(e)) else "sites" for name, e in casimirs.items()}
     return replace(lattice, kinds={**local, **kinds}, **parts)
 
 
-#: Keys of runs that lattices do not have, with the reason and a hint.
+#: Keys that runs of lattices do not have, with the hint: the reason, or what to use instead.
 _ABSENT_IN_RUNS = {
     "box": "certificates are those of ordinary systems; phigen show --expand prints a lattice as one",
     "exact": "closed forms are those of ordinary systems; phigen show --expand prints a lattice as one",
@@ -83,25 +87,26 @@ _ABSENT_IN_RUNS = {
 def watched_names(
     declared: Declarations, observables: Mapping[str, Expression], numbers: Collection[str]
 ) -> AllowedNames:
-    """Return the names that sections and stops of runs may use; ``numbers`` are observables that are one number
-    each."""
+    """Return the names that ``section`` and ``stop`` of a run may use.
+
+    ``numbers`` are the observables that are one number; on a lattice, other observables have a value at every site.
+    """
     if declared.lattice is None:
         return _scope_of_states(declared, observables)
     return _scope_of_numbers(declared, numbers, [name for name in observables if name not in numbers])
 
 
 def _scope_of_states(declared: Declarations, observables: Mapping[str, Expression]) -> AllowedNames:
-    """Return the names for sections and stops of an ordinary system: those of functions of states, and its
-    observables."""
+    """Return the names that ``section`` and ``stop`` may use without a lattice: all declared names, and observables."""
     scope = declared.dated_scope()
     return replace(scope, names={**observables, **scope.names})
 
 
 def _scope_of_numbers(declared: Declarations, observables: Iterable[str], fields: Iterable[str]) -> AllowedNames:
-    """Return the names for sections and stops of a lattice: numbers of the whole lattice.
+    """Return the names that ``section`` and ``stop`` of a lattice may use: quantities that are one number.
 
-    They are ``observables`` that are reduced to one number, parameters with one value, and the time. ``fields`` are
-    observables with a value at each site, which are refused.
+    These quantities are ``observables``, parameters with one value, and the time. ``fields`` are the observables with a
+    value at each site, which are refused.
     """
     scope = declared.dated_constants("a number of the lattice")
     at_sites = [name for name, parameter in declared.parameters.items() if parameter.at != "all"]
@@ -115,7 +120,10 @@ def _scope_of_numbers(declared: Declarations, observables: Iterable[str], fields
 
 
 def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRunSettings | None:
-    """Read the sizes, bonds, initial state and array parameters of a run."""
+    """Return the settings that only runs of lattices have; None without a lattice, where their keys are reported.
+
+    The arrays of parameters are read elsewhere, by `phigen.spec.runs`.
+    """
     if declared.lattice is None:
         for key in ("sizes", "bonds", "names", "spectrum", "correlation"):
             if key in raw:
@@ -199,7 +207,7 @@ def _names(name: str, raw: Raw, declared: Declarations) -> tuple[str, ...]:
 
 
 def _state(name: str, initial: Any, declared: Declarations) -> dict[str, Values]:
-    """Return initial values by field, or of all fields under the name ``""``."""
+    """Return the initial values by field; one array of all fields together has the name ``""``."""
     fields = declared.coordinates
     if initial is None:
         return {}

@@ -13,7 +13,7 @@ __all__ = ["PRODUCT_BYTES", "PRODUCT_TERMS", "TAYLOR_BYTES", "number_is_bounded"
 
 #: Largest size of a spec file, in bytes.
 FILE_BYTES = 512 * 1024
-#: Largest number of YAML nodes (scalars, sequences, mappings, keys) in a file.
+#: Largest number of YAML nodes in a file: scalars, keys included, sequences and mappings.
 YAML_NODES = 20_000
 #: Largest nesting of YAML collections.
 YAML_DEPTH = 32
@@ -23,9 +23,9 @@ EXPRESSION_LENGTH = 10_000
 EXPRESSION_NODES = 2_000
 #: Largest nesting of parentheses, calls, signs and exponents in one expression.
 EXPRESSION_DEPTH = 64
-#: Bound of the absolute value of numbers, both written ones and results of constant folding.
+#: Numbers in a spec are smaller than this in absolute value, those that constant folding makes too.
 NUMBER = 10**40
-#: Bound of denominators: a number of 40 decimals below 10^-40 has a smaller one.
+#: Denominators of rationals are smaller than this. So a decimal may have up to 79 places after the point.
 DENOMINATOR = 10**80
 #: Largest absolute value of a literal exponent; ``x**n`` is emitted as products.
 EXPONENT = 1_000
@@ -37,7 +37,7 @@ SITES = 10**10
 BONDS = 5_000
 #: Largest number of coordinates.
 COORDINATES = 256
-#: Largest number of entries of any other mapping or list of the user.
+#: Largest number of entries of a mapping or list for which no other limit is listed here.
 ENTRIES = 1_000
 #: Largest length of the name of a coordinate, parameter, definition, Casimir or run.
 NAME_LENGTH = 63
@@ -48,20 +48,20 @@ TEXT_LENGTH = 20_000
 ORDER = 16
 #: Largest number of correction terms of the modified Hamiltonian.
 CORRECTIONS = 8
-#: Largest number of operations of one kernel, mainly for gradient and Hessian of S_h: about 5 MB of C and a minute of
-#: compilation.
+#: Largest number of operations in one generated function; the gradient and the Hessian of S_h have the most. At the
+#: limit, the C has about 5 MB and compiles in about a minute.
 OPERATIONS = 100_000
-#: Largest number of terms of an S_i; the next S_i would take minutes.
+#: Largest number of monomials of a term S_i of the Hamilton–Jacobi series: the next S_i would take minutes to compute.
 SERIES_TERMS = 50_000
-#: Largest number of exponents of all monomials of a collected polynomial and of its derivatives: 80 MB, and some
-#: seconds.
+#: Largest number of stored exponents, one for each symbol of each monomial, when a polynomial and its derivatives are
+#: expanded. At the limit this takes 80 MB and some seconds.
 CELLS = 8_000_000
-#: Largest estimated number of products of terms in the proof of a bi-realisation: ten seconds. Larger ones are checked
-#: at points.
+#: Largest estimated number of products of terms in the proof of a bi-realisation, which then takes ten seconds. A
+#: bi-realisation beyond the limit is checked at sample points instead.
 PROOF_PRODUCTS = 20_000_000
-#: Seeds of noise have 64 bits, members of an ensemble 32.
+#: Largest seed of noise, which has 64 bits, and largest number of paths (members), which are numbered with 32 bits.
 SEED, MEMBERS = 2**64 - 1, 2**32
-#: Largest seed of a sweep: a word of the counter-based generator without its sign bit.
+#: Largest seed of a sweep. The counter-based random generator takes words of 64 bits, whose sign bit stays 0.
 SWEEP_SEED = 2**63 - 1
 #: Largest number of sources of noise.
 SOURCES = 64
@@ -69,10 +69,10 @@ SOURCES = 64
 SWEPT = 10**11
 #: Largest number of steps of a run.
 STEPS = 10**12
-#: Largest number of errors listed for one file; more would hardly help.
+#: Largest number of errors that are listed for one file. After this number, reading stops.
 ERRORS = 100
 
 
 def number_is_bounded(value: Fraction) -> bool:
-    """Whether a constant is within the limits of its size and its denominator."""
+    """Whether the absolute value and the denominator of a constant are below `NUMBER` and `DENOMINATOR`."""
     return abs(value) < NUMBER and value.denominator < DENOMINATOR

@@ -1,8 +1,7 @@
 """Content of a spec file as data: the first stage of the compiler.
 
-No mathematics is checked here. Definitions have been substituted into expressions, which use the names of coordinates
-and parameters as symbols; ``p_NAME`` in a custom bi-realisation is the symbol ``momentum(NAME)``. Decimals are exact
-rationals.
+No mathematics is checked here. The symbols in expressions are the names of coordinates and parameters; definitions have
+been substituted. In a custom bi-realisation, ``p_NAME`` is the symbol ``momentum(NAME)``. Decimals are exact rationals.
 """
 
 from __future__ import annotations
@@ -30,11 +29,10 @@ Matrix = tuple[tuple[Expression, ...], ...]
 class Values:
     """An array over the sites, or the bonds, of a lattice.
 
-    ``formula`` uses the symbols of the indices and sizes, ``i`` and ``N_i``. ``listed`` is in the order of the array,
-    the last axis fastest. ``file`` is a path relative to the folder of the spec. ``random`` names a distribution:
-    ``normal``, ``uniform`` between −1 and 1, or ``sphere`` for all fields of a site together. Random numbers are
-    multiplied by ``scale``, and the formula is added if there is one. In all other cases exactly one of these sources
-    is present.
+    The values come from exactly one of four sources. ``formula`` uses the symbols of the indices and sizes, ``i`` and
+    ``N_i``. ``listed`` is in the order of the array, the last axis fastest. ``file`` is a path relative to the folder
+    of the spec. ``random`` names a distribution: ``normal``, ``uniform`` between −1 and 1, or ``sphere`` for all fields
+    of a site together. Random numbers are multiplied by ``scale``; if there is a formula too, it is their mean.
     """
 
     formula: Expression | None = None
@@ -47,12 +45,12 @@ class Values:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A run-time argument of the generated code, with its default.
+    """A parameter of the spec, a run-time argument of the generated code.
 
-    ``small`` says that the terms with this factor are a small part of H, ``nonnegative`` that the parameter is 0 or
-    positive. For lattices ``at`` is ``all`` for one number, ``sites`` or ``bonds`` for an array with a value at each
-    site or bond; ``values`` are the defaults if not all are equal, and then ``value`` is 1, and no default. ``unit`` is
-    text for readers: nothing is converted.
+    ``value`` is its default. ``small`` says that the terms of H with this factor are a small perturbation,
+    ``nonnegative`` that the parameter is 0 or positive. ``at`` is ``all`` for one number; in lattices, ``sites`` or
+    ``bonds`` means an array with a value at each site or bond. If the defaults of an array are not all equal, they are
+    in ``values``, and ``value`` is 1 and unused. ``unit`` is shown to users: nothing is converted.
     """
 
     name: str
@@ -67,23 +65,22 @@ class Parameter:
 
     @property
     def bound(self) -> str:
-        """``positive``, ``nonnegative``, or "" if every number is allowed."""
+        """The declared bound in words, ``positive`` or ``nonnegative``; "" if every number is allowed."""
         return "positive" if self.positive else "nonnegative" if self.nonnegative else ""
 
     @property
     def inequality(self) -> str:
-        """The bound as displayed: `` > 0``, `` ≥ 0`` or ""."""
+        """The declared bound as a formula after the name: `` > 0``, `` ≥ 0``, or "" if every number is allowed."""
         return {"positive": " > 0", "nonnegative": " ≥ 0"}.get(self.bound, "")
 
     def refuses(self, value: float | Fraction) -> bool:
-        """Whether a number violates the bound."""
+        """Whether a number violates the declared bound (positive or nonnegative) of this parameter."""
         return bool(self.bound and (value < 0 or (self.positive and value == 0)))
 
 
 @dataclass(frozen=True)
 class MatrixForm:
-    """π as a matrix of entries, π_ij = {x_i, x_j}, from ``matrix:`` or, completed by skew symmetry, from
-    ``brackets:``."""
+    """π as a full matrix, π_ij = {x_i, x_j}: that of ``matrix:``, or ``brackets:`` completed by skew symmetry."""
 
     entries: Matrix
 
@@ -98,16 +95,17 @@ class CanonicalForm:
 
 @dataclass(frozen=True)
 class LogCanonicalForm:
-    """{x_i, x_j} = a_ij x_i x_j; the a_ij may contain parameters."""
+    """{x_i, x_j} = a_ij x_i x_j with constants a_ij, which may contain parameters."""
 
     a: Matrix
 
 
 @dataclass(frozen=True)
 class LieAlgebraForm:
-    """{x_i, x_j} = ± Σ_k c_ij^k x_k on the dual of a Lie algebra, from exactly one of three sources.
+    """Lie–Poisson brackets {x_i, x_j} = ± Σ_k c_ij^k x_k on the dual of a Lie algebra; ``sign`` is 1 or −1.
 
-    ``structure_constants[i][j][k]`` is c_ij^k with indices from 0; only the pairs in the spec are present.
+    The algebra comes from exactly one of three sources: a ``family`` with a ``size``, the ``matrices`` of a basis, or
+    ``structure_constants``. There, [i][j][k] is c_ij^k with indices from 0, for the pairs (i, j) in the spec.
     """
 
     sign: int = 1
@@ -119,23 +117,24 @@ class LieAlgebraForm:
 
 @dataclass(frozen=True)
 class NambuForm:
-    """{f, g} = det ∂(f, g, C_1, …, C_{n−2})/∂(x_1, …, x_n)."""
+    """Nambu bracket {f, g} = det ∂(f, g, C_1, …, C_{n−2})/∂(x_1, …, x_n), defined by its ``casimirs`` C_k."""
 
     casimirs: tuple[Expression, ...]
 
 
 @dataclass(frozen=True)
 class ProductForm:
-    """π with diagonal blocks, as pairs (coordinates, form); every coordinate belongs to exactly one block."""
+    """Block-diagonal π. A block is a pair (coordinates, form); every coordinate belongs to exactly one block."""
 
     blocks: tuple[tuple[tuple[str, ...], PoissonForm], ...]
 
 
 @dataclass(frozen=True)
 class PullbackForm:
-    """A structure in other coordinates y: ``of`` is its form, ``map`` has y as expressions in the spec's x.
+    """A Poisson structure that is given in other coordinates y, named ``coordinates``, in the form ``of``.
 
-    ``inverse`` has x as expressions in y, if the spec states it.
+    ``map`` has y as expressions in the coordinates x of the spec, ``inverse`` has x as expressions in y; None if the
+    spec does not state it.
     """
 
     coordinates: tuple[str, ...]
@@ -149,28 +148,30 @@ PoissonForm = MatrixForm | CanonicalForm | LogCanonicalForm | LieAlgebraForm | N
 
 @dataclass(frozen=True)
 class BirealisationChoice:
-    """The choice of a bi-realisation in a spec: a kind of the catalogue and its options (``custom``: alpha, beta).
+    """The choice of a bi-realisation in a spec: its ``kind``, and options, each of which applies to one or two kinds.
 
-    ``order`` is the order of the method if the caller overrides that of the spec; truncations depend on it.
+    ``alpha`` and ``beta`` are for the kind ``custom``. ``order`` is the order of the method if an option of a command
+    or a call overrides the order in the spec; the kind ``spray`` truncates its series accordingly.
     """
 
     kind: str = "auto"
     alpha: tuple[Expression, ...] = ()
     beta: tuple[Expression, ...] = ()
-    side: str = "q"  # canonical-euler
-    of: str = "auto"  # product: the kind for the blocks; pullback: the kind for the inner structure
-    tau: Expression | Matrix | None = None  # group-map: f(MATRIX), or the entries of τ in the momenta
-    spray: str | tuple[Expression, ...] = "auto"  # spray: auto, flat, natural or the components f_j(x, p)
-    degree: int | None = None  # spray: degree in p of a truncation; None for the degree that the order needs
+    side: str = "q"  # for canonical-euler: q or p, the coordinates that α leaves unchanged
+    of: str = "auto"  # for product: the kind of the blocks; for pullback: the kind of the inner structure
+    tau: Expression | Matrix | None = None  # for group-map: the map τ, as f(MATRIX) or as a matrix in the momenta
+    spray: str | tuple[Expression, ...] = "auto"  # for spray: auto, flat, natural or the components f_j(x, p)
+    degree: int | None = None  # for spray: largest degree in p of the series; None for the degree the order needs
     order: int | None = None
 
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """Options of the inner solve: ``method`` is auto or newton, ``tolerance`` None for automatic.
+    """Options of ``solver:``, for the solution of implicit equations in a step and for the code of steps.
 
-    ``lanes`` says whether C makes steps, and members of ensembles, in SIMD lanes; without lanes the code is shorter and
-    slower. ``compensated`` says whether C compensates sums over the steps of lattices.
+    ``method`` is auto or newton; ``tolerance`` is None if phigen chooses it. ``lanes`` says whether the C uses SIMD
+    lanes for steps and for members of ensembles; without lanes the code is shorter and slower. ``compensated`` says
+    whether the C for lattices uses compensated summation of the steps.
     """
 
     method: str = "auto"
@@ -184,11 +185,11 @@ class SolverOptions:
 class Extras:
     """Parts of the generated code that are optional.
 
-    ``tangent`` adds ``step_tangent``, the derivative of a step. ``modified_hamiltonian`` adds the function of that name
-    with this number of correction terms; 0 for no function. ``without`` are parts to leave out
-    (`phigen.spec.names.PARTS`). ``adjoint`` adds the transpose of a step and of a run, with respect to state and
-    parameters. ``real`` is the number type of the C, double or float. ``included`` are parts that are included although
-    the profile leaves them out.
+    ``tangent`` adds ``step_tangent``, the derivative of a step. ``modified_hamiltonian`` is the number of correction
+    terms in the function of this name; 0 leaves the function out. ``without`` are parts to leave out
+    (`phigen.spec.names.PARTS`); ``included`` are parts to include although the profile leaves them out. ``adjoint``
+    adds the transposed derivative of a step and of a run, with respect to state and parameters. ``real`` is the number
+    type of the C, double or float.
     """
 
     tangent: bool = False
@@ -199,7 +200,7 @@ class Extras:
     included: frozenset[str] = frozenset()
 
     def offers(self, part: str, profile: str) -> bool:
-        """Whether code with this profile includes a part, if the part applies to the system."""
+        """Whether code with this profile includes a part of `phigen.spec.names.PARTS`, if the part fits the system."""
         return part not in self.without | (LEFT_OUT[profile] - self.included)
 
 
@@ -221,9 +222,10 @@ class Overrides(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class AverageChoice:
-    """Setting ``average:`` of a run: rows from the time ``after`` on (None: all rows), in at least ``blocks`` blocks.
+    """Setting ``average:`` of a run: time averages of the observables ``of``; of all observables if it is empty.
 
-    ``of`` names the observables to be averaged; empty for all.
+    Rows from the time ``after`` on are averaged, all rows if it is None. They are divided into at least ``blocks``
+    blocks, from whose means the statistical error follows.
     """
 
     after: Fraction | None = None
@@ -244,38 +246,40 @@ class Run:
     seed: int = 0  # seed of the noise
     members: int = 1  # number of paths of the noise from the same initial state
     parameters: Mapping[str, Fraction] = field(default_factory=dict)
-    # functions of ELAPSED, the time, initial(NAME) and parameters
+    # exact solution by coordinate; its symbols are ELAPSED, the time, initial(NAME) and parameters
     exact: Mapping[str, Expression] = field(default_factory=dict)
     compare: tuple[str, ...] = ()
     section: Expression | None = None
     direction: str = "rising"  # direction of the crossings of the section
-    duration: Fraction | None = None  # duration of the run, if it determines the number of steps
+    duration: Fraction | None = None  # duration of the run, if the spec states it instead of the number of steps
     until: Fraction | None = None  # physical time of the end, which may be inside a step
     every: Fraction | None = None  # physical time between stored rows, instead of the stride
     average: AverageChoice = AverageChoice()
     at: tuple[Fraction, ...] = ()  # times of stored rows, instead of the stride
     stop: Expression | None = None  # the run ends where this passes through 0
     record: tuple[str, ...] = ()  # columns of the output (state, energy, Casimirs, observables); all by default
-    # ranges of coordinates for which certify bounds errors
+    # ranges of coordinates for which phigen certify bounds the errors of a step
     box: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=dict)
     description: str = ""
     lattice: LatticeRunSettings | None = None
 
     @property
     def is_timed(self) -> bool:
-        """Whether rows are at given times, not after given steps."""
+        """Whether the stored rows are given by physical times (``every`` or ``at``), not by a number of steps."""
         return self.every is not None or bool(self.at)
 
     @property
     def records_numbers(self) -> bool:
-        """Whether only numbers, and no states, are recorded."""
+        """Whether ``record`` names columns, but not the states, so that each row has only a few numbers."""
         return bool(self.record) and "state" not in self.record
 
 
 @dataclass(frozen=True)
 class SpectrumChoice:
-    """Setting ``spectrum:`` of a run of a lattice: S(q, ω) of the fields ``of``, over the frames from the time
-    ``after`` on."""
+    """Setting ``spectrum:`` of a run of a lattice: the power spectrum S(q, ω) of the fields ``of``.
+
+    It is computed from the stored states (frames) from the time ``after`` on; None means all frames.
+    """
 
     of: tuple[str, ...]
     after: Fraction | None = None
@@ -285,7 +289,8 @@ class SpectrumChoice:
 class CorrelationChoice:
     """Setting ``correlation:`` of a run of a lattice: the correlation of the fields ``of`` and ``other``.
 
-    ``axis`` is the direction, ``up_to`` the largest distance in sites. Frames from the time ``after`` on are used.
+    ``axis`` is the direction, ``up_to`` the largest distance in sites. The stored states (frames) from the time
+    ``after`` on are used; None means all frames.
     """
 
     of: str
@@ -299,10 +304,11 @@ class CorrelationChoice:
 class LatticeRunSettings:
     """Additional settings of a run of a lattice.
 
-    ``sizes`` are the sizes of the axes; for lattices without axes, the number of sites. ``state`` has initial values by
-    field, or of all fields under the name ``""``. ``bonds`` are pairs of sites, counted from 0, or a file with such
-    pairs. ``arrays`` are the values of parameters at sites and bonds that differ from the defaults. ``spectrum`` and
-    ``correlation`` are computed from the frames. ``names`` are labels of the sites of graphs and pairs, for pictures.
+    ``sizes`` are the sizes of the axes; without axes, the number of sites. ``state`` has the initial values by field;
+    one array of all fields together has the name ``""``. ``bonds`` are pairs of sites, counted from 0, or the name of
+    a file that lists these pairs. ``arrays`` has the values of parameters at sites or bonds, if the run replaces the
+    defaults. ``spectrum`` and ``correlation`` are computed from the stored states. ``names`` label the sites in
+    figures, if the lattice has no axes.
     """
 
     sizes: tuple[int, ...] = ()
@@ -318,8 +324,8 @@ class LatticeRunSettings:
 class Axis:
     """Range of a sweep: values of a parameter, of an initial coordinate, of ``step`` or ``start``, or of ``seed``.
 
-    The range consists of the listed ``values``, or of ``count`` values from one of the ``ends`` to the other. If
-    ``count`` is 0, values between the ends are drawn at random.
+    The range consists of the listed ``values``, or of ``count`` values from the first of the ``ends`` to the second. If
+    there are no values and ``count`` is 0, values between the ends are drawn at random. ``scale`` is linear or log.
     """
 
     name: str
@@ -330,13 +336,16 @@ class Axis:
 
     @property
     def size(self) -> int:
-        """Number of values; 0 if they are drawn at random."""
+        """Number of values of the range; 0 if its values are drawn at random."""
         return len(self.values) or self.count
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """Value of an observable that a sweep stores: one of `STATISTICS` over the run, or, for "", the last value."""
+    """Number that a sweep stores of an observable: a statistic over the run.
+
+    ``of`` is ``mean``, ``std`` (standard deviation) or ``error`` (of the mean); "" means the value at the end.
+    """
 
     observable: str
     of: str = ""
@@ -352,10 +361,11 @@ class Statistic:
 
 @dataclass(frozen=True)
 class SweepSettings:
-    """A sweep, a run for many values: a grid of axes, a number of ``random`` members, or the members in a ``file``.
+    """A sweep: one run, repeated for many values of parameters and initial values. Each repetition is a member.
 
-    ``keep`` (`phigen.spec.names.KEPT`, and statistics of observables) lists what is stored for each member. With
-    ``frames``, the states after every such number of steps are stored too. ``target`` is that of ``phigen sweep -t``.
+    The members are a grid of the axes ``over``, or a number of ``random`` members, or the rows of a ``file``. ``keep``
+    lists the results to store for each member: words of `phigen.spec.names.KEPT` and statistics of observables.
+    ``frames`` is the number of steps between states that are stored too; 0 for none. ``target`` runs the members.
     """
 
     name: str
@@ -371,16 +381,16 @@ class SweepSettings:
 
     @property
     def stored(self) -> tuple[str, ...]:
-        """The entries of ``keep``, and the standard error of each mean, which figures display."""
+        """The entries of ``keep`` and, for each entry ``mean(M)``, ``error(M)``, which figures draw as error bars."""
         errors = (word.replace("mean(", "error(", 1) for word in self.keep if word.startswith("mean("))
         return tuple(dict.fromkeys((*self.keep, *errors)))
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """Reduction of the density of an observable to one number: its ``kind`` is one of `phigen.spec.names.REDUCTIONS`.
+    """Reduction of an observable of a lattice, a density, to one number: its ``kind`` is mean, sum, max or min.
 
-    ``over`` is what the density belongs to: ``sites``, ``bonds`` or ``pairs``.
+    The density has a value at each element of ``over``: ``sites``, ``bonds`` or ``pairs``.
     """
 
     kind: str
@@ -393,10 +403,11 @@ class Lattice:
 
     ``axes`` name the directions of a grid, with a ``boundary`` for each: ``periodic`` or ``open``. ``graph`` is the
     name of the list of bonds. ``pairs`` says that every two sites form a pair. ``poisson`` and ``hamiltonian`` of the
-    spec are those of a site. ``bonds`` is the density of H of a bond or a pair. ``brackets`` maps (f, g), symbols of
-    two different sites, to their bracket, in one order. ``kinds`` maps Casimirs to ``sites``, ``sum`` or ``product``.
-    ``reductions`` has the reductions of observables to one number; observables without a reduction are fields, with a
-    value at each site.
+    spec are those of a site. ``bonds`` is the density of H of a bond or a pair. ``brackets`` maps pairs (f, g) of
+    symbols at two different sites to the bracket {f, g}; it contains (f, g) or (g, f), not both. ``kinds`` says for
+    each Casimir whether it is one at every site (``sites``), or the ``sum`` or ``product`` of a density over the sites
+    is. ``reductions`` has the reductions of observables to one number; an observable without a reduction is a field,
+    with a value at each site.
     """
 
     axes: tuple[str, ...] = ()
@@ -410,7 +421,7 @@ class Lattice:
 
     @property
     def indices(self) -> tuple[str, ...]:
-        """The names of the indices of a site."""
+        """Names of the indices of a site in formulas: the axes of a grid, or ``i`` if there are no axes."""
         return self.axes or ("i",)
 
     @property
@@ -421,7 +432,10 @@ class Lattice:
 
 @dataclass(frozen=True)
 class SpecForces:
-    """Forces of ``forces:`` and ``damping:``: the nonzero ζ and f by coordinate, and λ."""
+    """Forces of ``forces:`` and ``damping:``, as in ẋ = π(∇H + ζ + λ π∇H) + f.
+
+    ``covector`` has the nonzero components of ζ by coordinate, ``vector`` those of f; ``damping`` is λ.
+    """
 
     covector: Mapping[str, Expression] = field(default_factory=dict)
     vector: Mapping[str, Expression] = field(default_factory=dict)
@@ -436,7 +450,7 @@ NO_FORCES = SpecForces()
 
 @dataclass(frozen=True)
 class SpecNoise:
-    """A source of noise of ``noise:``, + σ π∇g ∘ dW, with the Hamiltonian g and the amplitude σ."""
+    """A source of noise of ``noise:``: the term σ π∇g ∘ dW of the equation, with Hamiltonian g and amplitude σ."""
 
     hamiltonian: Expression
     amplitude: Expression
@@ -444,10 +458,10 @@ class SpecNoise:
 
 @dataclass(frozen=True)
 class Spec:
-    """Content of a spec file. If there is a ``lattice``, it describes one cell.
+    """Content of a spec file. With a ``lattice``, coordinates, π and H are those of one site.
 
-    `locations` has the place of a part by its path of keys, e.g. ``("casimirs", "C")``. `written` is the spec of the
-    file, if options of a command or a call override it.
+    `locations` has the place of each part in the file by its path of keys, such as ``("casimirs", "C")``. If options of
+    a command or a call have replaced parts, `written` is the spec as it stands in the file.
     """
 
     name: str
@@ -458,10 +472,10 @@ class Spec:
     forces: SpecForces = SpecForces()
     noise: Mapping[str, SpecNoise] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
-    inputs: tuple[str, ...] = ()  # the parameters that change while a program runs
+    inputs: tuple[str, ...] = ()  # parameters that the calling program may change between steps
     casimirs: Mapping[str, Expression] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)
-    observables: Mapping[str, Expression] = field(default_factory=dict)  # to record; nothing is proved of them
+    observables: Mapping[str, Expression] = field(default_factory=dict)  # quantities to record; no proofs
     birealisation: BirealisationChoice = BirealisationChoice()
     order: int | None = DEFAULT_ORDER  # None if the spec states terms
     terms: int | None = None
@@ -470,7 +484,7 @@ class Spec:
     monitor: str | Expression | None = None  # log, or g of dt = g dτ
     scheme: str = "series"
     structure: str = "exact"  # for a Gauss method: exact, or to truncation
-    coordinates_from: str = ""  # for bodies in a splitting: jacobi or democratic_heliocentric
+    coordinates_from: str = ""  # for a splitting of attracting bodies: jacobi or democratic_heliocentric
     profile: str = "fast"
     solver: SolverOptions = SolverOptions()
     extras: Extras = NO_EXTRAS
@@ -491,7 +505,7 @@ class Spec:
 
     @property
     def recorded(self) -> tuple[str, ...]:
-        """Names of the observables that are one number each; fields of lattices are not among them."""
+        """Names of the observables that are one number; an observable with a value at every site is not among them."""
         lattice = self.lattice
         return tuple(name for name in self.observables if lattice is None or name in lattice.reductions)
 
@@ -502,7 +516,7 @@ class Spec:
 
     @property
     def wanted_order(self) -> int:
-        """The requested order or, if terms are requested, the order of a symmetric method with this number of terms."""
+        """Order that the spec requests. With ``terms`` it is the even order of symmetric methods with these terms."""
         return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
 
     def overridden(
@@ -519,8 +533,8 @@ class Spec:
     ) -> Spec:
         """Return the spec with the options of a command or a call applied.
 
-        ``tangent``, ``adjoint`` and ``without`` are added to those of the spec. The other options replace those of the
-        spec; an ``order`` replaces ``terms`` too. Single precision requires the profile small.
+        ``tangent``, ``adjoint`` and ``without`` are added to the settings of the spec. Other options replace settings
+        of the spec; an ``order`` replaces ``terms`` too. With single precision, the profile fast becomes small.
         """
         extras = Extras(
             tangent or self.extras.tangent,
@@ -542,8 +556,8 @@ class Spec:
     def for_running(self, **options: Unpack[Overrides]) -> Spec:
         """Return the spec with options applied, for code that phigen itself runs.
 
-        The ``profile`` of a spec applies to the code that ``phigen build`` writes. Code that phigen runs has the
-        profile fast, unless the options name another one, and parameters that can be changed between steps.
+        Such code has the profile fast, unless the options name another one, and its parameters can be changed between
+        steps. The ``profile`` in the spec holds only for the code that ``phigen build`` writes.
         """
         options["profile"] = options.get("profile") or "fast"
         spec = self.overridden(**options)
@@ -552,11 +566,11 @@ class Spec:
         return replace(spec, extras=replace(spec.extras, included=spec.extras.included | {"parameters"}))
 
     def parameters_of(self, run: Run) -> dict[str, float]:
-        """Return the values of all parameters in a run: those of the run, and defaults for the others."""
+        """Return the values of all parameters in a run: the value that the run states, else the default."""
         return {p.name: float(run.parameters.get(p.name, p.value)) for p in self.parameters}
 
     def diagnostic(self, path: tuple[Any, ...], message: str, hint: str = "") -> Diagnostic:
-        """Return a diagnostic located at the part with that path of keys, or at the nearest part around it."""
+        """Return a diagnostic at the part with this path of keys, or at the nearest part around it that has a place."""
         while path and path not in self.locations:
             path = path[:-1]
         location = self.locations.get(path)
@@ -565,5 +579,5 @@ class Spec:
 
 
 def _profile(profile: str, real: str) -> str:
-    """Return the profile of C for a number type: the profile fast is for double precision only."""
+    """Return the profile of the C for the number type ``real``: with float, the profile fast is replaced by small."""
     return "small" if profile == "fast" and real == "float" else profile

@@ -1,4 +1,4 @@
-"""Tables of names: reserved names, and the values that phigen knows."""
+"""Tables of names in specs: reserved names, and the words that keys such as ``scheme`` accept."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ from collections.abc import Callable
 
 from phigen.symbolic.functions import FUNCTIONS
 
-#: Functions of expressions with their number of arguments.
+#: Functions that expressions may use, with their number of arguments.
 SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f.name: f.arity for f in FUNCTIONS.values() if not f.own}
 
-#: Piecewise functions with their number of arguments. They are for observables and ``stop``, which are not
-#: differentiated.
+#: Piecewise functions with their number of arguments. Only observables and ``stop`` may use them, because these
+#: expressions are not differentiated.
 PIECEWISE_FUNCTIONS: dict[str, int] = {"sign": 1, "heaviside": 1, "min": 2, "max": 2, "if": 3}
 
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
 
-#: Arguments of the generated functions; parameters, which are passed by keyword, must have other names.
+#: Names of arguments of the generated functions. Parameters are passed by keyword too, so they must have other names.
 ARGUMENTS = frozenset(["x", "x0", "X0", "h", "steps", "stride", "gauge", "cotangent", "attitude0", "position0"])
-#: The same arguments for systems with a time.
+#: Names of arguments of the generated functions if the equations depend on the time.
 TIMED_ARGUMENTS = ARGUMENTS | {"t", "t0"}
-#: Further arguments for systems with noise.
+#: Names of further arguments of the generated functions if there is noise.
 NOISY_ARGUMENTS = frozenset(["seed", "member", "step0", "increments"])
 
 
 def argument_hint(name: str) -> str:
-    """Return the hint for a parameter that has the ``name`` of an argument."""
+    """Return the hint for a parameter whose ``name`` is that of an argument of generated functions."""
     proposed = f"{name}_0" if len(name) > 1 else f"{name}{name}"
     return f"parameters are passed by name in Python, where {name}= is an argument of solvers; call it {proposed}, say"
 
 
-#: Names of keys in other programs, with those in specs.
+#: Words that users of other programs may write as a key, with the key that specs have instead.
 MEANT = {
     "friction": "damping", "dissipation": "damping", "drag": "damping", "force": "forces", "torque": "forces",
     "forcing": "forces", "drive": "forces", "driving": "forces", "control": "forces",
@@ -61,7 +61,8 @@ zlib-acknowledgement ZPL-2.1"""
 LICENSES = tuple(_LICENSES.split())
 LICENSE_REFERENCE = re.compile(r"LicenseRef-[A-Za-z0-9.-]{1,60}")
 
-#: Families of Lie algebras: the smallest n, and the dimension as a function of n; the argument of sp is 2n.
+#: Families of matrix Lie algebras: for each, the smallest n, and the dimension of the algebra as a function of n. The
+#: argument of sp is the size of its matrices, 2n.
 FAMILIES: dict[str, tuple[int, Callable[[int], int]]] = {
     "so": (2, lambda n: n * (n - 1) // 2),
     "se": (2, lambda n: n * (n + 1) // 2),
@@ -72,12 +73,12 @@ FAMILIES: dict[str, tuple[int, Callable[[int], int]]] = {
     "heisenberg": (1, lambda n: 2 * n + 1),
     "aff": (1, lambda n: 2),
 }
-#: Families of which only these members are available.
+#: Families of Lie algebras of which only these sizes n are available.
 MEMBERS = {"se": (2, 3), "aff": (1,)}
 FAMILY_HELP = "so(n), se(2), se(3), sl(n), gl(n), su(n), sp(2n), heisenberg(n) or aff(1)"
 FAMILY_NAME = re.compile(r"([a-z]+)\(([1-9][0-9]{0,2})\)")
 
-#: Kinds of bi-realisations.
+#: Kinds of bi-realisations, the pairs of maps α, β from which the step of the series is built.
 BIREALISATIONS = (
     "auto",
     "constant",
@@ -94,14 +95,14 @@ BIREALISATIONS = (
     "custom",
 )
 POISSON_FORMS = ("matrix", "brackets", "canonical", "log_canonical", "lie_algebra", "nambu", "product", "pullback")
-#: Profiles of C.
+#: Profiles of the generated C: for speed, for small code, and for certified bounds of the error.
 PROFILES = ("fast", "small", "certified")
 
 #: Number types of the C.
 REALS = ("double", "float")
 
-#: Parts of the code that can be left out individually. The profile small leaves out parts that serve speed, members
-#: with different parameters, and the function that changes parameters between steps.
+#: Parts of the generated code that can be left out one by one. The profile small leaves out the parts for speed, for
+#: ensembles whose members have different parameters, and for the change of parameters between steps.
 PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "parameters", "recurrences")
 LEFT_OUT = {
     "fast": frozenset[str](),
@@ -112,23 +113,23 @@ LEFT_OUT = {
 #: Directions of crossings of a section.
 DIRECTIONS = ("rising", "falling", "both")
 
-#: Quantities that a sweep may vary besides parameters and initial values, and quantities that it may store.
+#: Quantities that a sweep may vary besides parameters and initial values; below, the quantities that it may store.
 SWEEP_NAMES = ("step", "start", "seed")
 KEPT = ("final", "energy_error", "casimir_error", "lyapunov", "crossings")
-#: Reductions of the density of an observable of a lattice to one number, and those of them that add densities.
+#: Reductions of the density of an observable of a lattice to one number; below, the reductions that are linear.
 REDUCTIONS = ("mean", "sum", "max", "min")
 ADDITIVE = ("mean", "sum")
-#: Sets over which the density of an observable is reduced.
+#: Elements of a lattice over which the density of an observable may be reduced.
 OVER = ("sites", "bonds", "pairs")
-#: Statistics over a run that a sweep may store of an observable M: mean(M), the standard deviation std(M), and the
-#: standard error of the mean, error(M).
+#: Statistics of an observable M over a run that a sweep may store: mean(M), the standard deviation std(M), and the
+#: standard error error(M) of the mean.
 STATISTICS = ("mean", "std", "error")
 
-#: Representations of attitudes.
+#: Representations of an attitude, the rotation of a rigid body, that ``reconstruct:`` may name.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
-#: Compositions: of near-integrable systems with corrector; of near-integrable systems; of two parts; of any number of
-#: parts.
+#: Compositions of the flows of parts of H. CORRECTED are those with a corrector, for near-integrable systems;
+#: NEAR_INTEGRABLE adds those without; FLOW_COMPOSITIONS adds those for two parts; COMPOSITIONS are all.
 CORRECTED = (
     *(f"wisdom-holman{order}" for order in ("", "-3", "-5", "-7", "-11", "-17")),
     *(f"wisdom-holman-modified-{order}" for order in (7, 11, 17)),
@@ -145,10 +146,10 @@ COMPOSITIONS = (
     "sofroniou-spaletta",
     *FLOW_COMPOSITIONS,
 )
-#: The monitor of a splitting in two parts, K = log(A + e) − log(−B).
+#: Name of a monitor for H = A + B. The splitting then integrates K = log(A + e) − log(−B), where e = −H(x₀).
 LOGARITHMIC = "log"
 SCHEMES = ("auto", "series", "splitting", "gauss")
-#: Structures of a Gauss method: an exact Poisson map, or one up to its truncation error.
+#: Words for ``structure:`` of a Gauss method: its step is a Poisson map exactly, or up to the truncation error.
 STRUCTURES = ("exact", "to truncation")
 #: Relative coordinates of attracting bodies, in which H is split.
 RELATIVE = ("jacobi", "democratic_heliocentric")

@@ -1,4 +1,4 @@
-"""The observables of a spec: expressions. Those of lattices are fields, or sums, means and extremes of densities."""
+"""Reader of ``observables:``. On a lattice an observable is a field, or a sum, mean or extreme of a density."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ from phigen.spec.names import REDUCTIONS
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression
 
-#: Names of the columns of output that are not observables.
+#: Names of columns that every output may have; observables must have other names.
 RECORDED = ("t", "tau", "x", "energy", "state", "attitude", "position")
-#: The relation between sites that densities of bonds and pairs require, and how a spec declares it.
+#: For densities of bonds and of pairs: the relation between sites that they require, and how a spec declares it.
 _RELATIONS = {"bonds": ("graph", "lattice: {graph: NAME}"), "pairs": ("pairs", "lattice: {pairs: all}")}
 
 
 def observables(
     raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations, casimirs: Iterable[str]
 ) -> tuple[dict[str, Expression], dict[str, Reduction]]:
-    """Return the expressions of ``observables``, and the reductions of those of lattices to one number.
+    """Return the expressions of ``observables``, and the reductions of observables of lattices to one number.
 
-    The names of observables must differ from those of coordinates and Casimirs, since all are columns of the output.
+    Observables, coordinates and Casimirs are columns of the output, so an observable with the name of a coordinate or a
+    Casimir is reported.
     """
     used_names = dict.fromkeys(declared.coordinates, "a coordinate") | dict.fromkeys(casimirs, "a Casimir")
     used_names |= {name: "a column of every output" for name in (*RECORDED, declared.time) if name}
@@ -44,14 +45,14 @@ def observables(
 
 
 def _scope(reduction: Reduction | None, declared: Declarations) -> AllowedNames:
-    """Return the names that an observable may use."""
+    """Return the names that an observable may use. Densities of bonds and pairs use the names of their ends."""
     of_bonds = reduction is not None and reduction.over != "sites"
     scope = declared.bond_scope(dated=True) if of_bonds else declared.dated_scope()
     return replace(scope, piecewise=True)
 
 
 def _reduction(name: str, entry: Mapping[str, Any], declared: Declarations) -> Reduction | None:
-    """Return the reduction of a density; None after errors, which are reported."""
+    """Return the reduction of the density under an observable; None if it has none, or after reported errors."""
     kind = next((k for k in REDUCTIONS if entry.get(k) is not None), None)
     if kind is None:
         return None

@@ -1,9 +1,9 @@
-"""The forms of a Poisson structure: from the YAML nodes to the data of `model.py`.
+"""Reader of ``poisson:``: from the YAML nodes of a Poisson structure to its form, a record of `model.py`.
 
-Shapes, names and repetitions are checked here; the mathematics is checked later.
+Sizes of matrices, names and repetitions are checked here; the Jacobi identity is checked later.
 """
 
-# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
+# `return reader.error(…)` reports an error and returns None, which stands for a value that could not be read.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Pairs = dict[tuple[int, int], tuple[Scalar, Expression]]
 
 
 def poisson_form(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
-    """Return the form of ``poisson:``; None after errors, which are reported."""
+    """Return the form of the Poisson structure under ``poisson:``; None after errors, which are reported."""
     for form, read_form in _FORMS.items():
         if form in raw:
             return read_form(
@@ -45,7 +45,10 @@ def poisson_form(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm 
 
 
 def brackets_of_sites(raw: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
-    """Return the brackets of fields of different sites of a lattice, in one order: on a grid, or along bonds."""
+    """Return the brackets {f, g} of fields at different sites of a lattice, neighbours on a grid or ends of a bond.
+
+    Keys are pairs of symbols (f, g). For each two symbols there is one key, (f, g) or (g, f).
+    """
     if "bonds" in raw:
         return _along_bonds(raw["bonds"], declared)
     return _of_neighbours(raw.get("brackets") or {}, declared) if declared.relation == "grid" else {}
@@ -110,7 +113,10 @@ def _fail(declared: Declarations, path: tuple[Any, ...], message: str, hint: str
 def _entries(
     rows: Rows, path: tuple[Any, ...], declared: Declarations, scope: AllowedNames, size: int
 ) -> tuple[tuple[Expression, ...], ...] | None:
-    """Return a size×size matrix of expressions; None after errors, which name the row."""
+    """Return a size×size matrix of expressions; None after reported errors.
+
+    ``path`` are the keys from the Poisson structure to the matrix.
+    """
     key_path, error_count = ".".join(str(p) for p in path if isinstance(p, str)), len(declared.reader.problems.found)
     if len(rows) != size:
         hint = "one for each coordinate" if size == len(declared.coordinates) else "the matrix must be square"
@@ -147,7 +153,7 @@ def _brackets(table: Mapping[str, Any], declared: Declarations) -> PoissonForm:
     for key, row in table.values():
         i = declared.coordinate(key)
         for second_name, cell in (row or {}).values():
-            # a bracket between sites, which is read elsewhere
+            # The bracket with a neighbour x[i+1] is one between sites, which `brackets_of_sites` reads.
             if "[" in second_name.text and declared.relation == "grid":
                 continue
             j = declared.coordinate(second_name)
@@ -164,7 +170,7 @@ def _brackets(table: Mapping[str, Any], declared: Declarations) -> PoissonForm:
 def _state(
     pairs: Pairs, pair: tuple[int, int], keys: tuple[Scalar, Scalar], value: Expression, declared: Declarations
 ) -> None:
-    """Record {x_i, x_j} = value; report a value that contradicts skew symmetry."""
+    """Record {x_i, x_j} = value in ``pairs``; report a value that contradicts skew symmetry."""
     (i, j), (a, b) = pair, keys
     if i == j:
         declared.reader.error(b, f"the bracket of {a.text!r} with itself is always 0", "remove it")
@@ -279,7 +285,7 @@ def _product(entries: list[Mapping[str, Any] | None], declared: Declarations) ->
     places_by_name: dict[str, Scalar] = {}
     blocks: list[tuple[tuple[str, ...], PoissonForm | None]] = []
     for i, block in enumerate(entries):
-        if "coordinates" not in (block or {}):  # this is reported where blocks are read
+        if "coordinates" not in (block or {}):  # the missing key was reported when the block was read
             blocks.append(((), None))
             continue
         nodes = [node for node in (block or {}).get("coordinates", ()) if node is not None]

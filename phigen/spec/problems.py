@@ -19,15 +19,15 @@ def shown(value: object, length: int = 60) -> str:
 
 
 def did_you_mean(word: str, candidates: Iterable[str], others: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return the hint ``did you mean 'x1'?``; "" if no candidate is close; see `intended`."""
+    """Return the hint ``did you mean 'x1'?``, with the candidate that `intended` chooses; "" if there is none."""
     candidate = intended(word, candidates, others)
     return f"did you mean {candidate!r}?" if candidate else ""
 
 
 def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return the candidate that a word stands for; "" if there is none.
+    """Return the candidate that a word probably stands for; "" if there is none.
 
-    It is the one that ``others`` has for the word, or one with a similar name.
+    ``others`` maps words to candidates. If it has no candidate for the word, one with a similar name is chosen.
     """
     if len(word) > limits.NAME_LENGTH:
         return ""
@@ -38,15 +38,17 @@ def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = M
         [c for c in choices if c.lower() == word.lower()]
         or [c for c in choices if c.startswith(f"{word}_")]
         or _numbered(word, choices)
-        or sorted((c for c in choices if len(c) > 2 and word.startswith(c)), key=len, reverse=True)  # cosine: cos
+        or sorted((c for c in choices if len(c) > 2 and word.startswith(c)), key=len, reverse=True)  # cos for cosine
         or difflib.get_close_matches(word, choices, n=1)
     )
     return close[0] if close else ""
 
 
 def _numbered(word: str, choices: Iterable[str]) -> list[str]:
-    """Return the choices that differ from the word only in a number, such as x1, x2, …; the nearest numbers come
-    first."""
+    """Return the choices that differ from the word only in the number at its end, such as x1 for x5.
+
+    Those with the nearest numbers come first.
+    """
     stem = word.rstrip("0123456789")
     row = [c for c in choices if c != stem and c[len(stem) :].isdecimal()] if stem and stem != word else []
     return sorted(
@@ -66,7 +68,7 @@ def counted(number: int, noun: str, plural: str = "") -> str:
 
 
 class Problems:
-    """The diagnostics of one file; `finish` raises them in the order of the file."""
+    """The errors of one file; `finish` raises one exception with all of them, in the order of the file."""
 
     def __init__(self, file: str, source: str = "") -> None:
         self.file = file
@@ -75,8 +77,10 @@ class Problems:
         self.only_limits = True
 
     def add(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> None:
-        """Record an error; a repeated message at the same place is ignored. Raises an exception after too many
-        errors."""
+        """Record an error; a repeated message at the same place is ignored.
+
+        ``limit`` says that the error is an exceeded limit. Raises the exception when `limits.ERRORS` are recorded.
+        """
         line = self.lines[location.line - 1] if location.line <= len(self.lines) else ""
         self.found.setdefault((location, message), Diagnostic(message, location, hint, line))
         self.only_limits &= limit
@@ -84,17 +88,17 @@ class Problems:
             raise self.error()
 
     def copy(self) -> Problems:
-        """Return a copy of the errors so far, for `restore`."""
+        """Return a copy of the errors so far. `restore` can go back to it."""
         twin = Problems(self.file)
         twin.found, twin.only_limits = dict(self.found), self.only_limits
         return twin
 
     def restore(self, before: Problems) -> None:
-        """Drop the errors that were recorded since a `copy`."""
+        """Drop the errors that were recorded since `copy` returned ``before``."""
         self.found, self.only_limits = dict(before.found), before.only_limits
 
     def forget(self, line: int) -> None:
-        """Drop the errors of a line, which follow from another error that is reported instead."""
+        """Drop the errors of a line, because they are consequences of another error that is reported instead."""
         self.found = {position: d for position, d in self.found.items() if position[0].line != line}
 
     def stop(self, message: str, location: Location, hint: str = "", *, limit: bool = False) -> SpecError:

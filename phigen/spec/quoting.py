@@ -1,15 +1,15 @@
-"""Parts of a line of YAML that need quotes: expressions with an index, such as ``x[i+1]``, inside { } or [ ]."""
+"""Quotes that a line of YAML lacks: inside { } or [ ], an expression with an index, such as ``x[i+1]``, needs them."""
 
 from __future__ import annotations
 
 
 def needs_quotes(line: str, column: int) -> bool:
-    """Whether YAML fails at this column because of an index: a bracket directly after a name."""
+    """Whether a ``[`` directly after a name stands at this column (from 0), so that the YAML parser fails there."""
     return column < len(line) and line[column] == "[" and (column > 0) and _ends_name(line[:column])
 
 
 def quoted(line: str) -> str:
-    """Return the line with quotes around the keys and values that contain an index."""
+    """Return the line with quotes around each key and value that contains an index, such as ``x[i+1]``."""
     written, part, depth, index, quote = "", "", 0, False, ""
     for position, character in enumerate(line + "\n"):
         following = line[position + 1 : position + 2]
@@ -33,7 +33,7 @@ def _ends_name(text: str) -> bool:
 
 
 def _finished(part: str) -> str:
-    """Return a key or a value, in quotes if it contains an index and has no quotes yet."""
+    """Return a key or a value; with quotes, if it contains an index such as ``[i+1]`` and has no quotes yet."""
     inner = part.strip()
     if "[" not in inner or inner[:1] in "\"'":
         return part

@@ -1,4 +1,4 @@
-"""The runs of a spec."""
+"""Reader of the runs of a spec: initial state, step, length, stored rows, and what is computed from the rows."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import ELAPSED, initial
 
-#: Words that users may write as the step of an adaptive method, which does not exist here.
+#: Words that users may write as a step because they expect an adaptive step size, which phigen does not have.
 _ADAPTING = ("auto", "adaptive", "variable")
-#: Largest relative error up to which a duration is a multiple of the step: decimals of users are rounded.
+#: A ratio of times counts as an integer if its relative distance from it is at most this, since users round decimals.
 NEAR_INTEGER = Fraction(1, 10**9)
 
 
@@ -32,10 +32,10 @@ def run(
     watched: AllowedNames,
     averaged: Collection[str],
 ) -> Run:
-    """Return the run of that name. After errors, which are reported, some of its values are placeholders.
+    """Return the run with this name. Errors are reported; values with errors are then replaced by harmless ones.
 
     ``recordable`` maps the names that ``record`` may contain to "", and other names to the reason why they are refused.
-    ``watched`` has the names for sections and stops, ``averaged`` those for ``average``.
+    ``section`` and ``stop`` may use the names in ``watched``, ``average`` those in ``averaged``.
     """
     numbers = declared.numbers()
     step_node = raw.get("step")
@@ -97,11 +97,11 @@ def run(
 def _box(
     raw: Mapping[str, tuple[Scalar, Sequence[Scalar | None] | None]], declared: Declarations
 ) -> dict[str, tuple[Fraction, Fraction]]:
-    """Return the ranges of coordinates in ``box``."""
+    """Return the ranges (lowest, highest value) of coordinates under ``box``."""
     box = {}
     for name, (key, nodes) in raw.items():
         if not nodes:
-            continue  # reported by the reader
+            continue  # The error was reported when the list was read.
         bounds = [declared.number(node, declared.numbers()) for node in nodes]
         is_coordinate = declared.coordinate(key) is not None
         if len(bounds) != 2 or None in bounds or bounds[0] > bounds[1]:  # type: ignore[operator]
@@ -147,7 +147,7 @@ def _fail(name: str, key: str, message: str, declared: Declarations, hint: str =
 def _recorded(
     name: str, nodes: Sequence[Scalar | None] | None, declared: Declarations, recordable: Mapping[str, str]
 ) -> tuple[str, ...]:
-    """Return ``record`` of a run.
+    """Return the names of columns under ``record`` of the run ``name``; report names that are refused.
 
     ``recordable`` maps column names to "", and other names to the reason why they are refused.
     """
@@ -169,7 +169,7 @@ def _recorded(
 def _average(
     name: str, raw: Mapping[str, Any] | None, declared: Declarations, averaged: Collection[str]
 ) -> AverageChoice:
-    """Return ``average`` of a run; ``averaged`` are the observables that are one number."""
+    """Return the setting ``average`` of the run ``name``; ``averaged`` are the observables that are one number."""
     if raw is None:
         return AverageChoice()
     selected = without_repetition(
@@ -183,7 +183,7 @@ def _average(
 
 
 def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
-    """Report averages that begin after the end of a run, if its steps are equal in time."""
+    """Report an average that begins after the end of a run. The steps of the run must be equal in physical time."""
     start_time, end = run_.average.after, run_.until
     end = run_.start + run_.step * run_.steps if end is None else end
     if start_time is not None and (end - start_time) * run_.step < 0:
@@ -195,7 +195,7 @@ def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
 def crossed(
     name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: AllowedNames
 ) -> Expression | None:
-    """Return an expression whose zeros are searched along the run; a constant one is reported."""
+    """Return the expression under ``section`` or ``stop`` (``key``), whose zeros a run finds; report a constant one."""
     section = declared.formula(raw.get(key), scope)
     constant = {n for n, p in declared.parameters.items() if p.at == "all"}
     if section is not None and not declared.incomplete and constant.issuperset(symbols_of(section)):
@@ -239,9 +239,10 @@ def _steps(
 def _steps_until(
     name: str, raw: Mapping[str, Any], span: Fraction, step: Fraction | None, declared: Declarations
 ) -> int | None:
-    """Return the number of whole steps before the time ``until``.
+    """Return the number of whole steps in ``span``, the time from the start to ``until``; at least 1.
 
-    With a monitor, whose steps differ in time, it is only an estimate.
+    Returns None after errors, which are reported. With a monitor the steps are unequal in time, so that the number is
+    only an estimate.
     """
     if step is None:
         return None
@@ -258,8 +259,10 @@ def _steps_until(
 
 
 def whole(ratio: Fraction) -> int | None:
-    """Return a ratio of times as a number of steps, up to the rounding of decimals; None if it is not a whole
-    number."""
+    """Return a ratio of two times as an integer, the number of steps; None if it is not an integer.
+
+    A relative distance of `NEAR_INTEGER` from the integer is allowed, because decimals are rounded.
+    """
     steps = round(ratio)
     return steps if abs(ratio - steps) <= NEAR_INTEGER * abs(ratio) else None
 
@@ -267,8 +270,8 @@ def whole(ratio: Fraction) -> int | None:
 def with_step(run: Run, step: Fraction, *, parts: bool = False) -> Run:
     """Return the run with another step, which may be negative.
 
-    The duration is unchanged if the run states one; otherwise the number of steps is unchanged. If the step does not
-    divide the duration, the run ends with a part of a step if ``parts`` is true; otherwise `ValueError` is raised.
+    A run keeps its ``until`` or ``duration``, if it states one, otherwise the number of its steps. If the step does not
+    divide the duration, the last step is shorter if ``parts`` is true; otherwise `ValueError` is raised.
     """
     if run.until is not None:
         ratio = (run.until - run.start) / step
@@ -305,7 +308,7 @@ def _initial(name: str, raw: Any, declared: Declarations) -> tuple[Fraction, ...
 
 
 def _single(node: Any, scope: AllowedNames, key: Scalar, declared: Declarations) -> Fraction | None:
-    """Return the number of a node, for ordinary specs. Lattices may have an array in its place."""
+    """Return the value of a node that must be one number; report a list or a mapping, which only lattices allow."""
     if node is None or isinstance(node, Scalar):
         return declared.number(node, scope)
     form = "a list" if isinstance(node, list) else "a mapping"
@@ -316,7 +319,7 @@ def _single(node: Any, scope: AllowedNames, key: Scalar, declared: Declarations)
 def _overrides(
     raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations
 ) -> tuple[dict[str, Fraction], dict[str, Values]]:
-    """Return the values of parameters in a run: numbers, and arrays."""
+    """Return the values of parameters under ``parameters`` of a run: numbers, and arrays over sites or bonds."""
     values: dict[str, Fraction] = {}
     arrays: dict[str, Values] = {}
     for name, (key, node) in raw.items():
@@ -349,7 +352,7 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
     time_values = dict(zip(dated, substitute(list(dated.values()), {declared.time: symbol(ELAPSED)}), strict=True))
     scope = declared.constants("an exact solution", symbols | time_values)
     hints = {c: (scope.refused[c][0], f"initial values are written x0_{c}") for c in declared.coordinates}
-    # A coordinate called t is allowed: an exact solution is a function of the time.
+    # In an exact solution, t always means the time, even if a coordinate is called t, so that it is not refused.
     refused = {n: reason for n, reason in {**scope.refused, **hints}.items() if n not in symbols}
     scope = AllowedNames(scope.names, refused, scope.open)
     values = {}
@@ -361,7 +364,10 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
 
 
 def without_repetition(entries: Any, path: tuple[Any, ...], declared: Declarations) -> tuple[str, ...]:
-    """Return a list of words, each once; repetitions are reported."""
+    """Return the words of a list, each once, without None; report words that occur twice.
+
+    ``path`` are the keys of the list in the spec.
+    """
     distinct: list[str] = []
     for index, word in enumerate(entries):
         if word in distinct:

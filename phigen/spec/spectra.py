@@ -1,4 +1,4 @@
-"""The keys ``spectrum`` and ``correlation`` of runs of lattices."""
+"""Reader of ``spectrum`` and ``correlation``, two keys of runs of lattices on a grid."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from phigen.spec.model import CorrelationChoice, SpectrumChoice
 from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.yaml_source import Scalar
 
-#: Key of the largest distance of a correlation.
+#: Key of ``correlation`` for the largest distance, in sites.
 UP_TO = "up to"
 
 
 def spectrum_of(name: str, raw: Mapping[str, Any], declared: Declarations) -> SpectrumChoice | None:
-    """Return ``spectrum`` of the run of that name; None if it has none, or after errors, which are reported."""
+    """Return the setting ``spectrum`` of the run ``name``; None if it is absent, or after reported errors."""
     entries = raw.get("spectrum")
     if entries is None or not _is_allowed(name, "spectrum", raw, declared):
         return None
@@ -27,9 +27,9 @@ def spectrum_of(name: str, raw: Mapping[str, Any], declared: Declarations) -> Sp
 def correlation_of(
     name: str, raw: Mapping[str, Any], sizes: tuple[int, ...], declared: Declarations
 ) -> CorrelationChoice | None:
-    """Return ``correlation`` of the run of that name, for a lattice with ``sizes``.
+    """Return the setting ``correlation`` of the run ``name``; None if it is absent, or after reported errors.
 
-    None if the run has none, or after errors, which are reported.
+    ``sizes`` are the sizes of the axes in this run; the largest distance must be smaller.
     """
     entries = raw.get("correlation")
     if entries is None or not _is_allowed(name, "correlation", raw, declared):
@@ -56,7 +56,7 @@ def correlation_of(
 
 
 def _is_allowed(name: str, key: str, raw: Mapping[str, Any], declared: Declarations) -> bool:
-    """Return whether a run has frames on a grid; if not, an error is reported at the key."""
+    """Return whether a run may have ``key``: it needs a grid and stored states. If not, the error is reported."""
     place, add = declared.reader.locations["runs", name, key], declared.reader.problems.add
     if declared.relation != "grid":
         add(f"{key} is along the axes of a grid", place, "lattice: {axes: [i]} declares one")

@@ -1,4 +1,4 @@
-"""The named sweeps of a spec: runs over ranges of parameters and initial values."""
+"""Reader of the sweeps of a spec. A sweep repeats a run for many values of parameters and initial values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.runs import whole, without_repetition
 from phigen.spec.yaml_source import Scalar
 
-#: Keys of ``over`` other than ranges.
+#: Keys under ``over`` that are settings of the sweep, not the name of a quantity with its range.
 _WORDS: Mapping[str, Kind] = {
     "random": Integer(1, limits.SWEPT, limit=True),
     "seed": Integer(0, limits.SWEEP_SEED, limit=True),
@@ -32,7 +32,10 @@ def sweep(
     *,
     monitored: bool,
 ) -> SweepSettings:
-    """Return the sweep of that name. After errors, which are reported, some of its values are placeholders."""
+    """Return the sweep with this name. Errors are reported; values with errors are then replaced by harmless ones.
+
+    ``runs`` and ``observables`` are those of the spec; ``monitored`` says that the spec has a monitor.
+    """
     place = ("sweeps", name)
     run = raw["run"].text if raw.get("run") else next(iter(runs), "")
     if run not in runs:
@@ -67,7 +70,7 @@ def sweep(
 def _kept(
     nodes: Sequence[Scalar | None] | None, place: tuple[Any, ...], declared: Declarations, observables: Collection[str]
 ) -> tuple[str, ...]:
-    """Return ``keep``: words of `KEPT` and statistics of observables."""
+    """Return the words under ``keep`` of a sweep: words of `KEPT` and statistics of observables, such as mean(M)."""
     quantities: list[str | None] = []
     for node in nodes or ():
         word = node.text.replace(" ", "") if node is not None else None
@@ -83,9 +86,10 @@ def _kept(
 
 
 def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
-    """Return the reason why a run cannot be swept; "" if it can be.
+    """Return the reason why a sweep cannot repeat this run; "" if it can.
 
-    All members must make the same number of whole steps, so the end of the run must not depend on the member.
+    All members must make the same number of whole steps. So a run is refused if it ends at a condition, or if what the
+    sweep varies changes the number of its steps.
     """
     statement = f"all members of a sweep make the same number of whole steps; the run {run.name} ends"
     if run.stop is not None:
@@ -106,7 +110,7 @@ def _fail(place: tuple[Any, ...], message: str, declared: Declarations, hint: st
 
 
 def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
-    """Return the range of one name, a list or an interval; no range after errors, which are reported."""
+    """Return the range of one quantity, a list or an interval, as a list of one axis; [] after reported errors."""
     name, numbers = key.text, declared.numbers()
     allowed_names = [*declared.parameters, *(() if declared.lattice else declared.coordinates), *SWEEP_NAMES]
     if name not in allowed_names and not declared.incomplete:
@@ -147,7 +151,7 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
 
 
 def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
-    """Return the range of ``seed``: the numbers of the random draws, as an axis of the sweep."""
+    """Return the range of ``seed`` as a list of one axis, whose values number the random draws; [] after errors."""
     if isinstance(value, list):
         draw_counts = [Integer(0, limits.SWEEP_SEED).read(node, ("seed",), declared.reader) for node in value if node]
         numbers = tuple(float(n) for n in draw_counts if n is not None)

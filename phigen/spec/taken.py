@@ -1,7 +1,8 @@
 """Names that a spec must not have.
 
-The name of a spec is used for files, NAME.h and NAME.py, and as the prefix of symbols, NAME_init. So it must not hide a
-header or a module if the folder of a solver is on a search path, and symbols must not clash with others.
+The name of a spec is that of the generated files NAME.h and NAME.py, and the prefix of generated symbols, such as
+NAME_init. So NAME must not be a header or a module that other code needs, which the generated file would hide on a
+search path. The symbols must not clash with those of libraries or of other specs.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ _PYTHON = """and as assert async await break class continue def del elif else ex
 import in is lambda nonlocal not or pass raise return try while with yield match type"""
 _KEYWORDS = frozenset(f"{_C} {_CPP} {_PYTHON}".split())
 
-# Headers of standard C, of POSIX and of the libraries of Linux, macOS and Windows, and those of compilers: other
-# headers include them as <NAME.h>. On file systems without case, <Availability.h> is found as availability.h.
+# Headers of standard C, of POSIX, of the libraries of Linux, macOS and Windows, and of compilers. Other headers include
+# them as <NAME.h>. The names are in lower case, because some file systems find availability.h as <Availability.h>.
 _HEADERS = """assert complex ctype errno fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg
 stdatomic stdbit stdbool stdckdint stddef stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype
 aio aliases alloca ar argp argz backtrace byteswap cpio crypt cxxabi dirent dlfcn elf endian envz err error execinfo
@@ -37,18 +38,18 @@ winsock2"""
 _HEADER_FAMILIES = r"\w+intrin|(arm|hexagon|hvx|riscv|wasm)_\w+|ncurses\w*|curses"
 _HEADER = re.compile(rf"{'|'.join(_HEADERS.split())}|{_HEADER_FAMILIES}")
 
-# Modules that are imported together with a generated module, and modules that only other versions of Python have.
+# Modules that programs import beside a generated module; then modules of the standard library of other Python versions.
 _MODULES = frozenset(["numpy", "scipy", "sympy", "matplotlib", "pandas", "phigen"])
 _OTHER_VERSIONS = frozenset(["annotationlib", "asynchat", "asyncore", "compression", "distutils", "imp", "smtpd"])
 
 _DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")
 
-# Functions of C libraries with names such as X_init and X_status: linked into one program, ours would be called
-# instead.
+# Names X for which a C library has functions X_init, X_status, …. In a program that is linked with generated code, the
+# generated functions would be called instead.
 _LIBRARY = re.compile(r"pthread_\w+|posix_\w+|inet6_\w+|argp_err_exit|acc|atomic|cnd|fanotify|inotify|mtx|res|sem|si")
 
-#: Ends of names whose symbols clash with those of another spec with a longer name. NAME_default_params is the default
-#: of NAME, but would also be the type of the parameters of NAME_default.
+#: Last words of names that are refused, with the symbol that would clash. NAME_default_params has the default
+#: parameters of the spec NAME; for a spec NAME_default, it would also be the type of its parameters.
 CLASHING_ENDS = {
     "default": "default_params",
     "modified": "modified_hamiltonian",

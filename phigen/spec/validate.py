@@ -37,7 +37,7 @@ from phigen.spec.yaml_source import Scalar, decode, read
 from phigen.symbolic.expression import ONE, ZERO, Expression, symbol, symbols_of
 from phigen.symbolic.symbols import MATRIX, momentum
 
-#: Options of bi-realisations, with the kind that each belongs to.
+#: Options under ``birealisation:``, each with the kinds of bi-realisations that accept it.
 OPTIONS = {
     "alpha": ("custom",),
     "beta": ("custom",),
@@ -52,7 +52,8 @@ OPTIONS = {
 def validate(data: bytes, file: str) -> Spec:
     """Return the spec in the bytes of a file.
 
-    Raises `SpecError` with all errors, in the order of the file; `LimitError` if one of them is an exceeded limit.
+    ``file`` is its name in messages. Raises `SpecError` with all errors, in the order of the file; `LimitError` if all
+    of them are exceeded limits.
     """
     source = decode(data, file)
     problems = Problems(file, source)
@@ -66,7 +67,10 @@ def validate(data: bytes, file: str) -> Spec:
 
 
 def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
-    """Return the arguments of `Spec`. After errors, which are reported, some of them are placeholders."""
+    """Return the arguments of `Spec` by name. Errors are reported; values with errors are then harmless ones.
+
+    ``raw`` is the content of the file by key, ``declared`` its names.
+    """
     references = raw.get("references", ())
     poisson = raw.get("poisson", {})
     hamiltonian, coupling = densities(raw.get("hamiltonian"), declared)
@@ -81,7 +85,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     if lattice is None:
         columns |= dict.fromkeys(declared.coordinates, "is recorded with the state")
     summed = [name for name in casimirs if lattice is None or lattice.kinds[name] != "sites"]
-    # A run that records an observable with an error is not reported in addition.
+    # Runs may record an observable that has an error, so that only the observable is reported.
     broken = [name for name in raw.get("observables", {}) if name not in observed]
     columns |= dict.fromkeys(["state", "energy", *summed, *numbers, *broken], "")
     watched = watched_names(declared, observed, numbers)
@@ -140,17 +144,17 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     }
 
 
-#: Keys of the Hamilton–Jacobi series, which have no meaning for a splitting, with the values that are allowed all the
-#: same.
+#: Keys of the Hamilton–Jacobi series, which schemes without a series refuse. Each has the values that are allowed
+#: nevertheless, because they request nothing.
 SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": ("auto",), "modified_hamiltonian": (0,)}
-#: Schemes without a series, with the part of the message that says what they do instead.
+#: Schemes that do not use the Hamilton–Jacobi series, each with a sentence for messages that says what it uses instead.
 WITHOUT_SERIES = {
     "splitting": "scheme: splitting follows exact flows of parts of H",
     "gauss": "scheme: gauss solves for the stages of a collocation method",
 }
 
 
-#: Keys that lattices do not have: the values that are allowed all the same, and a hint.
+#: Keys that lattices refuse. Each has the values that are allowed nevertheless, since they request nothing, and a hint.
 NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
     "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
     "terms": ((), "order: sets the method of a lattice"),
@@ -159,7 +163,7 @@ NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
 }
 
 
-#: Keys that are refused with noise: the values that are allowed all the same, the reason, and a hint.
+#: Keys that are refused with noise. Each has the values that are allowed nevertheless, the reason, and a hint.
 NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "monitor": (
         (),
@@ -175,7 +179,7 @@ NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     "terms": ((), "with noise the method is chosen by order", "order: 2"),
     "adjoint": ((False,), "it is not offered", ""),
 }
-#: Keys of runs that are refused with noise, and those that are refused without noise.
+#: Keys of runs that are refused with noise, and keys of runs that are allowed with noise only.
 NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "every", "at"), ("seed", "members")
 
 
@@ -228,7 +232,7 @@ def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, re
 
 
 def _no_brackets(declared: Declarations) -> MatrixForm:
-    """Return π of a site if all brackets are along bonds. After errors it is a placeholder."""
+    """Return the zero matrix as π of a site, for lattices all of whose brackets are along bonds, and after errors."""
     n = len(declared.coordinates)
     return MatrixForm(((ZERO,) * n,) * n)
 
@@ -251,7 +255,7 @@ def _formulas(
 
 
 def _inputs(nodes: Sequence[Scalar | None], declared: Declarations) -> tuple[str, ...]:
-    """Return the names under ``inputs``, which must be different parameters with one value each."""
+    """Return the names under ``inputs``; report names that are repeated or are not parameters with one value."""
     names: list[str] = []
     for node in filter(None, nodes):
         parameter = declared.parameters.get(node.text)
@@ -268,7 +272,7 @@ def _inputs(nodes: Sequence[Scalar | None], declared: Declarations) -> tuple[str
 
 
 def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
-    """Return the forces of ``forces`` and ``damping``, by coordinate."""
+    """Return the forces under ``forces``, by coordinate, and the coefficient under ``damping``."""
     entries_of_kinds, damping = raw.get("forces") or {}, raw.get("damping")
     forces: dict[str, dict[str, Expression]] = {}
     for kind in ("covector", "vector"):
@@ -282,7 +286,10 @@ def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
 
 
 def _noise(raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dict[str, SpecNoise]:
-    """Return the sources of ``noise``. Amplitudes must be constants, so that σ∇g is the gradient of a function."""
+    """Return the sources of noise by name, each with a Hamiltonian g and an amplitude σ.
+
+    The amplitude must not depend on coordinates, so that σ∇g is the gradient of a function.
+    """
     scope, sources = declared.dated_constants("an amplitude"), {}
     if len(raw) > limits.SOURCES:
         message = f"noise: {len(raw)} sources, the limit is {limits.SOURCES}"
@@ -299,8 +306,10 @@ def _noise(raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dic
 def _gauge(
     raw: str | Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations
 ) -> str | dict[str, Expression]:
-    """Return auto, none, or the multiples of Casimirs, which must not depend on coordinates, so that they are
-    constant along trajectories."""
+    """Return the value of ``gauge``: auto, none, or the multiples of Casimirs, by name, that are added to H.
+
+    The multiples must be constant along trajectories, so those that depend on coordinates are reported.
+    """
     if isinstance(raw, str):
         return raw
     values = _formulas(raw, declared)
@@ -314,10 +323,7 @@ def _gauge(
 
 
 def _monitor(node: Scalar | None, declared: Declarations) -> str | Expression | None:
-    """Return log, or the factor g of dt = g dτ.
-
-    If a declared name is ``log``, the word alone is ambiguous and is refused.
-    """
+    """Return the monitor: the word log, the factor g(x) of dt = g dτ for steps in the time τ, or None."""
     if node is None:
         return None
     if node.text == LOGARITHMIC:
@@ -392,7 +398,10 @@ def _spray(options: Mapping[str, Any], declared: Declarations) -> BirealisationC
 def _on_covectors(
     lists: Mapping[str, Sequence[Scalar | None]], where: str, declared: Declarations
 ) -> dict[str, tuple[Expression, ...]]:
-    """Return lists of n expressions in the coordinates and ``p_NAME``, by key of the bi-realisation."""
+    """Return the lists under the keys of a bi-realisation, each of n expressions in the coordinates and ``p_NAME``.
+
+    ``where`` names the bi-realisation in messages.
+    """
     n, scope, expressions = len(declared.coordinates), declared.scope(_momenta(declared, where)), {}
     for key, nodes in lists.items():
         place = declared.reader.locations.get(("birealisation", key))
@@ -404,7 +413,7 @@ def _on_covectors(
 
 
 def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
-    """Return the names ``p_NAME``; report names that have another meaning."""
+    """Return the names ``p_NAME`` of momenta with their symbols; report those that the spec declares otherwise."""
     momenta = {f"p_{c}": symbol(momentum(c)) for c in declared.coordinates}
     for name in [c for c in momenta if c in declared.nodes]:
         message = f"the name {name!r} means the momentum of {name[2:]!r} in {where}"

@@ -1,6 +1,6 @@
 """Values at the sites or bonds of a lattice: a formula of the indices, a list, a file, or random numbers."""
 
-# `return reader.error(…)` reports an error and returns None, the value of everything that has an error.
+# `return reader.error(…)` reports an error and returns None, which stands for a value that could not be read.
 # mypy: disable-error-code="func-returns-value"
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ _WHOLE_SPHERE = "initial: {random: sphere}"
 
 
 def values(raw: Any, declared: Declarations, *, whole: bool = False) -> Values | None:
-    """Return an array that was read; None after errors, which are reported.
+    """Return the values at sites or bonds that a YAML value describes; None after errors, which are reported.
 
-    If ``whole``, it is the array of all fields together.
+    ``whole`` says that they are the initial values of all fields of a lattice together.
     """
     if raw is None:
         return None
@@ -51,13 +51,13 @@ def values(raw: Any, declared: Declarations, *, whole: bool = False) -> Values |
 
 
 def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> Values | None:
-    """Return random values; keys that have no effect are reported."""
+    """Return the random values that a mapping {random: …, seed: …} describes; None after errors, which are reported."""
     reader, before = declared.reader, len(declared.reader.problems.found)
     for key, (node, _) in entries.items():
         if key not in RANDOM_KEYS:
             hint = did_you_mean(key, RANDOM_KEYS) or f"keys: {', '.join(RANDOM_KEYS)}"
             reader.error(node, f"random values have no key {shown(key)}", hint)
-    if not entries:  # the mapping has keys that are not names, which was reported
+    if not entries:  # no key of the mapping was a name, which was reported when it was read
         return None
     if "random" not in entries:
         first = next(iter(entries.values()))[0]
@@ -76,7 +76,7 @@ def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> 
 
 
 def _option(entries: Mapping[str, tuple[Scalar, Any]], key: str, declared: Declarations) -> Any:
-    """Return the value of a key of random values; None if the key is absent or its value wrong, which is reported."""
+    """Return the value under a key of random values; None if the key is absent, or after a reported error."""
     node, value = entries.get(key, (None, None))
     if node is None or value is None:
         return None

@@ -1,8 +1,8 @@
 """Parser of YAML 1.2 into a tree of nodes with their places.
 
-It uses the event stream of ruamel instead of its loaders: anchors, aliases and tags are refused before anything is
-expanded, and nesting is limited before it can exhaust the stack. A scalar keeps its text, so ``1e-3`` is an exact
-rational and ``no`` is a name.
+The parser reads the event stream of the library ruamel, not its loaders. So anchors, aliases and tags are refused
+before anything is expanded, and nesting is limited before it can exhaust the stack. A scalar keeps its text: ``1e-3``
+becomes an exact rational, and ``no`` is a name, not a boolean.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ class Node:
 
 @dataclass
 class Scalar(Node):
-    """A scalar, as its text.
+    """A YAML scalar, as its text; ``plain`` means without quotes.
 
-    ``offset`` is the number of columns from the location to the first character of the text. It is None if the
-    characters of the text do not correspond one to one to columns of a line. For a text over several lines, ``places``
-    are the lines and columns of its characters other than blanks, and of its end; they are unknown if there are
-    escapes.
+    ``offset`` is the number of columns from the location of the scalar to the first character of the text: 1 if there
+    is a quote, else 0. It is None for a text with escapes or over several lines, whose characters are not consecutive
+    columns. For a text over several lines without escapes, ``places`` has the line and the column of each character
+    that is not a blank, and of the end.
     """
 
     text: str
@@ -41,7 +41,7 @@ class Scalar(Node):
     places: tuple[tuple[int, int], ...] = ()
 
     def at(self, index: int) -> Location:
-        """Return the place of a character of the text; the place of the scalar if the character's is unknown."""
+        """Return the place of a character of the text in the file; if it is unknown, the place of the scalar."""
         here = self.location
         if self.offset is not None:
             return Location(here.line, here.column + self.offset + index, here.file)
@@ -52,7 +52,7 @@ class Scalar(Node):
 
     @property
     def is_null(self) -> bool:
-        """Whether YAML reads the text as null."""
+        """Whether YAML reads the text as null: no text, ``~`` or ``null``, without quotes."""
         return self.plain and self.text in ("", "~", "null", "Null", "NULL")
 
     @property
@@ -91,12 +91,13 @@ _BYTE_ORDER_MARKS = (
     (b"\xff\xfe", "UTF-16"),
     (b"\xfe\xff", "UTF-16"),
 )
-#: Joiners and the soft hyphen, which occur in ordinary text. Other format characters can make a line look different.
+#: Invisible format characters that occur in ordinary text: joiners and the soft hyphen. Other invisible characters are
+#: refused, because they can make a line look different from what it is.
 _HARMLESS = "\u200c\u200d\u00ad"
 
 
 def kind_of(node: Node) -> str:
-    """Return the name of the kind of a node, for messages such as "expected …, found …"."""
+    """Return the words for the kind of a node, such as "a list", in messages "expected …, found …"."""
     if isinstance(node, Sequence):
         return "a list"
     if isinstance(node, Mapping):
@@ -172,7 +173,7 @@ def read(text: str, problems: Problems) -> Mapping:
     except MarkedYAMLError as error:
         raise builder.syntax_error(error) from None
     except (YAMLError, ValueError, OverflowError) as error:
-        # for instance a directive or an escape with an impossible number
+        # errors that ruamel raises as ValueError, for instance for an escape with an impossible number
         raise problems.stop(f"not valid YAML: {shown(error, 200)}", Location(1, 1, problems.file)) from None
     root = builder.root
     if root is None or (isinstance(root, Scalar) and root.is_null):
@@ -186,7 +187,7 @@ def read(text: str, problems: Problems) -> Mapping:
 
 
 class _Builder:
-    """Builder of nodes from the events of ruamel, with a stack of the open collections."""
+    """Builder of nodes from the events of ruamel; a stack has the sequences and mappings that are not complete."""
 
     def __init__(self, text: str, problems: Problems) -> None:
         self.text, self.problems = text, problems
@@ -196,12 +197,12 @@ class _Builder:
         self.documents = 0
 
     def place(self, mark: Any) -> Location:
-        """Return the location of a mark of ruamel."""
+        """Return the location, counted from 1, of a mark of ruamel, which counts from 0."""
         return Location(mark.line + 1, mark.column + 1, self.problems.file)
 
     def syntax_error(self, error: Any) -> Exception:
         mark = error.problem_mark or error.context_mark
-        # the start of the open collection is more helpful than the end of the file
+        # If the end of the file is reached, the place where the unfinished list or mapping starts is more helpful.
         if error.context_mark and mark.index >= len(self.text):
             mark = error.context_mark
         location = self.place(mark) if mark else Location(1, 1, self.problems.file)
@@ -211,7 +212,7 @@ class _Builder:
             hint = "indent with spaces, not with tabs"
         line = self.text.split("\n")[location.line - 1]
         if needs_quotes(line, location.column - 1):
-            self.problems.forget(location.line)  # drops errors about the line that follow from this one
+            self.problems.forget(location.line)  # drops earlier errors of this line, consequences of the missing quotes
             what = "inside { } and [ ], what contains [ ] stands between quotes"
             hint = f"write {quoted(line).strip()}"
         return self.problems.stop(f"not valid YAML: {what}", location, hint)
@@ -268,13 +269,14 @@ class _Builder:
         return 1 if raw[:1] in ("'", '"') and raw[1:-1] == event.value else None
 
     def places(self, event: Any) -> tuple[tuple[int, int], ...]:
-        """Return the places of the characters of a text over several lines, without blanks, and of its end.
+        """Return line and column of each character of a text that is not a blank, and of the end of the text.
 
-        Folding changes blanks only. If other characters differ, there are escapes, and the places are unknown: ().
+        The text spans several lines, which YAML joins by changing blanks only. If other characters differ from those in
+        the file, the text has escapes; then the places are unknown, and the result is ().
         """
         start, end = event.start_mark.index, event.end_mark.index
         characters = [c for c in event.value if not c.isspace()]
-        if event.style in ("|", ">"):  # the rest of the line after the sign is not part of the text
+        if event.style in ("|", ">"):  # the text begins in the line after that of the sign | or >
             start = self.text.find("\n", start, end)
         elif event.style:
             start += 1
@@ -291,7 +293,7 @@ class _Builder:
         return (*places, (places[-1][0], places[-1][1] + 1))
 
     def attach(self, node: Node) -> None:
-        """Add a node to the innermost open collection."""
+        """Add a node to the innermost list or mapping that is being read; there it is an item, a key or a value."""
         if not self.stack:
             self.root = node
             return
@@ -305,7 +307,7 @@ class _Builder:
         else:
             key, pending[0] = pending[0], None
             if isinstance(node, Scalar) and node.is_null and not node.text:
-                node.location = key.location  # ruamel gives an empty value the place of the next token
+                node.location = key.location  # ruamel reports the place of the next token for an empty value
             first = parent.entries.get(key.text)
             if first is None:
                 parent.entries[key.text] = (key, node)

@@ -1,4 +1,4 @@
-"""Writer of a spec as YAML that parses to the same spec, for specs that were made by programs."""
+"""Writer of a spec as YAML, for specs that phigen makes in memory. Reading the text gives the same system."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from phigen.spec.model import DEFAULT_ORDER, MatrixForm, Parameter, Run, Spec, V
 from phigen.symbolic.expression import Expression, neg, number, text
 from phigen.symbolic.readable import infix, signed_sum
 
-#: Lengths above which expressions are divided into definitions: nine tenths of the limits.
+#: Lengths, in characters and in names and operators, above which an expression is divided into definitions. They are
+#: nine tenths of the limits for expressions, since parentheses may be added.
 _LENGTH, _NODES = limits.EXPRESSION_LENGTH * 9 // 10, limits.EXPRESSION_NODES * 9 // 10
 _WIDTH = 110
 _PLAIN = re.compile(r"[A-Za-z0-9_+*/(). ^-]*")
@@ -20,7 +21,10 @@ _WORDS = frozenset(["null", "Null", "NULL", "~", "true", "True", "TRUE", "false"
 
 
 def spec_text(spec: Spec) -> str:
-    """Return the text of a spec that was made in memory: its name, system and runs. π must be a matrix."""
+    """Return the YAML text of a spec that was made in memory: its name, title, system, order and runs.
+
+    π must be a `MatrixForm`. Other settings of the spec are not written.
+    """
     return "\n".join(_Writer(spec).lines()) + "\n"
 
 
@@ -65,7 +69,10 @@ class _Writer:
                 yield from _indented(_run(run))
 
     def short(self, name: str, expression: Expression) -> str:
-        """Return the text of an expression; parts of a long expression become definitions."""
+        """Return the text of an expression. A sum that is too long is divided: its parts become definitions.
+
+        ``name`` begins the names of these definitions.
+        """
         terms = [(t, _size(t) + 1) for t in map(infix, _terms(expression))]
         groups: list[list[str]] = [[]]
         length = nodes = 0
@@ -132,7 +139,7 @@ class _Writer:
 
 
 def _size(written: str) -> int:
-    """Return the number of numbers, names and operators in a text, counted as the grammar does."""
+    """Return the number of numbers, names and operators in an expression, as the limit of the parser counts them."""
     return len(re.findall(r"[\w.]+|\*\*|[-+*/]", written))
 
 
@@ -150,7 +157,7 @@ def _terms(e: Expression) -> Iterator[Expression]:
 
 
 def _flat(e: Expression) -> str:
-    """Return an expression as text, with sums without parentheses."""
+    """Return an expression as text, in which a sum of sums is written without parentheses."""
     return _sum([infix(t) for t in _terms(e)])
 
 

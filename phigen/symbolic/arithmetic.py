@@ -1,4 +1,4 @@
-"""Evaluation of expressions in any kind of arithmetic."""
+"""Evaluation of expressions in any kind of arithmetic: numbers, arrays, intervals, elements of a ring."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from phigen.symbolic.expression import Expression, topological
 
 T = TypeVar("T")
 
-#: Values of nodes that are known before an evaluation: none.
+#: Empty table of values that are known before an evaluation, by the ``id`` of the node; the default.
 NOTHING: Mapping[int, Any] = MappingProxyType({})
 
 
 class Arithmetic(Generic[T]):
-    """A kind of arithmetic in which expressions have values of type T. Sums use ``+`` and ``-`` of these values."""
+    """A kind of arithmetic in which expressions have values of type T; sums are computed by ``+`` and ``-`` of T."""
 
     def constant(self, value: Fraction) -> T:
         """Return the value of a rational number."""
@@ -41,7 +41,7 @@ class Arithmetic(Generic[T]):
         raise NotImplementedError
 
     def visit(self, node: Expression, args: list[Any]) -> T:
-        """Return the value of a node from those of its arguments."""
+        """Return the value of a node; ``args`` are the values of its arguments."""
         match node.op:
             case "number":
                 return self.constant(node.value)
@@ -62,7 +62,7 @@ class Arithmetic(Generic[T]):
     def values(self, roots: Sequence[Expression], computed: Mapping[int, T] = NOTHING) -> list[T]:
         """Return the values of expressions. A shared node is computed once; its value is dropped after its last use.
 
-        ``computed`` maps the ``id`` of nodes to known values; the nodes below these are not visited.
+        ``computed`` maps the ``id`` of nodes to known values; nodes that only such nodes use are not visited.
         """
         order = topological(roots, computed)
         uses = Counter(id(a) for node in order for a in node.args)

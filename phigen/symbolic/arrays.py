@@ -35,7 +35,7 @@ class Arrays(Arithmetic[Any]):
         return self._library.power(base, float(exponent))
 
     def function(self, name: str, args: list[Any]) -> Any:
-        """Return a function of arrays, by the function of the library."""
+        """Return the value of a function at arrays, elementwise, by the function of the library."""
         if not args:
             return np.pi if name == "pi" else np.e
         if name == "choose":
@@ -44,7 +44,9 @@ class Arrays(Arithmetic[Any]):
 
 
 def evaluate(roots: Sequence[Expression], values: Mapping[str, Any]) -> list[Floats]:
-    """Return the values of the roots for arrays (or numbers) of the symbols; NaN or infinity outside the domain.
+    """Return the values of expressions, elementwise for arrays (or numbers) as values of their symbols.
+
+    Outside its domain a function gives NaN or infinity.
 
     Raises `KeyError` for a symbol without a value.
     """

@@ -1,4 +1,4 @@
-"""Chebyshev economisation of power series in exact arithmetic: the same accuracy with fewer terms."""
+"""Chebyshev economisation of power series, in exact arithmetic: nearly the same accuracy with fewer terms."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ def economised(
 ) -> list[Fraction]:
     """Return ``terms`` coefficients whose power series approximates Σ c_k z^k.
 
-    The approximation is for 0 ≤ z ≤ radius or, if ``symmetric``, for −radius ≤ z ≤ radius. By Lanczos' method (C.
-    Lanczos, Applied Analysis, 1956), the highest power is replaced by the lower terms of the Chebyshev polynomial of
-    its degree, again and again.
+    The approximation holds for 0 ≤ z ≤ radius or, if ``symmetric``, for −radius ≤ z ≤ radius. The method is that of C.
+    Lanczos, Applied Analysis, 1956: subtracting a multiple of the Chebyshev polynomial of the highest degree removes
+    the highest power with the smallest change of the sum. This is repeated until ``terms`` coefficients are left.
     """
     scaled = [c * radius**k for k, c in enumerate(coefficients)]
     while len(scaled) > terms:
@@ -24,7 +24,10 @@ def economised(
 
 
 def _chebyshev(degree: int, twice: Sequence[int]) -> list[int]:
-    """Return the coefficients of the Chebyshev polynomial T_n(y) in u, where 2y = ``twice[0]`` + ``twice[1]`` u."""
+    """Return the coefficients of the Chebyshev polynomial T_n(y) as a polynomial in u; n is the ``degree``.
+
+    y is a linear function of u: 2y = ``twice[0]`` + ``twice[1]`` u.
+    """
     previous, last = [1], [twice[0] // 2, twice[1] // 2]
     if degree == 0:
         return previous

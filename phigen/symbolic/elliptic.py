@@ -6,18 +6,19 @@ are sn, cn and dn of √P t with the modulus √(Q/P) (sn divided by √P), and 
 
     S = 4κ(1 − z)/(1 + z)²,    C = (1 − 6z + z²)/(1 + z)²,    D² = C² + (P − Q)S².
 
-`AMPLITUDE` is κ as a function of (t, P, R) with R = P − Q, for φ modulo full turns, so that |κ|√P ≤ 1. Near a
-separatrix R is small, and more accurate than a difference of P and Q would be. The derivatives contain G = ∫ S² dt and
-I = ∫ S²/D² dt from 0 to t, `SQUARES` and `RATIOS`. None divides by P, Q or R:
+`AMPLITUDE` is κ as a function of (t, P, R) with R = P − Q, for φ modulo full turns, so that |κ|√P ≤ 1. The argument is
+R, not Q, because near a separatrix R is small, and the difference P − Q would lose digits. The derivatives of κ contain
+the integrals G = ∫ S² dt (`SQUARES`) and I = ∫ S²/D² dt (`RATIOS`) from 0 to t, but no division by P, Q or R:
 
     ∂κ/∂t = (1 + z)D/4,  ∂κ/∂R = (1 + z)DI/8,  ∂κ/∂P = (1 + z)DG/8 − κ³(5 − 2z + z²)/(1 + z)³.
 
 `THIRD` is ∫ S²/(1 − nS²) dt from 0 to t as a function of (t, P, R, n) with n ≤ 0, an integral of the third kind.
 
-If Pt² ≤ 1, S is a power series at t/16, doubled four times. Otherwise φ is computed by the arithmetic–geometric mean of
-√P and √R (M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 16.4 and 17.6), with arcsin written as an
-arctangent whose denominator has no cancellation. The integrals are Carlson's R_D and R_J, by duplication (B. C.
-Carlson, Numerical computation of real or complex elliptic integrals, Numerical Algorithms 10, 1995).
+If Pt² ≤ 1, generated code computes S at t/16 by a power series, and doubles the argument four times. Otherwise it
+computes φ by the arithmetic–geometric mean of √P and √R (M. Abramowitz, I. A. Stegun, Handbook of Mathematical
+Functions, 16.4 and 17.6); there, arcsin is written as an arctangent, so that there is no cancellation. The integrals
+are Carlson's R_D and R_J, by duplication (B. C. Carlson, Numerical computation of real or complex elliptic integrals,
+Numerical Algorithms 10, 1995).
 """
 
 from __future__ import annotations
@@ -28,28 +29,32 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-#: Names of the functions; their arguments are t, P and R.
+#: Names, in expressions, of κ and of the integrals G and I; their arguments are t, P and R.
 AMPLITUDE, SQUARES, RATIOS = ELLIPTIC = ("amplitude", "amplitude1", "amplitude2")
 
-#: The name of the integral of the third kind; its arguments are t, P, R and n.
+#: Name, in expressions, of the integral of the third kind; its arguments are t, P, R and n.
 THIRD = "amplitude3"
 
-#: Number of doublings of the argument of the series, and number of its terms. At a sixteenth of t with Pt² ≤ 1, the
-#: omitted terms are below 10⁻¹⁸.
+#: For Pt² ≤ 1: number of times that the argument of S is halved for the power series and doubled afterwards, and number
+#: of terms of the series. At t/16 the omitted terms are below 10⁻¹⁸.
 DOUBLINGS, TERMS = 4, 6
 
 #: Ratio c/a of the arithmetic–geometric mean at which the iteration ends: the next c/a, a quarter of its square, is
 #: below rounding.
 MEAN_RATIO = 1e-8
 
-#: Number of duplications of R_D in code without branches, where its arguments differ by 0.71 at most.
+#: Number of duplication steps for Carlson's R_D in SIMD code, which has no branches. The arguments of R_D there differ
+#: by at most 0.71, so that this number suffices for double precision.
 LANE_DUPLICATIONS = 5
 
 
 @cache
 def series() -> tuple[tuple[Fraction, ...], ...]:
-    """Return the coefficients of S/t = Σ c[j][i] xⁱ yʲ with x = (P + Q)t² and y = PQt⁴: S̈ = −(P + Q)S + 2PQS³."""
-    terms = [{(0, 0): Fraction(1)}]  # coefficients of t⁰, t², …, by the powers of x and y
+    """Return the coefficients c[j][i] of S/t = Σ c[j][i] xⁱ yʲ, where x = (P + Q)t² and y = PQt⁴.
+
+    They follow from the differential equation S̈ = −(P + Q)S + 2PQS³.
+    """
+    terms = [{(0, 0): Fraction(1)}]  # for t⁰, t², … in S/t: the coefficients by the exponents (i, j) of x and y
     for n in range(TERMS - 1):
         following: dict[tuple[int, int], Fraction] = {}
         divisor = (2 * n + 2) * (2 * n + 3)
@@ -69,7 +74,7 @@ def series() -> tuple[tuple[Fraction, ...], ...]:
 
 
 def _product(a: dict[tuple[int, int], Fraction], b: dict[tuple[int, int], Fraction]) -> dict[tuple[int, int], Fraction]:
-    """Return the product of two polynomials."""
+    """Return the product of two polynomials in x and y, which map exponents (i, j) to coefficients."""
     product: dict[tuple[int, int], Fraction] = {}
     for (i, j), c in a.items():
         for (k, m), d in b.items():
@@ -78,7 +83,7 @@ def _product(a: dict[tuple[int, int], Fraction], b: dict[tuple[int, int], Fracti
 
 
 def functions_of(kappa: Any, p: Any, r: Any) -> tuple[Any, Any, Any]:
-    """Return S, C and D² from κ."""
+    """Return S, C and D² from κ, by the formulas of the module, for P = ``p`` and R = P − Q = ``r``."""
     z = p * kappa**2
     inverse = 1 / (1 + z) ** 2
     s, c = 4 * kappa * (1 - z) * inverse, (1 - 6 * z + z**2) * inverse
@@ -86,7 +91,7 @@ def functions_of(kappa: Any, p: Any, r: Any) -> tuple[Any, Any, Any]:
 
 
 def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tuple[Any, ...]:
-    """Return the partial derivatives of κ with respect to t, P and R."""
+    """Return the partial derivatives of κ with respect to t, P and R; ``call`` applies a function by its name."""
     z = p * kappa**2
     *_, square = functions_of(kappa, p, r)
     along_t = (1 + z) * square ** Fraction(1, 2) / 4
@@ -96,7 +101,7 @@ def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tupl
 
 
 def value(library: Any, t: Any, p: Any, r: Any) -> Any:
-    """Return κ in the precision of the library: double for `math`, else that of an mpmath context."""
+    """Return κ for t, P and R, in double precision if the library is `math`, else in that of an mpmath context."""
     return _reduced(library, t, p, r)[0]
 
 
@@ -116,7 +121,7 @@ def third(library: Any, t: Any, p: Any, r: Any, n: Any) -> Any:
 
 
 def _reduced(library: Any, t: Any, p: Any, r: Any) -> tuple[Any, Any]:
-    """Return κ, and the number of full turns of the amplitude."""
+    """Return κ for the amplitude φ reduced to −π ≤ φ < π, and the number of full turns that the reduction removed."""
     if p <= 0:
         return t / 4, 0
     root = library.sqrt(p)
@@ -126,7 +131,10 @@ def _reduced(library: Any, t: Any, p: Any, r: Any) -> tuple[Any, Any]:
 
 
 def _amplitude(library: Any, u: Any, k: Any) -> Any:
-    """Return the amplitude of u by the arithmetic–geometric mean; k is the square of the complementary modulus."""
+    """Return Jacobi's amplitude am(u) by the arithmetic–geometric mean.
+
+    ``k`` is the square of the complementary modulus, 1 − modulus².
+    """
     a, b, c = 1 + 0 * u, library.sqrt(k), library.sqrt(1 - k)
     if b == 0:
         return 2 * library.atan(library.tanh(u / 2))
@@ -143,7 +151,10 @@ def _amplitude(library: Any, u: Any, k: Any) -> Any:
 
 
 def _integral(library: Any, t: Any, p: Any, r: Any, carlson_of: Callable[[Any, Any, Any], Any]) -> Any:
-    """Return an integral of S² over t; ``carlson_of`` returns Carlson's integral from C², D² and S²."""
+    """Return an integral from 0 to t whose integrand is S² times a function of S², by a formula of Carlson.
+
+    The integral is S³/3 times an elliptic integral of Carlson, which ``carlson_of`` computes from C², D² and S².
+    """
     if p <= 0:
         return t**3 / 3
     r = min(max(r, 0 * r), p)
@@ -178,9 +189,9 @@ def carlson_third(library: Any, x: Any, y: Any, w: Any) -> Any:
 
 
 def _third_series(a: Any, b: Any, c: Any) -> Any:
-    """Return R_J for arguments close to their mean, in units of the mean to the power -3/2, by a series.
+    """Return Carlson's R_J for arguments close to their mean, by a power series, divided by mean^(−3/2).
 
-    ``a``, ``b`` and ``c`` are relative differences of arguments from the mean.
+    ``a``, ``b`` and ``c`` are the relative differences of the mean from the first three arguments of R_J.
     """
     d = -(a + b + c) / 2
     product, dd = a * b * c, d * d

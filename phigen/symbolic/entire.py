@@ -1,12 +1,12 @@
-"""Entire functions in which flows are written, so that there is no division by a frequency that may be 0.
+"""Entire functions in which exact flows are written, so that no formula divides by a frequency that may be 0.
 
-- ``cosroot``(s) = cos √s, ``sinroot``(s) = sin(√s)/√s: with cosh and sinh for s < 0, one formula for rotations and
-  hyperbolic motions; cosroot² + s·sinroot² = 1
+- ``cosroot``(s) = cos √s, ``sinroot``(s) = sin(√s)/√s, for s < 0 with cosh and sinh. So one formula holds for rotations
+  and for hyperbolic motions. The functions satisfy cosroot² + s·sinroot² = 1
 - ``arcroot``(s) = (√s − sin √s)/√s³
 - ``exprel``(s) = (e^s − 1)/s
 - ``sinroot1``, ``arcroot1`` and ``exprel1`` are the derivatives of sinroot, arcroot and exprel, for tangent maps
 
-They are internal to phigen: a spec cannot use them.
+The functions are internal to phigen: a spec cannot use them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fractions import Fraction
 from itertools import count
 from typing import Any
 
-#: Relative size of terms of series, compared with the first term, below which they are omitted in double precision.
+#: Terms of a power series are omitted in double precision if they are smaller than this fraction of its first term.
 NEGLIGIBLE = 1e-17
 
 _HALF = Fraction(1, 2)
@@ -26,12 +26,12 @@ _HALF = Fraction(1, 2)
 
 @dataclass(frozen=True)
 class Entire:
-    """A function Σ c_n s^n: its coefficients, and the closed form for |s| > ``radius``.
+    """An entire function Σ c_n s^n: its power series for |s| ≤ ``radius``, and a closed form for larger |s|.
 
-    ``closed`` has the forms for s > 0 and for s < 0, or one for both, as functions of a library of functions, s and
-    √|s|. The library is math, an mpmath context, or a printer of formulas. ``known`` is the form for s > 0 in terms of
-    well-known functions. ``slopes`` is the derivative, as in `phigen.symbolic.functions`; None without a derivative.
-    ``meaning`` is the comment in generated code.
+    ``closed`` has one closed form for s > 0 and one for s < 0, or a single one for both signs. Its arguments are a
+    library of functions (math, an mpmath context, or a printer of formulas), s and √|s|. ``known`` is the form for s >
+    0 in terms of well-known functions. ``slopes`` is the derivative, as in `phigen.symbolic.functions`; None if there
+    is none. ``meaning`` is the comment in generated code.
     """
 
     meaning: str
@@ -42,7 +42,7 @@ class Entire:
     radius: float
 
     def terms(self) -> list[Fraction]:
-        """The coefficients that double precision needs for |s| ≤ ``radius``."""
+        """Return the coefficients c_n of the terms that double precision needs for |s| ≤ ``radius``, c_0 first."""
         first = abs(self.coefficient(0))
         n = next(n for n in count(1) if abs(self.coefficient(n)) * self.radius**n < NEGLIGIBLE * first)
         return [self.coefficient(k) for k in range(n)]
@@ -113,7 +113,7 @@ ENTIRE: dict[str, Entire] = {
 
 
 class _Library:
-    """A library of functions that also has those of `ENTIRE`, by their closed forms."""
+    """A library of functions to which the functions of `ENTIRE` are added, computed by their closed forms."""
 
     def __init__(self, library: Any) -> None:
         self._library = library
@@ -123,13 +123,13 @@ class _Library:
 
 
 def by_closed_form(library: Any, name: str, s: Any) -> Any:
-    """Return the value for s that is not small, with functions of a library."""
+    """Return the value of a function of `ENTIRE` by its closed form, which is inaccurate for small s."""
     forms = ENTIRE[name].closed
     return forms[0 if s > 0 else -1](_Library(library), s, library.sqrt(abs(s)))
 
 
 def in_double(name: str, s: float) -> float:
-    """Return the value in double precision, as the generated code computes it."""
+    """Return the value of a function of `ENTIRE` in double precision, computed as generated code does."""
     function = ENTIRE[name]
     if abs(s) > function.radius:
         return float(by_closed_form(math, name, s))
@@ -140,7 +140,7 @@ def in_double(name: str, s: float) -> float:
 
 
 def precisely(context: Any, name: str, s: Any) -> Any:
-    """Return the value in an mpmath context, to its precision except for a few digits."""
+    """Return the value of a function of `ENTIRE` in an mpmath context; its last few digits may be wrong."""
     function = ENTIRE[name]
     if abs(s) > 1:
         return by_closed_form(context, name, s)
@@ -152,5 +152,5 @@ def precisely(context: Any, name: str, s: Any) -> Any:
 
 
 def value(library: Any, name: str, s: Any) -> Any:
-    """Return the value in the precision of the library: double for `math`, else that of an mpmath context."""
+    """Return the value of a function of `ENTIRE`, in double precision if the library is `math`, else in mpmath's."""
     return in_double(name, s) if library is math else precisely(library, name, s)

@@ -20,9 +20,9 @@ op          value                   args
 a function  ``None``                its arguments, see `phigen.symbolic.functions`
 =========== ======================= =====================================
 
-A quotient is a product with a ``pow`` of exponent −1. Names of symbols that phigen makes itself contain a colon
-(``p:x1``, ``h:``), which names in a spec cannot contain, so they never clash with names of the user; see
-`phigen.symbolic.symbols`.
+A quotient is a product with a ``pow`` of exponent −1. Names of symbols that phigen adds contain a colon, such as
+``p:x1`` and ``h:`` (`phigen.symbolic.symbols`). Names in a spec contain no colon, so that they cannot clash with
+symbols of phigen.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from phigen.symbolic.functions import FUNCTIONS
 
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
 
-#: Number of nodes above which walks report progress: they take a tenth of a second or more.
+#: Number of nodes from which on a walk over an expression reports progress, because it takes a tenth of a second.
 MANY = 10_000
 
 Number = int | Fraction
@@ -48,7 +48,7 @@ T = TypeVar("T")
 
 
 class Expression:
-    """A node. Nodes are made by the functions of this module or by operators, never directly."""
+    """A node of the graph of expressions. Nodes are made by the functions of this module and by operators only."""
 
     __slots__ = ("__weakref__", "_digest", "args", "depth", "op", "value")
 
@@ -56,7 +56,7 @@ class Expression:
     args: tuple[Expression, ...]
     value: Any
     depth: int
-    _digest: bytes  # computed on demand; empty before
+    _digest: bytes  # hash of the content; empty until the property `digest` computes it
 
     def __add__(self, other: Expression | Number) -> Expression:
         return add(self, as_expression(other))
@@ -90,7 +90,7 @@ class Expression:
 
     @property
     def is_zero(self) -> bool:
-        """Whether this is the literal number 0; other expressions that would simplify to 0 do not count."""
+        """Whether this is the literal number 0; an expression such as sin² + cos² − 1 is not."""
         return self is ZERO
 
     @property
@@ -124,7 +124,7 @@ class Expression:
 
 
 class _Reference(ref[Expression]):
-    """Weak reference to a node; its finaliser removes the node from the table."""
+    """Weak reference to a node, under ``key`` in the table of all nodes; its finaliser removes the entry."""
 
     __slots__ = ("key",)
 
@@ -140,8 +140,8 @@ def _forget(dead: _Reference, nodes: dict[tuple[Any, ...], _Reference] = _NODES)
 
 
 def _node(op: str, args: tuple[Expression, ...] = (), value: Any = None) -> Expression:
-    # The keys contain plain integers: at interpreter exit, keys of dying nodes are compared when Fraction no longer
-    # works.
+    # The keys contain integers, not fractions: at interpreter exit, keys are still compared when nodes are removed from
+    # the table, and Fraction may not work any more.
     key = (op, (value.numerator, value.denominator) if type(value) is Fraction else value, args)
     weak = _NODES.get(key)
     node = weak() if weak else None
@@ -164,7 +164,7 @@ def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
 
 
 def _ordered(a: Expression, b: Expression) -> tuple[Expression, Expression]:
-    """Return two terms or factors in canonical order, which is the same in every process."""
+    """Return two terms or factors in a fixed order, which is the same in every process."""
     first, second = _place(a), _place(b)
     if first == second:
         first, second = a.digest, b.digest
@@ -177,7 +177,7 @@ def _place(e: Expression) -> Any:
 
 
 def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
-    """Return a node without simplification, for lowering passes that have chosen its form."""
+    """Return a node without simplification, for passes that have chosen the form of the expression for code."""
     return _node(op, args, value)
 
 
@@ -348,15 +348,17 @@ def call(function: str, *args: Expression) -> Expression:
 
 
 def total(terms: Iterable[Expression]) -> Expression:
-    """Return the sum of the terms as a balanced tree, which has less rounding error and more parallelism than a
-    chain."""
+    """Return the sum of the terms as a balanced tree.
+
+    A balanced tree has smaller rounding errors, and allows more parallel instructions, than a chain of additions.
+    """
     return _balanced(add, list(terms), ZERO)
 
 
 def total_at(terms: Mapping[int, Expression]) -> Expression:
     """Return the `total` of a list that has these terms at their positions and 0 elsewhere.
 
-    The tree is the same, without the zeros.
+    The terms are added in the order in which `total` would add them, so that the result does not depend on the zeros.
     """
     items = dict(sorted(terms.items()))
     while len(items) > 1 or any(items):
@@ -385,10 +387,10 @@ def _balanced(
 
 
 def topological(roots: Iterable[Expression], excluded: Container[int] = ()) -> list[Expression]:
-    """Return all nodes below the roots, arguments before the nodes that use them. The order depends on the content
-    only.
+    """Return the roots and all nodes below them; the arguments of a node come before the node.
 
-    Nodes whose ``id`` is in ``excluded`` are left out, with all nodes below them.
+    The order depends only on the expressions, not on addresses in memory. Nodes whose ``id`` is in ``excluded`` are
+    left out, and nodes that only these use.
     """
     order: list[Expression] = []
     visited: set[Expression] = set()
@@ -411,15 +413,16 @@ def topological(roots: Iterable[Expression], excluded: Container[int] = ()) -> l
 
 
 def symbols_of(*roots: Expression) -> list[str]:
-    """Return the names of the symbols below the roots, sorted."""
+    """Return the names of the symbols in the expressions, sorted by `natural_key`."""
     return sorted({e.value for e in topological(roots) if e.op == "symbol"}, key=natural_key)
 
 
 def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T]) -> list[T]:
-    """Return the values of the roots, where ``visit(node, values_of_its_arguments)`` returns the value of a node.
+    """Return the values of the roots, computed from the leaves upwards.
 
-    Every walk over expressions (substitution, evaluation, conversion, printing) is a call of this function. A shared
-    node is visited once.
+    ``visit(node, values)`` returns the value of a node from the list of the values of its arguments. Every node is
+    visited once, even if several nodes use it. Substitution, evaluation, conversion and printing of expressions are
+    calls of this function.
     """
     values: dict[Expression, T] = {}
     for node in _with_progress(topological(roots)):
@@ -428,7 +431,7 @@ def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T])
 
 
 def _with_progress(order: Sequence[Expression]) -> Iterable[Expression]:
-    """Return the nodes as an iterable that reports progress if there are very many."""
+    """Return the nodes as an iterable, which reports progress if there are `MANY` nodes or more."""
     if len(order) < MANY:
         return order
 
@@ -445,7 +448,7 @@ _BUILDERS: dict[str, Callable[..., Expression]] = {"add": add, "sub": sub, "neg"
 
 
 def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
-    """Return the node with other arguments, simplified anew."""
+    """Return the node with its arguments replaced by ``args``; the result is simplified."""
     if not node.args:
         return node
     if node.op == "pow":
@@ -455,7 +458,10 @@ def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
 
 
 def familiar(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with internal functions of phigen replaced by well-known ones, for s > 0 if the sign matters."""
+    """Return the roots with internal functions of phigen replaced by well-known ones, such as cosroot(s) by cos √s.
+
+    If the replacement depends on the sign of an argument, that for positive arguments is taken.
+    """
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         known_values = FUNCTIONS[node.op].known if node.op in FUNCTIONS else None
@@ -468,7 +474,7 @@ def familiar(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def substitute(roots: Sequence[Expression], values: Mapping[str, Expression]) -> list[Expression]:
-    """Return the roots with symbols replaced by ``values``, simultaneously."""
+    """Return the roots with symbols replaced by their ``values``. All symbols are replaced simultaneously."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         if node.op == "symbol":
@@ -515,9 +521,9 @@ def derivatives(roots: Sequence[Expression], name: str) -> list[Expression]:
 
 
 def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> list[dict[str, Expression]]:
-    """Return the nonzero derivatives of each root, by name.
+    """Return for each root its nonzero partial derivatives, by the name of the symbol.
 
-    They are those of `derivatives`, computed in one sweep for all names.
+    The results equal those of `derivatives`; all names are treated in one walk over the expressions.
     """
     variables = frozenset(names)
     slopes: dict[int, dict[str, Expression]] = {}
@@ -529,7 +535,7 @@ def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> lis
         if any(slopes[id(a)] for a in node.args):
             for partial, a in zip(partials(node), node.args, strict=True):
                 for name, d in slopes[id(a)].items():
-                    # the factor is 1 in sums, which are the most frequent nodes
+                    # In sums, the most frequent nodes, the partial derivative is 1, and the product is left out.
                     term = d if partial is ONE else mul(partial, d)
                     row[name] = add(row[name], term) if name in row else term
         slopes[id(node)] = {name: d for name, d in row.items() if not d.is_zero}
@@ -570,7 +576,8 @@ _PRECEDENCE = {"add": 1, "sub": 1, "neg": 1, "mul": 2, "pow": 3}
 def text(e: Expression, longest: int = 2000) -> str:
     """Return the expression in the syntax of a spec; parsing the text yields an equal expression.
 
-    It is for messages: a shared sub-expression is repeated wherever it occurs, and long texts are cut with an ellipsis.
+    The text is for messages: a shared sub-expression is repeated wherever it occurs, and a text of more than
+    ``longest`` characters is cut, with an ellipsis.
     """
 
     def wrap(part: tuple[str, int], level: int) -> str:

@@ -1,7 +1,7 @@
 """The elementary functions: one record for each, with all its properties.
 
-Rules are functions of plain arithmetic. Their argument ``call`` applies a function by its name, so that the same rule
-can be used for expressions, sympy, numbers and elements of a ring.
+Properties that are formulas, such as derivatives, are Python functions that use arithmetic and an argument ``call``,
+which applies a function by its name. So the same formula serves expressions, sympy, numbers and elements of a ring.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from phigen.symbolic.special import SPECIAL
 
 HALF = Fraction(1, 2)
 
-#: Function that applies a function, given by its name, to arguments.
+#: Type of ``call``, which applies a function to arguments: ``call("sin", x)``.
 Call = Callable[..., Any]
 
 
@@ -30,18 +30,19 @@ def _everywhere(*arguments: Fraction) -> bool:
 class Function:
     """A function that may occur in expressions.
 
-    ``slopes(call, f, *arguments)`` are the partial derivatives of the function, with f its value; None if unknown.
+    ``slopes(call, f, *arguments)`` are the partial derivatives, where f is the value of the function; None if unknown.
     ``known(call, *arguments)`` expresses the function by well-known functions. ``value(library, *arguments)`` computes
-    the function with the functions of the library, `math` or an mpmath context; without this rule the library must have
-    a function of the same name. ``at_zero`` is the value at 0, if it is rational. ``defined`` says whether the function
-    has a value at rational arguments, ``rational`` whether its values there are rational. ``cost`` is in units of one
-    addition. An ``own`` function is internal: a spec cannot use it.
+    it with the functions of the library, `math` or an mpmath context; if it is None, the library must have a function
+    of the same name. ``at_zero`` is the value at 0, None if it is not rational. ``parity`` is even or odd, ``inverse``
+    the name of the inverse function. ``defined`` tests whether the function has a value at rational arguments,
+    ``rational`` says whether the value is then rational. ``cost`` is the time of a call in units of one addition. An
+    ``own`` function is internal: a spec cannot use it.
 
     ``written`` maps a language to the spelling of the function: a name, or a text with ``{0}``, ``{1}`` for the
-    arguments. In languages without an entry, the generated file defines the function. ``lanes`` is the spelling in
-    loops over lanes in C, by functions with a vectorised version; for a function that has a vectorised version itself,
-    it is the name. An ``inline`` function is an instruction, or arithmetic. ``near`` says that flows call a polynomial
-    for small arguments. ``letters`` is the name in mathematics.
+    arguments. In languages without an entry, the generated file defines the function. ``lanes`` is the spelling in C
+    loops over SIMD lanes: the name, if the function has a vectorised version, or a formula in such functions.
+    ``inline`` says that the code has no call, only arithmetic or an instruction. ``near`` says that for small arguments
+    flows use a version that is a polynomial. ``letters`` is the name in mathematics.
     """
 
     name: str
@@ -63,12 +64,15 @@ class Function:
     letters: str = ""
 
 
-#: How each language calls a function of its library.
+#: Spelling of the name ``{}`` of a library function in each language.
 _LIBRARIES = {"c": "{}", "numpy": "np.{}", "js": "Math.{}"}
 
 
 def _library(name: str, **other_names: str) -> dict[str, str]:
-    """Return ``written`` for a function in the libraries of all languages; ``other_names`` are by language."""
+    """Return the table ``written`` for a function that the libraries of all languages have.
+
+    ``other_names`` has the names in languages whose library has another name for it.
+    """
     return {language: call.format(other_names.get(language, name)) for language, call in _LIBRARIES.items()}
 
 
@@ -133,7 +137,7 @@ _LISTED = (
         known=lambda call, a: call("log", 1 + a),
         written=_library("log1p"),
     ),
-    Function(  # 1/a for a > 0, else NaN: beyond the pole of a flow there is no solution
+    Function(  # 1/a for a > 0, else NaN: a flow with this factor ends where a reaches 0
         "inv",
         own=True,
         slopes=lambda call, f, a: (-(f**2),),
@@ -148,7 +152,7 @@ _LISTED = (
         },
         inline=True,
     ),
-    Function(  # 1/a for a > 0, else 0: used where its factor vanishes for a ≤ 0
+    Function(  # 1/a for a > 0, else 0; in formulas where the other factor of the product is 0 for a ≤ 0
         "inv0",
         own=True,
         slopes=lambda call, f, a: (-(f**2),),
@@ -316,9 +320,9 @@ _LISTED = (
 
 
 def _phi(order: int) -> Function:
-    """Return the derivative of φ of that order (`phigen.symbolic.special`).
+    """Return the record of the derivative of φ of this order, of φ itself for 0 (`phigen.symbolic.special`).
 
-    Its cost is that of a series of nine terms for small arguments, and a test.
+    The cost is that of small arguments: a series of nine terms, and a test of the argument.
     """
     name, further = SPECIAL[order], SPECIAL[order + 1 : order + 2]
     return Function(
@@ -334,7 +338,7 @@ def _phi(order: int) -> Function:
 
 
 def _entire(name: str) -> Function:
-    """Return the record of a function of `phigen.symbolic.entire`; for small arguments it is a series."""
+    """Return the record of a function of `phigen.symbolic.entire`, for small arguments computed by a power series."""
     series = ENTIRE[name]
     return Function(
         name,
@@ -352,7 +356,7 @@ def _entire(name: str) -> Function:
 FUNCTIONS: dict[str, Function] = {f.name: f for f in _LISTED}
 FUNCTIONS |= {name: _phi(order) for order, name in enumerate(SPECIAL)}
 FUNCTIONS |= {name: _entire(name) for name in ENTIRE}
-FUNCTIONS[universal.ANOMALY] = Function(  # for Kepler motions, by an iteration; see `phigen.symbolic.universal`
+FUNCTIONS[universal.ANOMALY] = Function(  # for Kepler motions, computed by iteration; see `phigen.symbolic.universal`
     universal.ANOMALY,
     arity=6,
     own=True,
@@ -362,7 +366,7 @@ FUNCTIONS[universal.ANOMALY] = Function(  # for Kepler motions, by an iteration;
     cost=120,
     near=True,
 )
-#: Functions for free rigid bodies, by elliptic functions; see `phigen.symbolic.elliptic`.
+#: Elliptic functions, in which the motion of free rigid bodies is written; see `phigen.symbolic.elliptic`.
 FUNCTIONS |= {
     name: Function(
         name,
@@ -376,7 +380,7 @@ FUNCTIONS |= {
     for name, value in zip(elliptic.ELLIPTIC, (elliptic.value, elliptic.squares, elliptic.ratios), strict=True)
 }
 FUNCTIONS[elliptic.THIRD] = Function(elliptic.THIRD, arity=4, own=True, value=elliptic.third, cost=160)
-#: Functions for exponentials of matrices; see `phigen.symbolic.remainders`.
+#: Functions in which exponentials of matrices are written; see `phigen.symbolic.remainders`.
 FUNCTIONS |= {
     name: Function(
         name,
@@ -391,11 +395,11 @@ FUNCTIONS |= {
     for k, name in enumerate(names)
 }
 
-#: Powers with exponents ½ and ⅓ as functions: languages have them, expressions do not.
+#: Powers with the exponents ½ and ⅓, which expressions write as powers, and languages as functions.
 ROOTS = {"sqrt": _library("sqrt"), "cbrt": _library("cbrt")}
 
 
 def written_in(language: str) -> dict[str, str]:
-    """Return the spelling of functions and roots in a language, without those that a generated file defines."""
+    """Return the spelling of functions and roots in a language, for those that the generated file does not define."""
     spellings = {f.name: f.written[language] for f in FUNCTIONS.values() if language in f.written}
     return spellings | {name: forms[language] for name, forms in ROOTS.items()}

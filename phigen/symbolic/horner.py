@@ -1,4 +1,4 @@
-"""Greedy nested Horner form: an expression with few operations from a sparse polynomial."""
+"""Nested Horner form of sparse polynomials in several variables, chosen greedily for few operations."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from phigen.symbolic.expression import ZERO, Expression, power, product, total
 
 Monomial = tuple[int, ...]
-#: The variables of a monomial, by index, with their exponents. In large systems a monomial contains few variables.
+#: A monomial as pairs (index of a variable, exponent) of the variables that it contains; few, even in large systems.
 Powers = tuple[tuple[int, int], ...]
 
 
 def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]) -> Expression:
     """Return Σ coefficient · Π variables[i]**exponent[i] as a nested expression.
 
-    At each level the power that divides the most terms is factored out. Even polynomials become polynomials in the
-    squares of the variables, since the least exponent among the terms that share a variable is factored out, and
-    squares are shared nodes. The result depends on the terms only, not on their order.
+    ``terms`` maps the exponents of a monomial to its coefficient.
+    At each level, the variable that occurs in the most terms is factored out of them, with the smallest exponent that
+    it has there. So even polynomials become polynomials in the squares of the variables, and each square is computed
+    once. The result depends on the terms only, not on their order.
     """
     return sparse_horner({_powers(m): c for m, c in terms.items()}, variables)
 
 
 def sparse_horner(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """Return `horner` for monomials that list only the variables that they contain, in the order of the indices."""
+    """Return the result of `horner` for terms whose monomials are `Powers`, sorted by the index of the variable."""
     left = {m: c for m, c in terms.items() if not c.is_zero}
     return _nested(left, variables) if left else ZERO
 
@@ -33,7 +34,7 @@ def _powers(monomial: Monomial) -> Powers:
 
 
 def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """Return `horner` of nonzero terms."""
+    """Return the result of `sparse_horner` for terms with nonzero coefficients, of which there is at least one."""
     if len(terms) == 1:
         ((monomial, coefficient),) = terms.items()
         return coefficient * _monomial(monomial, variables)
@@ -57,7 +58,7 @@ def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression])
 
 
 def _common(terms: Iterable[Powers]) -> dict[int, int]:
-    """Return the powers that divide all terms, by variable."""
+    """Return the greatest common divisor of monomials: the exponents by the index of the variable."""
     first, *remaining = terms
     common = dict(first)
     for m in remaining:
@@ -69,8 +70,10 @@ def _common(terms: Iterable[Powers]) -> dict[int, int]:
 
 
 def _graded(monomial: Powers) -> tuple[int, list[tuple[int, int]]]:
-    """Return a sort key for monomials: by degree, then by the exponents of the first variables that differ, larger
-    ones first."""
+    """Return a sort key for monomials: by total degree, then by the exponents of the first variable that differs.
+
+    The monomial with the larger exponent of this variable comes first.
+    """
     return sum(e for _, e in monomial), [(i, -e) for i, e in monomial]
 
 

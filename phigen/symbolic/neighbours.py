@@ -1,8 +1,8 @@
 """Symbols of values at sites of a lattice, with an offset: ``x[i+1]``, ``x[i-1,j+2]``, ``x[a]``.
 
-On a grid the offset consists of steps along axes, in the order of the axes, without zeros; ``x`` alone is x at the site
-itself. On lattices without axes the offset is an end, a or b, of a bond or a pair. The symbols are ordinary symbols;
-names in a spec contain no brackets, so they cannot be confused.
+On a grid the offset consists of nonzero steps along axes, in the order of the axes; ``x`` alone is x at the site
+itself. On lattices without axes the offset is an end, a or b, of a bond or a pair. The text with brackets is the name
+of an ordinary symbol. Names that a spec declares contain no brackets, so that they cannot clash with it.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import Symbol
 
-#: Offset of a site from another site: steps along the axes of a grid, or an end, ``("a",)`` or ``("b",)``, of a bond or
-#: a pair; ``()`` is the site itself on lattices without axes.
+#: Offset of a site from another site. On a grid: steps along the axes. On lattices without axes: ``("a",)`` or
+#: ``("b",)`` for an end of a bond or a pair, ``()`` for the site itself.
 Offset = tuple[int, ...] | tuple[str, ...]
-#: The name of a field or other value at sites, and the offset of the site.
+#: The name of a field, or of another quantity with a value at every site, and the offset of the site.
 Place = tuple[str, Offset]
 ENDS = ("a", "b")
 
@@ -27,18 +27,21 @@ _STEP = re.compile(r"(?P<axis>.+?)(?P<step>[+-][0-9]+)")
 
 @dataclass(frozen=True)
 class Neighbours:
-    """The symbols of a lattice: ``names`` have a value at every site, ``axes`` are the directions of a grid."""
+    """The symbols of values at sites of a lattice.
+
+    ``names`` are the quantities with a value at every site, ``axes`` the directions of a grid; () without a grid.
+    """
 
     names: tuple[str, ...]
     axes: tuple[str, ...] = ()
 
     @property
     def origin(self) -> Offset:
-        """The offset of the site itself."""
+        """Offset of the site itself: zero steps along all axes."""
         return (0,) * len(self.axes)
 
     def at(self, name: str, offset: Offset) -> str:
-        """Return the symbol of a name at an offset."""
+        """Return the name of the symbol for the quantity ``name`` at an offset, such as ``x[i+1]``."""
         if self.axes:
             index = [f"{a}{o:+d}" for a, o in zip(self.axes, steps(offset), strict=True) if o]
         else:
@@ -69,11 +72,11 @@ class Neighbours:
         return base, tuple(offsets.values())
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
-        """Return all symbols of the expressions that have a value at sites, with their places."""
+        """Return those symbols in the expressions that are values at sites, each with its name and its offset."""
         return {n: self.place(n) for n in symbols_of(*expressions) if n.partition("[")[0] in self.names}
 
     def shifted(self, expressions: Sequence[Expression], offset: Offset) -> list[Expression]:
-        """Return the expressions translated by an offset of a grid."""
+        """Return the expressions of one site, written for the site at an offset on a grid: x[i+1] becomes x[i+2]."""
         if not any(offset):
             return list(expressions)
         shifted_symbols = {
@@ -82,21 +85,21 @@ class Neighbours:
         return substitute(expressions, shifted_symbols)
 
     def on(self, expression: Expression, end: str) -> Expression:
-        """Return an expression of one site, written for the site at an ``end`` of a bond or a pair."""
+        """Return an expression of one site, written for the site at an ``end`` of a bond or a pair: x becomes x[a]."""
         symbols_at_end = {name: symbol(self.at(base, (end,))) for name, (base, _) in self.places(expression).items()}
         return substitute([expression], symbols_at_end)[0]
 
 
 def steps(offset: Offset) -> tuple[int, ...]:
-    """Return an offset of a grid as integers, one for each axis."""
+    """Return an offset on a grid as a tuple of integers, one for each axis."""
     return tuple(int(o) for o in offset)
 
 
 def plus(a: Offset, b: Offset) -> tuple[int, ...]:
-    """Return the sum of two offsets of a grid."""
+    """Return the sum of two offsets on a grid."""
     return tuple(x + y for x, y in zip(steps(a), steps(b), strict=True))
 
 
 def minus(a: Offset) -> tuple[int, ...]:
-    """Return the opposite offset, −a."""
+    """Return the opposite −a of an offset on a grid."""
     return tuple(-o for o in steps(a))

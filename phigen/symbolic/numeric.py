@@ -22,7 +22,7 @@ class DomainError(ArithmeticError):
 
 
 def is_rational(*roots: Expression) -> bool:
-    """Whether rational values of the symbols lead to rational values of the roots, wherever these are defined."""
+    """Whether the expressions have rational values, where they are defined, for all rational values of the symbols."""
     return all(
         node.op in _RATIONAL or (node.op == "pow" and node.value.denominator == 1) for node in topological(roots)
     )
@@ -38,13 +38,13 @@ def evaluate(roots: Sequence[Expression], values: Mapping[str, float]) -> list[f
 
 
 def evaluate_exactly(roots: Sequence[Expression], values: Mapping[str, Fraction]) -> list[Fraction]:
-    """Return the exact values of roots for which `is_rational` holds. Raises the errors of `evaluate`."""
+    """Return the exact values of expressions for which `is_rational` is true. Raises the errors of `evaluate`."""
     exact = {name: Fraction(v) for name, v in values.items()}
     return _guarded(lambda: Numbers(exact, Fraction, None, _exact_power).values(roots))
 
 
 def evaluate_precisely(roots: Sequence[Expression], values: Mapping[str, Fraction], digits: int = 50) -> list[Any]:
-    """Return the values of the roots as mpmath numbers with that many digits. Raises the errors of `evaluate`.
+    """Return the values of the roots as mpmath numbers with ``digits`` decimal digits. Raises the errors of `evaluate`.
 
     The global precision of mpmath is not changed.
     """
@@ -54,10 +54,10 @@ def evaluate_precisely(roots: Sequence[Expression], values: Mapping[str, Fractio
 def evaluate_with_scale(
     roots: Sequence[Expression], values: Mapping[str, Fraction], digits: int = 50
 ) -> list[tuple[Any, Any]]:
-    """Return pairs (value, scale) of mpmath numbers.
+    """Return for each root a pair (value, scale) of mpmath numbers, computed with ``digits`` decimal digits.
 
-    The scale is the largest magnitude of a node below the root, at least 1. A value far below its scale may be rounding
-    error only.
+    The scale is the largest absolute value of an intermediate result, at least 1. A value far below its scale may be
+    nothing but rounding error.
     """
     context = _mpmath_context(digits)
 
@@ -107,10 +107,9 @@ def _mpmath_context(digits: int) -> Any:
 
 
 class Numbers(Arithmetic[Any]):
-    """Arithmetic of numbers of one kind, made by ``convert``, with the functions of ``library`` (math or an mpmath
-    context).
+    """Arithmetic of numbers of one kind: floats, fractions or mpmath numbers. ``convert`` makes them of fractions.
 
-    Without a library, only rational operations are possible.
+    ``library`` has the elementary functions, math or an mpmath context; None allows rational operations only.
     """
 
     def __init__(
@@ -123,11 +122,11 @@ class Numbers(Arithmetic[Any]):
         self._values, self._convert, self._library, self._power = values, convert, library, power
 
     def constant(self, value: Fraction) -> Any:
-        """Return the number for a rational number."""
+        """Return a rational number, converted to this kind of number."""
         return self._convert(value)
 
     def variable(self, name: str) -> Any:
-        """Return the number of a symbol."""
+        """Return the value of the symbol ``name``."""
         return self._values[name]
 
     def power(self, base: Any, exponent: Fraction) -> Any:
@@ -135,7 +134,7 @@ class Numbers(Arithmetic[Any]):
         return self._power(base, exponent)
 
     def function(self, name: str, args: list[Any]) -> Any:
-        """Return the value of a function, by the library or by the function's own rule."""
+        """Return the value of a function, by the formula in its record if there is one, else by the library."""
         if name in ("pi", "E"):
             return +getattr(self._expected(name), name.lower())
         if name == "power":

@@ -23,13 +23,13 @@ from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import MOMENTUM, Symbol, kind_of, plain
 from phigen.symbolic.tower import Poly, Tower, rational
 
-#: Number of terms of a formula that are shown by default.
+#: Default for the largest number of terms of a formula that are displayed; the other terms become an ellipsis.
 SHOWN = 8
 
-#: Names of φ and its derivatives for readers, as text.
+#: Names of φ and its derivatives in displayed formulas.
 _GREEK = {name: FUNCTIONS[name].letters.replace("′", "'").replace("″", "''") for name in SPECIAL}
 
-#: The internal functions in which flows are written, in terms of well-known functions.
+#: Definitions of the internal functions in which flows are written, displayed below formulas that contain them.
 UNFAMILIAR = {
     "cosroot": "cosroot(s) = cos √s",
     "sinroot": "sinroot(s) = sin(√s)/√s",
@@ -49,18 +49,20 @@ UNFAMILIAR = {
 #: Largest number of characters of a formula in a message.
 LONGEST = 160
 
-#: Largest number of nodes of a formula that is expanded in search of a shorter form.
+#: Largest number of nodes of a formula that is multiplied out, to see whether the result is shorter.
 _LARGE = 400
 
 
-#: A product of factors (base, exponent), with positive or negative rational exponents.
+#: A product of powers, as pairs (base, exponent) with rational exponents of either sign.
 Monomial = tuple[tuple[Expression, Fraction], ...]
 
 
 @dataclass(frozen=True)
 class Formula:
-    """A sum of ``terms`` (coefficient, monomial), divided by ``divisor``; ``hidden`` is the number of terms that are
-    left out."""
+    """A sum of ``terms``, pairs (coefficient, monomial), divided by ``divisor``, for display.
+
+    ``hidden`` is the number of further terms, which are replaced by an ellipsis.
+    """
 
     divisor: int
     terms: tuple[tuple[Fraction, Monomial], ...]
@@ -68,7 +70,7 @@ class Formula:
 
     @property
     def size(self) -> int:
-        """Number of terms, including hidden ones."""
+        """Number of terms, those that are not displayed included."""
         return len(self.terms) + self.hidden
 
     def __str__(self) -> str:
@@ -83,7 +85,7 @@ class Formula:
 
 
 def signed_sum(terms: Iterable[tuple[bool, str]]) -> str:
-    """Return terms joined by their signs; each is a pair of whether it is negative, and its text."""
+    """Return the text of a sum. A term is a pair: whether it is negative, and the text of its absolute value."""
     printed_sum = "".join(f" {'-' if negative else '+'} {body}" for negative, body in terms)
     return printed_sum[3:] if printed_sum.startswith(" + ") else f"-{printed_sum[3:]}"
 
@@ -97,9 +99,9 @@ def _term(coefficient: Fraction, monomial: str) -> str:
 def of_polynomial(
     tower: Tower, element: Poly, max_terms: int | None = SHOWN, small_symbols: Collection[str] = ()
 ) -> Formula:
-    """Return the formula of an element of a tower; ``max_terms`` bounds the terms shown, None shows all.
+    """Return the formula of an element of a tower; ``max_terms`` is the number of terms to display, None for all.
 
-    If terms are left out, those of the lowest degree in the ``small_symbols`` come first, and are shown.
+    If there are more terms, those of the lowest total degree in the ``small_symbols`` are displayed.
     """
     terms = [(rational(c), tuple(int(e) for e in m)) for m, c in element.to_dict().items()]
     divisor = lcm(*(c.denominator for c, _ in terms)) if terms else 1
@@ -117,9 +119,10 @@ def of_polynomial(
 def readable(
     expressions: Sequence[Expression], max_terms: int | None = SHOWN, small_symbols: Collection[str] = ()
 ) -> list[str]:
-    """Return the expressions as text, expanded if that is shorter; covectors are written ``p_NAME``.
+    """Return the expressions as text, multiplied out if that is shorter; covectors are written ``p_NAME``.
 
-    If terms are left out, covectors and the symbols in ``small_symbols`` count as small; see `of_polynomial`.
+    Of an expression with more than ``max_terms`` terms, those of the lowest degree in covectors and ``small_symbols``
+    are displayed.
     """
     covectors = (name for name in symbols_of(*expressions) if kind_of(name) == MOMENTUM)
     renamed = with_plain_names(expressions)
@@ -133,9 +136,9 @@ def _written(e: Expression) -> str:
 
 
 def infix(e: Expression) -> str:
-    """Return the expression as text of any length, with no more parentheses than mathematics needs.
+    """Return the expression as text of any length, with as few parentheses as possible.
 
-    Unlike `text`, it does not preserve the tree of the expression.
+    Parsing the result gives an equal expression, but possibly another tree, unlike for the function `text`.
     """
 
     def wrap(part: tuple[str, int], level: int) -> str:
@@ -179,28 +182,27 @@ def infix(e: Expression) -> str:
 
 
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
-    """Return the expressions with symbols of phigen replaced by their `plain` names."""
+    """Return the expressions with symbols that phigen added replaced by their names for display (`plain`)."""
     internal = [n for n in symbols_of(*expressions) if isinstance(n, Symbol)]
     return substitute(expressions, {n: symbol(plain(n)) for n in internal})
 
 
 def shortened(expression: Expression) -> str:
-    """Return the expression as text of bounded length, for messages."""
+    """Return the expression as text of at most `LONGEST` characters, for messages."""
     return cut(readable([expression])[0])
 
 
 def cut(text: str) -> str:
-    """Return a text cut to a bounded length, for messages."""
+    """Return a text, cut with an ellipsis to at most `LONGEST` characters, for messages."""
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 
 
 def expanded(
     expressions: Sequence[Expression], max_terms: int | None, small_symbols: Collection[str] = ()
 ) -> Iterator[Formula | None]:
-    """Yield the expressions multiplied out, with common factors cancelled and ``max_terms`` terms shown; see
-    `readable`.
+    """Yield for each expression its formula, multiplied out, with common factors of fractions cancelled.
 
-    None is yielded for expressions that are too large.
+    None is yielded for an expression that is too large. ``max_terms`` and ``small_symbols`` are those of `readable`.
     """
     for e in expressions:
         if len(topological([e])) > _LARGE:
@@ -211,9 +213,9 @@ def expanded(
 
 
 def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monomial:
-    """Return the factors of a monomial in the order of the variables.
+    """Return a monomial as pairs (base, exponent), in the order of the variables.
 
-    For a variable that is itself a power, the factor is its base.
+    A variable that is itself a power, such as 1/r, is replaced by its base, and the exponent is adapted.
     """
     factors = []
     for variable, k in zip(variables, exponents, strict=False):
@@ -225,7 +227,7 @@ def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monom
 
 
 def _monomial(factors: Monomial) -> str:
-    """Return a product as text, with negative powers in one denominator."""
+    """Return a product of powers as text; all powers with negative exponents are in one denominator."""
     numerator = [_atom(power(b, e)) for b, e in factors if e > 0]
     denominator = [_atom(power(b, -e)) for b, e in factors if e < 0]
     top = "*".join(numerator) or "1"

@@ -1,15 +1,17 @@
-"""Exponentials of matrices with at most four rows, by the theorem of Cayley and Hamilton: e^{tA} = 1 + Σ F_k A^k for k
-< 4.
+"""Exponentials of matrices with at most four rows, by the theorem of Cayley and Hamilton: e^{tA} is 1 + Σ F_k A^k,
+where k < 4.
 
 If A⁴ = a_0 + a_1 A + a_2 A² + a_3 A³, the remainder of e^{tx} on division by p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0 is
-1 + Σ F_k x^k. `REMAINDERS` are the F_k, functions of t, a_0, …, a_3; for matrices with three rows a_0 = 0. The
-functions are entire: eigenvalues, which may be complex or equal, do not occur. Let g = Σ G_k x^k be the remainder of
-the quotient (e^{tx} − 1 − Σ F_k x^k)/p on division by p, with the coefficients `QUOTIENTS`. Then
+1 + Σ F_k x^k. `REMAINDERS` are the names of F_0, …, F_3, functions of t, a_0, …, a_3. For matrices with three rows,
+a_0 = 0. The functions are entire: eigenvalues, which may be complex or equal, do not occur. The quotient of the
+division, (e^{tx} − 1 − Σ F_k x^k)/p, has a remainder g = Σ G_k x^k on division by p; `QUOTIENTS` are the names of the
+G_k. The derivatives of the F_k are
 
-    ∂F_k/∂t = F_{k−1} + a_k F_3 (with F_{−1} = 0, and F_0 + 1 for F_0),   Σ ∂F_k/∂a_j x^k = x^j g mod p.
+    ∂F_k/∂t = F_{k−1} + a_k F_3 (for k = 1, F_0 + 1 replaces F_0; F_{−1} = 0),   Σ_k (∂F_k/∂a_j) x^k = x^j g mod p.
 
-For the computation, t is halved until the roots of p in y = ux are small, where u is the halved t. Remainders of powers
-of y satisfy a recurrence, and their sums are those of e^y. Squares modulo p lead back to t: (1 + F)² − 1 = 2F + F².
+For the computation, t is halved n times, u = t/2ⁿ, until p has only small roots as a polynomial in y = ux. The
+remainders of the powers of y satisfy a recurrence, and summing them gives the remainder of e^y. Then n squarings modulo
+p lead from u to t: if 1 + F is the remainder for u, the remainder for 2u is (1 + F)² = 1 + 2F + F².
 """
 
 from __future__ import annotations
@@ -18,24 +20,25 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-#: Names of the functions; their arguments are t, a_0, …, a_3.
+#: Names, in expressions, of F_0, …, F_3; below, of G_0, …, G_3. Their arguments are t, a_0, …, a_3.
 REMAINDERS = tuple(f"exprem{k}" for k in range(4))
 QUOTIENTS = tuple(f"expquo{k}" for k in range(4))
 
-#: Largest bound of the roots after halving, for the series of e^y, and number of its terms: the omitted ones are below
-#: 10⁻¹⁷.
+#: Largest bound of the roots of p at which halving t ends, and number of terms of the series of e^y that are then
+#: summed: the omitted terms are below 10⁻¹⁷.
 MAX_ROOT, TERMS = 0.25, 18
 
-#: Number of doublings in code without branches: the bound of the roots for t is then four times `MAX_ROOT`.
+#: Number of halvings and doublings in SIMD code, which has no branches. Two of them allow roots up to 4 `MAX_ROOT`.
 LANE_DOUBLINGS = 2
 
 
 def slopes(k: int) -> Callable[..., tuple[Any, ...]]:
-    """Return the rule for the partial derivatives of F_k with respect to t, a_0, …, a_3."""
+    """Return the function ``slopes`` of the record of F_k: its partial derivatives with respect to t, a_0, …, a_3."""
 
     def rule(call: Callable[..., Any], f: Any, t: Any, *a: Any) -> tuple[Any, ...]:
         last = call(REMAINDERS[3], t, *a)
-        vanishing = k == 0 or (k == 1 and getattr(a[0], "is_zero", a[0] == 0))  # F_0 is 0 if a_0 is 0
+        # whether F_{k−1} = 0: F_{−1} is 0, and F_0 is 0 if a_0 is 0
+        vanishing = k == 0 or (k == 1 and getattr(a[0], "is_zero", a[0] == 0))
         previous = 0 if vanishing else call(REMAINDERS[k - 1], t, *a)
         slope = (previous + 1 if k == 1 else previous) + a[k] * last
         quotient = [call(name, t, *a) for name in QUOTIENTS]
@@ -49,23 +52,23 @@ def slopes(k: int) -> Callable[..., tuple[Any, ...]]:
 
 
 def times_x(coefficients: Any, a: Any) -> list[Any]:
-    """Return x times a polynomial of degree 3 modulo p."""
+    """Return the product of x and a polynomial of degree 3, modulo p; lists of coefficients begin with the constant."""
     *lower, top = coefficients
     return [c * top + e for c, e in zip(a, [0, *lower], strict=True)]
 
 
 def value(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """Return F_k in the precision of the library: double for `math`, else that of an mpmath context."""
+    """Return F_k for t and a_0, …, a_3, in double precision if the library is `math`, else in that of mpmath."""
     return _coefficients(library, t, a)[0][k]
 
 
 def quotient(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """Return the coefficient G_k of the quotient g, in the precision of the library as for `value`."""
+    """Return G_k for t and a_0, …, a_3, in double precision if the library is `math`, else in that of mpmath."""
     return _coefficients(library, t, a)[1][k]
 
 
 def _coefficients(library: Any, t: Any, a: Any) -> tuple[list[Any], list[Any]]:
-    """Return the F_k and the G_k."""
+    """Return the lists of all F_k and of all G_k, in the precision of the library."""
     root_bound = max(abs(c * t ** (4 - j)) ** (1 / (4 - j) + 0 * t) for j, c in enumerate(a))
     halvings = 0
     while root_bound > MAX_ROOT:
@@ -89,7 +92,7 @@ def _coefficients(library: Any, t: Any, a: Any) -> tuple[list[Any], list[Any]]:
 
 
 def _product(a: Any, b: Any) -> list[Any]:
-    """Return the product of two polynomials of degree 3."""
+    """Return the product of two polynomials of degree 3, as its seven coefficients, the constant first."""
     return [sum(a[i] * b[n - i] for i in range(max(0, n - 3), min(n, 3) + 1)) for n in range(7)]
 
 

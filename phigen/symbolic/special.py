@@ -17,16 +17,16 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-#: φ, φ', φ''; further derivatives are not available.
+#: Names, in expressions, of φ, φ' and φ''. Higher derivatives are not available.
 SPECIAL = ("phi0", "phi1", "phi2")
 
-#: Magnitudes of s that separate three methods: below NEAR the power series; below MIDDLE the nearest pole and a series
-#: of the rest; above it the closed form.
+#: Bounds of |s| between three methods. Below NEAR, φ is a power series; from NEAR to MIDDLE, its nearest pole plus a
+#: power series; from MIDDLE on, the closed form.
 NEAR, MIDDLE = 0.25, 16.0
 NEAR_TERMS, MIDDLE_TERMS = 9, 21
 POLE = 4 * math.pi**2
 
-#: Largest magnitude of s for the power series in code without branches, and its number of terms.
+#: Largest |s| for which SIMD code, which has no branches, uses the power series, and number of its terms there.
 LANE_REACH, LANE_TERMS = 4.0, 17
 
 _PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923078164062862089986, 10**82)
@@ -40,7 +40,7 @@ def _series(n: int) -> Fraction:
 
 
 def order_of(name: str) -> int:
-    """Return the order of the derivative of φ that a name of `SPECIAL` stands for."""
+    """Return the order, 0, 1 or 2, of the derivative of φ with this name in expressions."""
     return SPECIAL.index(name)
 
 
@@ -61,7 +61,10 @@ def lane_coefficients(order: int) -> list[float]:
 
 @cache
 def rest_coefficients(order: int) -> list[float]:
-    """Return Taylor coefficients, for |s| < `MIDDLE`, of φ^(order) minus its pole 2·order!/(4π² − s)^{order+1}."""
+    """Return the Taylor coefficients of φ^(order) without its nearest pole, for |s| < `MIDDLE`, the constant first.
+
+    The function is φ^(order)(s) − 2·order!/(4π² − s)^{order+1}.
+    """
     differences = []
     for n in range(MIDDLE_TERMS):
         factor = math.factorial(n + order) // math.factorial(n)
@@ -81,7 +84,7 @@ def in_double(order: int, s: float) -> float:
 
 
 def precisely(context: Any, order: int, s: Any) -> Any:
-    """Return the value in an mpmath context, to its precision except for two digits."""
+    """Return φ^(order)(s) in an mpmath context; the last two digits may be wrong."""
     if abs(s) < 1:
         terms = int(context.dps / 1.5) + 6  # a_n decreases like (4π²)^{−n}
         value = context.zero
@@ -94,12 +97,15 @@ def precisely(context: Any, order: int, s: Any) -> Any:
 
 
 def value(library: Any, order: int, s: Any) -> Any:
-    """Return the value in the precision of the library: double for `math`, else that of an mpmath context."""
+    """Return φ^(order)(s), in double precision if the library is `math`, else in that of an mpmath context."""
     return in_double(order, s) if library is math else precisely(library, order, s)
 
 
 def _closed(order: int, s: Any, c: Any) -> Any:
-    """Return the value from c = w cot w (w coth w for s < 0), by the Riccati equation."""
+    """Return φ^(order)(s) from c = w cot w with w = √s/2, or c = w coth w with w = √−s/2 for s < 0.
+
+    φ is (1 − c)/s; its derivatives follow from the Riccati equation.
+    """
     phi0 = (1 - c) / s
     if order == 0:
         return phi0

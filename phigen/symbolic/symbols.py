@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from typing import Any
 
-#: Kinds of symbols that several modules distinguish. A kind without keys has only one symbol, such as the step size.
+#: Kinds of symbols that phigen adds: momentum (covector), variation, cotangent, initial value, gauge of a Casimir. The
+#: other symbols of a kind differ by a key, such as the name of a coordinate.
 MOMENTUM, VARIATION, COTANGENT, INITIAL, GAUGE = "p", "v", "bar", "x0", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
-#: Kind of the entries of exp(tA) − 1, by the matrix and the place; they are coefficients.
+#: Kind of the entries of exp(tA) − 1 for a constant matrix A. The key is the number of the matrix, row and column.
 EXPONENTIAL = "exponential"
 TEMPORARY, WORK, PART = "t", "w", "part"
-#: Kinds for lattices. GATHERED: contribution of bonds or pairs to a component of the gradient at a site. PRESENT: 1 if
-#: a term reaches beyond no open end, else 0. CHOSEN: 1 at sites of the colour that a part of a graph belongs to, else
-#: 0. BEGINS: 1 if the site at an offset has a colour, and lies on the side of a seam that a sweep is for, else 0.
+#: Kinds of symbols for lattices. GATHERED: sum over the bonds or pairs of a site that enters a component of the
+#: gradient. The others are 1 or 0. PRESENT: 1 if no site that a term reads lies beyond an open end. CHOSEN: 1 if a site
+#: of a graph has the colour whose flow is applied. BEGINS: 1 if the site at an offset has the colour, and lies on the
+#: side of a boundary seam, for which the flow is applied.
 GATHERED, PRESENT, CHOSEN, BEGINS = "gathered", "present", "chosen", "begins"
-#: Inputs of transposed kernels of lattices: cotangents of the changes of fields at a neighbour, by the number of the
-#: field and the offset; cotangents of sums over bonds or pairs, at the site and at the partner.
+#: Kinds of inputs of transposed functions of lattices. AROUND: cotangent of the change of a field at a neighbour; the
+#: key is the number of the field and the offset. HERE and THERE: cotangents of a sum over bonds or pairs, at the site
+#: itself and at the other site of the bond or pair.
 AROUND, HERE, THERE = "change_bar_around", "sums_bar", "sums_bar_there"
 
 
 class Symbol(str):
-    """A name that phigen adds, of a kind and with a key that distinguishes it from others of the kind.
+    """Name of a symbol that phigen adds. It has a kind, and a key that distinguishes symbols of the same kind.
 
-    Its text, such as ``p:x1``, ``c:3`` or ``h:``, is for sorting and display; it is never parsed. Names of a spec
-    cannot contain a colon, so they never clash with it.
+    The text of a symbol, such as ``p:x1``, ``c:3`` or ``h:``, is for sorting and display; it is never parsed. Names in
+    a spec contain no colon, so that they cannot clash with symbols of phigen.
     """
 
     __slots__ = ("key", "kind")
@@ -44,20 +47,20 @@ class Symbol(str):
 #: Σ p_i E_i.
 STEP, ELAPSED, MATRIX = Symbol("h"), Symbol("time"), Symbol("P")
 
-#: Kind of the increments of the Wiener processes in a step, by the number of the source.
+#: Kind of the increment of a Wiener process in a step; the key is the number of the source of noise.
 INCREMENT = "dw"
 
-#: Symbol of the energy level e = −H(x₀), which a monitored step holds fixed.
+#: Symbol of the energy level e = −H(x₀), a constant in the equations of systems with a monitor.
 LEVEL = Symbol("e")
 
 
 def momentum(name: str) -> Symbol:
-    """Return the symbol of the covector component that belongs to a coordinate."""
+    """Return the symbol of the momentum (component of a covector) that belongs to the coordinate ``name``."""
     return Symbol(MOMENTUM, name)
 
 
 def increment(k: int) -> Symbol:
-    """Return the symbol of the increment of noise source ``k`` in a step."""
+    """Return the symbol of the increment, in a step, of the Wiener process of noise source ``k``."""
     return Symbol(INCREMENT, k)
 
 
@@ -67,7 +70,7 @@ def initial(name: str) -> Symbol:
 
 
 def variation(name: str) -> Symbol:
-    """Return the symbol of the variation of a coordinate."""
+    """Return the symbol of the variation of a coordinate, a component of a tangent vector."""
     return Symbol(VARIATION, name)
 
 
@@ -77,20 +80,19 @@ def cotangent(name: str) -> Symbol:
 
 
 def coefficient(k: int) -> Symbol:
-    """Return the symbol of a value that does not depend on the state."""
+    """Return the symbol of coefficient ``k``, a value that depends on parameters and step, but not on the state."""
     return Symbol(COEFFICIENT, k)
 
 
 def kind_of(name: str) -> str | None:
-    """Return the kind of a symbol that phigen added; None for a name of the user."""
+    """Return the kind of a symbol that phigen added; None for a name that the spec declares."""
     return name.kind if isinstance(name, Symbol) else None
 
 
 def plain(name: str) -> str:
-    """Return a name for display: ``p_x1`` for the momentum of x1, as in specs, λ_C for the gauge of C, ``h`` for the
-    step.
+    """Return the name of a symbol for display: ``p_x1`` for the momentum of x1, λ_C for the gauge of the Casimir C.
 
-    Shared sub-expressions are called σ_1, σ_2, …
+    Named parts of long expressions are called σ_1, σ_2, … Names that a spec declares are unchanged.
     """
     if not isinstance(name, Symbol):
         return name

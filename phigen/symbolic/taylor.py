@@ -1,9 +1,9 @@
-"""Truncated power series in t of a composed expression, level by level.
+"""Truncated power series in t of an expression whose symbols are power series in t.
 
-A `Taylor` contains the series of every node of an expression graph whose symbols are themselves series. The
-coefficients are elements of any ring with ``constant``, ``function`` and ``power``: a `Tower` (polynomials), or
-`ExpressionRing` (shared expression graphs). Levels are computed one at a time, so the coefficients of a symbol at level
-i may depend on the result at level i−1. Thus the Hamilton–Jacobi recursion computes each coefficient once.
+A `Taylor` contains the series of every node of the expression. The coefficients are elements of a ring: polynomials (a
+`Tower`), or expressions (`ExpressionRing`). The coefficients of tⁱ, *level* i, are computed for all nodes before those
+of level i + 1. So the coefficient of a symbol at level i may depend on results at level i − 1, as in the
+Hamilton–Jacobi recursion.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from phigen.symbolic.special import SPECIAL, coefficient, order_of
 
 
 class RingOperations(Protocol):
-    """Operations of a ring of coefficients other than + and −."""
+    """Operations of a ring of coefficients, in addition to + and −."""
 
     @property
     def bytes_per_term(self) -> int:
@@ -48,7 +48,7 @@ class RingOperations(Protocol):
         """Return a symbol as an element."""
 
     def function(self, name: str, args: list[Any]) -> Any:
-        """Return an elementary function of elements, or ``pi`` or ``E``, which have no arguments."""
+        """Return the value of an elementary function at elements; without arguments, the constant ``pi`` or ``E``."""
 
     def power(self, base: Any, exponent: Fraction | int) -> Any:
         """Return a rational power of an element."""
@@ -57,34 +57,34 @@ class RingOperations(Protocol):
         """Return the sum of the terms."""
 
     def vanishes(self, element: Any) -> bool:
-        """Whether the element is 0 in its present form; relations are not used."""
+        """Whether the element is literally 0; identities such as sin² + cos² = 1 are not used."""
 
 
 class ExpressionRing(Arithmetic[Expression]):
-    """The ring of expression graphs: nothing is expanded, and sub-expressions are shared."""
+    """The ring of expressions: products are not multiplied out, and equal sub-expressions are shared."""
 
     bytes_per_term = 0
 
     def product(self, a: Expression, b: Expression) -> Expression:
-        """Return the node of a product."""
+        """Return the product of two expressions, simplified."""
         return a * b
 
     def constant(self, value: int | Fraction) -> Expression:
-        """Return the node of a number."""
+        """Return a rational number as an expression."""
         return number(value)
 
     def variable(self, name: str) -> Expression:
-        """Return the node of a symbol."""
+        """Return the symbol ``name`` as an expression."""
         return symbol(name)
 
     def function(self, name: str, args: list[Expression]) -> Expression:
-        """Return a function call, or one of the constants."""
+        """Return the call of a function as an expression, or the constant ``pi`` or ``E``."""
         if not args:
             return PI if name == "pi" else EULER
         return power(*args) if name == "power" else call(name, *args)
 
     def power(self, base: Expression, exponent: Fraction | int) -> Expression:
-        """Return the node of a power."""
+        """Return a rational power of an expression, simplified."""
         return power(base, exponent)
 
     def combine(self, terms: list[Expression]) -> Expression:
@@ -97,8 +97,10 @@ class ExpressionRing(Arithmetic[Expression]):
 
 
 def closure(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the nodes below the roots and below the derivatives that function nodes need, in the order of
-    evaluation."""
+    """Return the nodes of the expressions, and of the partial derivatives that the series of functions need.
+
+    Arguments come before the nodes that use them. The series of f(a) is computed from that of f'(a).
+    """
     closed = list(roots)
     while True:
         order = topological(closed)
@@ -114,9 +116,10 @@ def _by_derivative(e: Expression) -> bool:
 
 
 class Taylor:
-    """Series in t of the nodes of some expressions; ``series[id(node)]`` lists the coefficients computed so far.
+    """Power series in t of the nodes of some expressions; ``series[id(node)]`` has the coefficients computed so far.
 
-    Raises `OverflowError` if one polynomial, or all polynomials together, become too large.
+    The symbols ``variable_symbols`` are series, other symbols are constants. Raises `OverflowError` if one coefficient,
+    or all coefficients together, need too much memory.
     """
 
     def __init__(self, roots: Sequence[Expression], ring: RingOperations, variable_symbols: Sequence[str]) -> None:
@@ -129,18 +132,19 @@ class Taylor:
         self._bytes = 0
 
     def coefficients(self, e: Expression) -> list[Any]:
-        """Return the coefficients of a node that have been computed."""
+        """Return the coefficients of the series of a node that have been computed so far."""
         return self.series[id(e)]
 
     def advance(self, inputs: dict[str, Any], running: progress.Stage | None = None) -> None:
-        """Compute the next level of all nodes.
+        """Compute the next level, one more coefficient of the series of every node.
 
-        ``inputs`` has the level of the symbols that are series. ``running`` counts the nodes, for the progress display.
+        ``inputs`` has the coefficients at this level of the symbols that are series. ``running`` counts the nodes, for
+        the progress display.
         """
         for count, e in enumerate(self.order, 1):
             coefficients = self.series[id(e)]
             coefficients.append(self._coefficient(e, len(coefficients), inputs))
-            if e.op in ("add", "sub", "neg"):  # sums are stored too, and may be longer than all products
+            if e.op in ("add", "sub", "neg"):  # the memory of products was counted when they were computed
                 self._count(coefficients[-1])
             if running:
                 running.done = count
@@ -151,7 +155,7 @@ class Taylor:
         return product
 
     def _count(self, element: Any) -> None:
-        """Add the memory of an element to the total. Raises `OverflowError` beyond the budget."""
+        """Add the memory of an element to the total. Raises `OverflowError` if the total exceeds TAYLOR_BYTES."""
         if self.ring.bytes_per_term:
             self._bytes += len(element) * self.ring.bytes_per_term
             if self._bytes > budgets.TAYLOR_BYTES:
@@ -205,7 +209,7 @@ class Taylor:
             for j in range(1, i + 1)
             if not (zero(a[j]) or zero(powers[i - j]))
         ]
-        # For a constant base the ring may contain this power but not its reciprocal.
+        # The reciprocal is computed only if there are terms: for a constant base, the ring may not contain it.
         return self.ring.combine(terms) * self.ring.power(a[0], -1) if terms else self._zero
 
     def _integer_power(self, a: list[Any], n: int, i: int) -> Any:
@@ -235,7 +239,10 @@ class Taylor:
         return self.ring.combine(terms)
 
     def _analytic(self, e: Expression, a: list[Any], i: int) -> Any:
-        """Return a level of a function with a power series at 0, composed with a series that begins at 0."""
+        """Return level ``i`` of φ(a) or of a derivative of φ, by its power series at 0.
+
+        ``a`` has the coefficients of the argument, the first of which must be 0, else `ValueError` is raised.
+        """
         order = order_of(e.op)
         if i == 0:
             if not self.ring.vanishes(a[0]):

@@ -1,9 +1,9 @@
-"""The differential ring in which phigen computes: polynomials over Q in symbols and in function values.
+"""The differential ring in which phigen computes: polynomials over Q in symbols and in values of functions.
 
-A function value in the data that is not polynomial (``exp(x)``, ``1/(x**2+1)``, ``sqrt(l)`` …) is one more variable of
-the ring, a *generator*, whose derivatives are again elements of the ring. So geometry and series use one fast
-polynomial arithmetic for every Hamiltonian. Generators satisfy relations (r·f = 1, w² = q, sin² + cos² = 1 …), which
-`Tower.is_zero` eliminates.
+If H or π contains a function that is not polynomial, such as ``exp(x)``, ``1/(x**2+1)`` or ``sqrt(l)``, its value is
+one more variable of the ring, a *generator*, whose derivatives are again elements of the ring. So one fast arithmetic
+of polynomials serves every Hamiltonian. Generators satisfy relations, such as r·f = 1 for r = 1/f, w² = q for w = √q,
+and sin² + cos² = 1. `Tower.is_zero` uses them to decide whether an element vanishes.
 """
 
 from __future__ import annotations
@@ -38,8 +38,9 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 from phigen.symbolic.symbols import Symbol
 
-#: Number of generators from which on an element is first evaluated at a point: its numerator takes minutes for seven
-#: roots. ROUNDING is the largest relative size of a sum that may be 0, compared with the magnitudes of its terms.
+#: If an element contains at least MANY_GENERATORS generators, it is evaluated at a point before it is reduced by the
+#: relations, since the reduction takes minutes for seven roots. A value counts as nonzero there if it is larger than
+#: the fraction ROUNDING of the sum of the absolute values of its terms.
 MANY_GENERATORS, ROUNDING = 5, 1e-9
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
@@ -48,10 +49,10 @@ Poly = Any
 
 @dataclass
 class Generator:
-    """A function value as a variable of the ring; ``derivative`` has its nonzero derivatives.
+    """A generator, the value of a function as a variable of the ring. ``derivative`` has its nonzero derivatives.
 
-    ``kind`` is the name of the function, ``constant`` (pi, E), ``reciprocal`` (1/argument, with an irreducible
-    argument) or ``root`` (argument**(±1/degree)).
+    ``kind`` is the name of a function, or a constant (``pi``, ``E``), or ``reciprocal`` (1/argument, where the argument
+    is irreducible), or ``root``: argument**(1/degree), or argument**(−1/degree) if ``inverse``.
     """
 
     name: str
@@ -64,7 +65,7 @@ class Generator:
 
 
 class _MissingError(Exception):
-    """The ring lacks a generator, which is added next."""
+    """An expression needs this generator, which the ring lacks. The tower adds it, or refuses the expression."""
 
     def __init__(self, kind: str, arguments: list[Poly], degree: int = 1, inverse: bool = False) -> None:
         self.kind, self.arguments, self.degree, self.inverse = kind, arguments, degree, inverse
@@ -73,10 +74,10 @@ class _MissingError(Exception):
 class Tower(Arithmetic[Poly]):
     """The ring Q[symbols, generators] that contains the given expressions and their derivatives.
 
-    ``symbols`` are the polynomial variables, ``expressions`` must be elements of the ring, and ``variables`` are the
-    symbols with respect to which the ring is closed under differentiation.
+    ``symbols`` are the first variables of the ring; generators are added until ``expressions`` are elements, and until
+    the derivatives of elements with respect to the symbols ``variables`` are elements.
 
-    Raises `OverflowError` if polynomials that may be larger than memory would be needed.
+    Raises `OverflowError` if a polynomial may be larger than memory.
     """
 
     def __init__(
@@ -109,7 +110,10 @@ class Tower(Arithmetic[Poly]):
         return tuple(self._index)
 
     def _set_context(self, spare: int = 0) -> None:
-        """Make the ring of all names and ``spare`` additional ones, and convert the generators to it."""
+        """Make the ring of polynomials in all names, and convert the generators to it.
+
+        ``spare`` variables are reserved for generators that may follow.
+        """
         self._room = max(len(self._index) + spare, 1)
         self.context = fmpq_mpoly_ctx.get([f"v{i}" for i in range(self._room)], Ordering.degrevlex)
         self.gens = self.context.gens()
@@ -119,10 +123,10 @@ class Tower(Arithmetic[Poly]):
         self._forget()
 
     def _forget(self) -> None:
-        """Drop cached values that depend on the generators."""
+        """Drop the cached values, which are no longer valid after a change of the generators."""
         self._pairs: list[tuple[int, int]] | None = None
         self._below: dict[str, frozenset[str]] = {}
-        self._known: dict[int, Poly] = {}  # values of functions; `_kept` keeps their nodes alive
+        self._known: dict[int, Poly] = {}  # values of nodes by their id, which `_kept` protects from being reused
         self._kept: list[Expression] = []
 
     def constant(self, value: int | Fraction) -> Poly:
@@ -131,7 +135,7 @@ class Tower(Arithmetic[Poly]):
         return self.context.constant(fmpq(value.numerator, value.denominator))
 
     def variable(self, name: str) -> Poly:
-        """Return the symbol or generator of that name as an element."""
+        """Return the symbol or generator with this name as an element."""
         return self.gens[self._index[name]]
 
     @property
@@ -142,8 +146,7 @@ class Tower(Arithmetic[Poly]):
     # -- growing ----------------------------------------------------------------------------------
 
     def _absorb(self, e: Expression) -> Poly:
-        """Return the value of an expression; missing generators are added to the ring, and known values of functions
-        reused."""
+        """Return the expression as an element; generators that are missing are added to the ring."""
         while True:
             try:
                 for node in topological([e], self._known):
@@ -155,7 +158,8 @@ class Tower(Arithmetic[Poly]):
                 self._grow(missing)
 
     def _grow(self, missing: _MissingError) -> None:
-        # The root of q, found after 1/q, replaces 1/q: elements with 1/q are converted again.
+        # 1/√q becomes a generator. If 1/q was a generator before, it must become the square of 1/√q, so all elements
+        # are converted again.
         is_inverse_root = missing.kind == "root" and missing.inverse
         if is_inverse_root and any(g.kind == "reciprocal" for g in self.generators):
             self._renamed = True
@@ -185,13 +189,13 @@ class Tower(Arithmetic[Poly]):
         )
 
     def _close(self, running: progress.Stage) -> None:
-        """Add generators until the derivative of each is in the ring."""
+        """Add generators until the derivatives of all generators are elements of the ring; store the derivatives."""
         closed_count = size = 0
         while closed_count < len(self.generators):
             (rules,) = sparse_derivatives([self.generators[closed_count].expression], self.variables)
             for v in self.variables:
                 if v in rules:
-                    value = self._absorb(rules[v])  # may replace the generators by larger ones
+                    value = self._absorb(rules[v])  # may add generators, and then replaces the ring by a larger one
                     self.generators[closed_count].derivative[v] = value
                     size += len(value) * self.bytes_per_term
                     if size > budgets.PRODUCT_BYTES:
@@ -202,19 +206,21 @@ class Tower(Arithmetic[Poly]):
     # -- conversion -------------------------------------------------------------------------------
 
     def convert(self, e: Expression) -> Poly:
-        """Return the expression as an element. Raises `ValueError` if it needs a function that the tower does not
-        have."""
+        """Return the expression as an element. Raises `ValueError` if it needs a generator that the ring lacks."""
         return self.convert_all([e])[0]
 
     def convert_all(self, expressions: Sequence[Expression]) -> list[Poly]:
-        """Return `convert` for several expressions, which may share parts."""
+        """Return several expressions as elements; shared parts are converted once. Raises the errors of `convert`."""
         try:
             return self.values(expressions)
         except _MissingError as missing:
             raise ValueError(f"the ring has no generator for {missing.kind}") from None
 
     def function(self, name: str, args: list[Poly]) -> Poly:
-        """Return a function of elements, if the tower has it; this is used for constant terms of series."""
+        """Return the value of a function at elements, as an element: by a generator of the ring, or simplified.
+
+        If the ring lacks the generator, `_MissingError` is raised.
+        """
         if not args:
             return self._generator(name, [])
         args = [self.cancelled(a) for a in args]
@@ -235,7 +241,7 @@ class Tower(Arithmetic[Poly]):
         if name == "log" and first == 1:
             return self.zero
         if record.parity and rational(first.leading_coefficient()) < 0:
-            # f(q) and f(-q) share one generator.
+            # For an even or odd function f, the generator of f(-q) also serves f(q).
             mirrored = self._generator(name, [-first])
             return mirrored if record.parity == "even" else -mirrored
         if name == "exp":
@@ -246,9 +252,9 @@ class Tower(Arithmetic[Poly]):
         return self._generator(name, args)
 
     def _entire(self, name: str, s: Poly) -> Poly:
-        """Return a function of `ENTIRE` of s, in terms of cosroot, sinroot, exp and 1/s.
+        """Return the value at s of a function of `ENTIRE`, expressed by cosroot, sinroot, exp and 1/s.
 
-        A generator for cosroot(s) always comes with one for sinroot(s).
+        The generators cosroot(s) and sinroot(s) are always added together.
         """
         if s.is_constant() and s == 0:
             return self.constant(ENTIRE[name].coefficient(0))
@@ -260,7 +266,7 @@ class Tower(Arithmetic[Poly]):
             sine = self._entire("sinroot", s * self.constant(Fraction(1, 4)))
             numerator = sine**2 * self.constant(Fraction(1, 2)) - 3 * self._entire("arcroot", s)
             return numerator * self._reciprocal(s) * self.constant(Fraction(1, 2))
-        if name == "arcroot":  # by half angles, in which flows are written
+        if name == "arcroot":  # by functions of s/4, of half the angle √s, which the formulas of flows contain too
             quarter = s * self.constant(Fraction(1, 4))
             return (1 - self._entire("sinroot", quarter) * self._entire("cosroot", quarter)) * self._reciprocal(s)
         cos, sin = self._generator("cosroot", [s]), self._generator("sinroot", [s])
@@ -269,7 +275,8 @@ class Tower(Arithmetic[Poly]):
         return cos if name == "cosroot" else sin
 
     def _special(self, order: int, s: Poly) -> Poly:
-        """Return φ, φ' or φ'' of an element, in terms of φ(s) and 1/s only, by the Riccati equation of φ."""
+        """Return φ(s), φ'(s) or φ''(s) for an element s; the Riccati equation of φ expresses φ' and φ'' by φ and
+        1/s."""
         if s.is_constant() and s == 0:
             return self.constant(coefficient(order, 0))
         phi = self._generator("phi0", [s])
@@ -316,7 +323,7 @@ class Tower(Arithmetic[Poly]):
         return self.integer_power(base, k // n) * self._generator("root", [base], n, False) ** (k % n)
 
     def inverse(self, base: Poly) -> Poly | None:
-        """Return 1/base if the tower has it, else None."""
+        """Return 1/base if it is an element of the ring, else None."""
         try:
             return self._reciprocal(base)
         except (_MissingError, ZeroDivisionError):
@@ -357,7 +364,7 @@ class Tower(Arithmetic[Poly]):
         return self.expression_in(element, {})
 
     def expression_in(self, element: Poly, values: Mapping[str, Expression]) -> Expression:
-        """Return `expression` with some of the ring's variables replaced by ``values``."""
+        """Return the element as an expression, in which some symbols and generators are replaced by ``values``."""
         variables = self._meanings
         if values:
             variables = [values.get(n, meaning) for n, meaning in zip(self.names, variables, strict=True)]
@@ -367,8 +374,8 @@ class Tower(Arithmetic[Poly]):
     # -- calculus ---------------------------------------------------------------------------------
 
     def derivative(self, element: Poly, name: str) -> Poly:
-        """Return the total derivative with respect to one of `variables`, including that of the generators."""
-        # a copy, which frees the memory of terms that were cancelled
+        """Return the total derivative with respect to one of `variables`, on which generators depend too."""
+        # Adding 0 makes a copy, so that the memory of terms that were cancelled is freed.
         result = element.derivative(self._index[name]) + 0
         degrees = element.degrees()
         for g in self.generators:
@@ -392,7 +399,7 @@ class Tower(Arithmetic[Poly]):
         return slopes
 
     def partial(self, element: Poly, name: str) -> Poly:
-        """Return the derivative with respect to a symbol that no generator contains."""
+        """Return the derivative with respect to a symbol. Raises `ValueError` if a generator contains the symbol."""
         if any(self.depends_on(a, [name]) for g in self.generators for a in g.arguments):
             raise ValueError(f"{name} is in a function")
         return element.derivative(self._index[name])
@@ -403,7 +410,7 @@ class Tower(Arithmetic[Poly]):
 
     def names_in(self, element: Poly) -> set[str]:
         """Return the symbols and generators that occur in the element, directly or inside a generator."""
-        if element == 0:  # its degrees are −1
+        if element == 0:  # the library reports the degrees −1 for 0
             return set()
         names: set[str] = set()
         for i, degree in enumerate(element.degrees()):
@@ -414,7 +421,7 @@ class Tower(Arithmetic[Poly]):
         return names
 
     def _names_below(self, g: Generator) -> frozenset[str]:
-        """Return the name of a generator and the names that its arguments depend on."""
+        """Return the name of a generator, and the names of the symbols and generators in its arguments."""
         if g.name not in self._below:
             self._below[g.name] = frozenset({g.name}.union(*map(self.names_in, g.arguments)))
         return self._below[g.name]
@@ -424,14 +431,14 @@ class Tower(Arithmetic[Poly]):
     def is_zero(self, element: Poly) -> bool:
         """Return whether the element is proved to vanish identically.
 
-        False says only that it was not reduced to 0.
+        False is no proof of the contrary: the relations did not reduce the element to 0.
         """
         if element == 0 or self._is_nonzero_at_a_point(element):
             return bool(element == 0)
         return bool(self.numerator(element) == 0)
 
     def _is_nonzero_at_a_point(self, element: Poly) -> bool:
-        """Whether an element of many generators has a nonzero value at a point; its numerator may be very long."""
+        """Whether an element with `MANY_GENERATORS` or more has a nonzero value at a point; False if it has fewer."""
         degrees = element.degrees()
         if sum(degrees[self._index[g.name]] > 0 for g in self.generators) < MANY_GENERATORS:
             return False
@@ -443,7 +450,7 @@ class Tower(Arithmetic[Poly]):
         return abs(math.fsum(terms)) > ROUNDING * math.fsum(map(abs, terms))
 
     def _values_at_a_point(self) -> list[float]:
-        """Return the values of the ring's variables at one point, in floats; all are NaN if one is not defined."""
+        """Return the values of symbols and generators at one point, in floats; all are NaN if one is not defined."""
         if len(self._sampled) != len(self._meanings):
             point = {n: 0.5 + math.modf((k + 1) * (math.sqrt(5) - 1) / 2)[0] for k, n in enumerate(self.symbols)}
             try:
@@ -453,8 +460,10 @@ class Tower(Arithmetic[Poly]):
         return self._sampled
 
     def numerator(self, element: Poly) -> Poly:
-        """Return a multiple of the element by a non-vanishing function, with relations between generators
-        eliminated."""
+        """Return the product of the element and a function without zeros, reduced by the relations of generators.
+
+        The function removes denominators: the result contains no reciprocals.
+        """
         degrees = element.degrees()
         for g in reversed(self.generators):
             if degrees[self._index[g.name]] > 0:
@@ -463,12 +472,13 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def simplified(self, element: Poly) -> Poly:
-        """Return an equal function with fewer terms, by the relations r·f = 1, w² = q, sin² + cos² = 1."""
+        """Return the same function with fewer terms, if the relations (r·f = 1, w² = q, sin² + cos² = 1) allow it."""
         return self._shortened(element, relations=True)
 
     def reduced(self, element: Poly) -> Poly:
-        """Return an equal function with common factors of numerator and denominator cancelled, if fewer terms
-        remain."""
+        """Return the same function with common factors of numerator and denominator cancelled, if this leaves fewer
+        terms.
+        """
         return self._shortened(self.cancelled(element), relations=False)
 
     def _shortened(self, element: Poly, *, relations: bool) -> Poly:
@@ -487,13 +497,14 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def _is_related(self, g: Generator) -> bool:
-        """Whether powers of a generator are polynomials in lower powers and in other generators: w² = q, sin² = 1 −
-        cos²."""
+        """Whether a relation replaces powers of a generator by lower powers: w² = q, or sin² = 1 − cos²."""
         return g.kind in ("sin", "cosh", "cosroot", "sign") or (g.kind == "root" and not self._partner(g))
 
     def _divided(self, element: Poly, g: Generator) -> Poly:
-        """Return the element with lower powers of a reciprocal r, for terms that are multiples of f = 1/r or f =
-        r^-n."""
+        """Return the element with lower powers of the generator r = 1/f or r = f^(−1/n).
+
+        The coefficient of a power of r is divided by f: the quotient belongs to the power with r·f, or rⁿ·f, cancelled.
+        """
         parts, generator, base = self._parts(element, g.name), self.variable(g.name), g.arguments[0]
         for e in range(max(parts, default=0), g.degree - 1, -1):
             quotient, parts[e] = divmod(parts.get(e, self.zero), base)
@@ -501,7 +512,7 @@ class Tower(Arithmetic[Poly]):
         return self.combine(c * generator**e for e, c in parts.items())
 
     def _partner(self, g: Generator) -> Generator | None:
-        """Return the generator 1/w for a root w, or w for 1/w, if it precedes ``g``; else None."""
+        """Return the generator before ``g`` that is the reciprocal of the root ``g``; None if there is none."""
         for candidate in self.generators[: self.generators.index(g)]:
             if candidate.kind == "root" and candidate.degree == g.degree and candidate.arguments == g.arguments:
                 return candidate
@@ -543,7 +554,7 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def _eliminate_cosroot(self, parts: dict[int, Poly], g: Generator) -> Poly:
-        """Return the element with powers of cosroot above 1 replaced, by cosroot² + s·sinroot² = 1."""
+        """Return the element Σ parts[k] gᵏ, g = cosroot(s), with cosroot² replaced by 1 − s·sinroot²."""
         generator, sin = self.variable(g.name), self._generator("sinroot", g.arguments)
         square = 1 - g.arguments[0] * sin**2
         return self.combine(c * generator ** (e % 2) * square ** (e // 2) for e, c in parts.items())
@@ -551,7 +562,7 @@ class Tower(Arithmetic[Poly]):
     def _eliminate_root(self, parts: dict[int, Poly], g: Generator) -> Poly:
         base, n, generator = g.arguments[0], g.degree, self.variable(g.name)
         if partner := self._partner(g):
-            # w·v = 1: multiplication by a power of the partner eliminates g.
+            # g·w = 1. Multiplication of the element by a power of w eliminates g.
             top, w = max(parts), self.variable(partner.name)
             return self.combine(c * w ** (top - e) for e, c in parts.items())
         if not g.inverse:
@@ -560,9 +571,9 @@ class Tower(Arithmetic[Poly]):
         return self.combine(c * generator ** (e % n) * base ** (top - e // n) for e, c in parts.items())
 
     def _parts(self, element: Poly, name: str) -> dict[int, Poly]:
-        """Return the coefficients of the powers of a generator that occur.
+        """Return the element as a polynomial in the generator ``name``: {exponent: coefficient}.
 
-        Terms are divided by powers in the C library.
+        The divisions are done by the C library, which is faster than a loop over terms in Python.
         """
         i, parts = self._index[name], dict[int, Poly]()
         while (exponent := int(element.degrees()[i])) > 0:
@@ -570,14 +581,14 @@ class Tower(Arithmetic[Poly]):
         return {**parts, 0: element} if element != 0 else parts
 
     def combine(self, terms: Iterable[Poly]) -> Poly:
-        """Return the sum of the terms, with v · (1/v) cancelled."""
+        """Return the sum of the terms, in which products of a generator and its reciprocal are cancelled."""
         result = self.zero
         for t in terms:
             result += t
         return self.cancelled(result)
 
     def cancelled(self, element: Poly) -> Poly:
-        """Return the element with cancelled products of a variable and its reciprocal, or of w and 1/w for a root w."""
+        """Return the element with products v · (1/v) cancelled, where v is a variable of the ring or a root."""
         degrees = element.degrees()
         pairs = [(i, j) for i, j in self._inverse_pairs() if degrees[i] and degrees[j]]
         if not pairs:
@@ -589,7 +600,7 @@ class Tower(Arithmetic[Poly]):
         return element
 
     def _inverse_pairs(self) -> list[tuple[int, int]]:
-        """Pairs of indices of ring variables whose product is 1."""
+        """Return the pairs (i, j) for which the product of the ring variables with the indices i and j is 1."""
         if self._pairs is None:
             self._pairs = []
             for g in self.generators:
@@ -605,12 +616,12 @@ class Tower(Arithmetic[Poly]):
         return self._pairs
 
     def vanishes(self, element: Poly) -> bool:
-        """Whether the element is 0 as a polynomial; relations are not used."""
+        """Whether the element is 0 as a polynomial; relations between generators are not used."""
         return bool(element == 0)
 
 
 def _is_arithmetic(e: Expression) -> bool:
-    """Whether a node needs no generator, since it is a polynomial in its arguments."""
+    """Whether a node of an expression is a polynomial in its arguments, so that it needs no generator."""
     if e.op == "pow":
         return bool(e.value > 0 and e.value.denominator == 1)
     return e.op in ("number", "symbol", "add", "sub", "neg", "mul")

@@ -1,12 +1,13 @@
 """The universal anomaly of a Kepler motion: s with ds = dt/r, for ellipses, parabolas, hyperbolas and radial motions.
 
-Along q̈ = −μq/r³, with r and η = q·q̇ at the start and β = 2μ/r − q̇², s is the solution of
+For q̈ = −μq/r³, let r = |q| and η = q·q̇ at the start, and β = 2μ/r − q̇². After the time t, s is the solution of
 
     r G1 + η G2 + μ G3 = t,    G1 = s sinroot(βs²),  G2 = s² sinroot(βs²/4)²/2,  G3 = s³ arcroot(βs²)
 
-(E. Stiefel, G. Scheifele, Linear and Regular Celestial Mechanics, 1971). The G_n are those of Stumpff: G0' = −βG1 and
-G_n' = G_{n−1} with G0 = cosroot(βs²). The left-hand side grows with the slope r(s) = r G0 + η G1 + μ G2, the distance,
-so there is one solution; its derivatives follow from that of the equation, and none divides by β.
+(E. Stiefel, G. Scheifele, Linear and Regular Celestial Mechanics, 1971). The G_n are functions of Stumpff: G0 is
+cosroot(βs²), G0' = −βG1 and G_n' = G_{n−1}. The derivative of the left-hand side by s is the distance at s, r G0 + η G1
++ μ G2 > 0, so that there is one solution. The derivatives of s follow by differentiating the equation; no formula
+divides by β.
 """
 
 from __future__ import annotations
@@ -15,37 +16,39 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-#: Name of the function; its arguments are t, r, η, β, μ and |q × q̇|².
+#: Name of the function s in expressions; its arguments are t, r, η, β, μ and |q × q̇|².
 ANOMALY = "anomaly"
 
-#: Largest number of iterations, after which the function has no value. Halving a bracket takes 53 iterations.
+#: Largest number of iterations, after which the function has no value. Bisection alone takes 53 for double precision.
 MOST_ITERATIONS = 100
 
-#: A motion is radial if |q × q̇|² is below this fraction of η² + |μ|r; the products have ten units of rounding.
+#: A motion counts as radial if |q × q̇|² is at most this fraction of η² + |μ|r. Rounding of q × q̇, about 10⁻¹⁵
+#: relative to the products in it, has the square 10⁻³⁰.
 RADIAL = 1e-30
 
 
 def slopes(
     call: Callable[..., Any], s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any
 ) -> tuple[Any, ...]:
-    """Return the partial derivatives with respect to t, r, η, β and μ.
+    """Return the partial derivatives of s with respect to t, r, η, β, μ and |q × q̇|²; ``call`` applies a function.
 
-    |q × q̇|² only decides whether there is a value, so its derivative is 0.
+    The derivative with respect to |q × q̇|² is 0, since this argument only decides whether s has a value.
     """
     square = s**2
     z = beta * square
     half_sine, slope = call("sinroot", z / 4), call("sinroot1", z / 4)
     g1, g2, g3 = s * call("sinroot", z), square * half_sine**2 / 2, square * s * call("arcroot", z)
     inverse = 1 / (r * call("cosroot", z) + eta * g1 + mu * g2)
-    # sinroot(z/4)²/2 has the derivative sinroot(z/4) sinroot1(z/4)/4 with respect to z.
+    # s·along_t is the derivative of the left-hand side of the equation by z = βs², at constant s. In G2, the derivative
+    # of sinroot(z/4)²/2 by z is sinroot(z/4) sinroot1(z/4)/4.
     along_t = r * call("sinroot1", z) + eta * s * (half_sine * slope / 4) + mu * square * call("arcroot1", z)
     return inverse, -(g1 * inverse), -(g2 * inverse), -(square * s * along_t * inverse), -(g3 * inverse), 0
 
 
 def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any) -> Any:
-    """Return the value in the precision of the library: double for `math`, else that of an mpmath context.
+    """Return s, in double precision if the library is `math`, else in that of an mpmath context.
 
-    Raises `ValueError` if there is no value: at r = 0, and beyond a collision of a radial motion.
+    ``spin`` is |q × q̇|². Raises `ValueError` if there is no value: at r = 0, and after a collision of a radial motion.
     """
     if not r > 0:
         raise ValueError("the distance of a Kepler motion is not positive")
@@ -59,7 +62,10 @@ def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any)
 
 
 def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
-    """Return the solution for t > 0, by Laguerre's method between bounds, until the residual is rounding error."""
+    """Return the solution s of the equation for t > 0, to rounding error.
+
+    The iteration is Laguerre's method. Steps that leave the known bounds of the solution are replaced by bisection.
+    """
     rounding = 2.3e-16 if library is math else library.eps
     low, high, s = 0 * t, None, _guess(library, t, r, eta, beta, mu)
     for k in range(MOST_ITERATIONS + (0 if library is math else 10 * library.dps)):
@@ -80,10 +86,10 @@ def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any
 
 
 def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
-    """Return an initial value of the iteration.
+    """Return an initial value for the iteration that solves for s.
 
-    It is a series if the motion is a small part of an orbit. Otherwise it is that of the mean motion, or a unit of a
-    hyperbola, which is doubled if it is too small.
+    For a small part of an orbit it is a power series in t, or its first term t/r. Otherwise it is βt/μ, the mean of s
+    over an elliptic orbit, or 1/√−β for a hyperbolic one; if this is too small, the iteration doubles it.
     """
     u = t / r
     if abs(beta) * u**2 > 1:
@@ -95,7 +101,8 @@ def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
 
 
 def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the residual, the size of its terms, and its first two derivatives."""
+    """Return the residual of the equation for s, the sum of the absolute values of its terms, and the first two
+    derivatives of the residual by s."""
     from phigen.symbolic import entire
 
     z = beta * s**2
@@ -112,8 +119,10 @@ def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any
 
 
 def _collides(library: Any, s: Any, r: Any, eta: Any, beta: Any) -> bool:
-    """Whether a radial motion reaches r = 0 before s: √r, as a function of s, moves like a pendulum of small
-    amplitude."""
+    """Whether a radial motion reaches r = 0 before s.
+
+    Along a radial motion, the second derivative of √r by s is −(β/4)√r, so that √r is known in closed form.
+    """
     from phigen.symbolic import entire
 
     z = beta * s**2 / 4

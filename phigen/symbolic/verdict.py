@@ -1,4 +1,4 @@
-"""Statements, which are proved, refuted, or only checked at points, and the decision whether expressions vanish."""
+"""Statements with their verdicts (proved, refuted, checked at points), and the decision whether expressions vanish."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ UNDECIDED = "undecided"
 
 POINTS = 8
 DIGITS = 60
-#: Values below 10**-ZERO_DIGITS times their scale count as zero; rounding errors are 15 digits smaller.
+#: A value counts as zero if it is below 10**-ZERO_DIGITS times the largest intermediate result. It is computed with
+#: `DIGITS` digits, 20 more.
 ZERO_DIGITS = 40
 _ATTEMPTS = 64
-#: Largest number of failing parts that a refutation lists; it bounds the memory for large structures.
+#: Largest number of failing parts that a refutation lists, which bounds its memory for systems of high dimension.
 MOST_LISTED = 1000
 
 
@@ -30,10 +31,11 @@ MOST_LISTED = 1000
 class Statement:
     """A statement with its verdict.
 
-    ``verdict`` is ``proved`` (in exact arithmetic, for all values of the symbols), ``refuted`` (``residual`` should be
-    zero and is not), ``checked numerically`` (``detail`` says at how many points and to which tolerance) or
-    ``undecided`` (not provable, and no point of the domain is known). ``failing`` lists the parts of a refuted
-    statement that do not reduce to 0, such as the triples of a Jacobi identity, with their residuals.
+    ``verdict`` is one of four: ``proved`` (in exact arithmetic, for all values of the symbols), ``refuted``
+    (``residual`` should be zero and is not), ``checked numerically`` (``detail`` says at how many points and to which
+    tolerance), or ``undecided`` (there is no proof, and no point where all functions are defined was found).
+    ``failing`` lists pairs (label, residual) of the parts of a refuted statement that do not reduce to 0, such as the
+    triples of coordinates in the Jacobi identity.
     """
 
     name: str
@@ -59,10 +61,10 @@ class Statement:
 def decide_zero(
     name: str, residuals: Iterable[tuple[str, Expression]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """Return the statement that all residuals vanish identically in their symbols.
+    """Return the statement ``name``, that all residuals vanish identically in their symbols, with its verdict.
 
-    ``residuals`` are pairs (label, expression); a label such as ``(x1, x2, x3)`` names the failing part in a
-    refutation. ``positive`` are the symbols that take positive values only. ``detail`` is added to a proof.
+    ``residuals`` are pairs (label, expression); a label such as ``(x1, x2, x3)`` names the part in a refutation.
+    ``positive`` are the symbols that take positive values only. ``detail`` is the detail of the statement if proved.
     """
     nonzero = [(label, e) for label, e in residuals if not e.is_zero]
     try:
@@ -78,7 +80,7 @@ def decide_zero(
 def decide_elements(
     name: str, tower: Tower, residuals: Iterable[tuple[str, Poly]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """Return `decide_zero` for elements of a tower."""
+    """Return the statement that elements of a tower vanish, with its verdict; the arguments are those of `decide_zero`."""
     pending = [(label, element) for label, element in residuals if not tower.is_zero(element)]
     if not pending:
         return Statement(name, PROVED, detail)
@@ -93,8 +95,11 @@ def decide_elements(
 def _at_points(
     name: str, pending: Sequence[tuple[str, Expression]], describe: Callable[[int], str], positive: Collection[str]
 ) -> Statement:
-    """Return the verdict on residuals that did not reduce to 0, or are too large to be reduced: refuted at a point,
-    or checked."""
+    """Return the statement with the verdict from values at points, for residuals that were not reduced to 0.
+
+    A nonzero value at one point refutes the statement; otherwise it is checked numerically, or undecided if no residual
+    could be evaluated. ``describe`` returns the text of the residual with this index.
+    """
     fewest = POINTS
     for k, (label, expression) in enumerate(pending):
         point_or_count = _refuting_point(expression, positive)
@@ -114,7 +119,7 @@ def _at_points(
 def _refuting_point(expression: Expression, positive: Collection[str]) -> str | int:
     """Return a point where the expression is not zero, with its value, as text: ``at x=11/7: -8.5``.
 
-    If there is none, return the number of points that were tried.
+    If no such point is found, return the number of points where the expression was evaluated.
     """
     names = symbols_of(expression)
     tried_points = 0
@@ -133,9 +138,9 @@ def _refuting_point(expression: Expression, positive: Collection[str]) -> str | 
 
 
 def refutation(point: Mapping[str, str], number: int, value: str) -> str:
-    """Return the text ``at x=11/7: -8.5``, with the number of the point if it is too long.
+    """Return a point and the value there as text, ``at x=11/7: -8.5``; a long point is replaced by its ``number``.
 
-    Without names the text is ``everywhere -2``.
+    For an expression without symbols the text is ``everywhere -2``.
     """
     if not point:
         return f"everywhere {value}"
@@ -155,8 +160,8 @@ def _value(expression: Expression, point: dict[str, Fraction]) -> str:
 def sample_point(names: Sequence[str], positive: Collection[str], index: int) -> dict[str, Fraction]:
     """Return the point number ``index`` of a fixed sequence of rational points, with magnitudes between 1/5 and 3.
 
-    Points of odd index have negative components too, except for the ``positive`` names. The same names always have the
-    same points. Covectors (``p:NAME``) are 32 times smaller, since bi-realisations are defined near p = 0.
+    Components may be negative if the index is odd and the name is not in ``positive``. The sequence depends on the
+    names only. Covectors (``p:NAME``) are 32 times smaller, since bi-realisations are defined near p = 0.
     """
     state = 88172645463325252 + 7919 * (index + 1)
     point = {}
