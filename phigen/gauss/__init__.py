@@ -1,1 +1,1 @@
-"""Gauss collocation: its coefficients, and the algebras by which its step becomes an exact Poisson map."""
+"""Gauss collocation: its coefficients, and the algebras with which its step is exactly a Poisson map."""

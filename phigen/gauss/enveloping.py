@@ -1,9 +1,9 @@
-"""Star algebras of simple Lie algebras without known matrices, as quotients of their universal enveloping algebras.
+"""Star algebras of simple Lie algebras for which phigen knows no matrices: quotients of universal enveloping algebras.
 
-For sl(n), so(n), sp(2n) and their real forms, A = K ⊕ g ⊕ S ⊕ Z. Here K is spanned by 1. S is a module of symmetric
-elements such that all anticommutators ab + ba are in K ⊕ S. Z is spanned by a central skew element z, and is only
-needed for sl(n) and su(n). S is an eigenspace of the Casimir operator on Sym² g. The products of elements of g with a,
-b in g and f in S are
+Let g be sl(n), so(n), sp(2n), or a real form of these. Its star algebra is A = K ⊕ g ⊕ S ⊕ Z. Here K is spanned by 1. S
+is a g-module of symmetric elements such that all anticommutators ab + ba of a, b in g are in K ⊕ S. Z is spanned by a
+central skew element z, and is only needed for sl(n) and su(n). S is an eigenspace of the Casimir operator on Sym² g.
+The products of elements of g with a, b in g and f in S are
 
     ab = ½[a, b] + c κ(a, b) + σ(a, b),    af = ½ a▷f + μ τ(a, f) + ν ⟨a, f⟩ z,    az = ι(a),
 
@@ -27,19 +27,20 @@ from phigen.gauss.star_algebra import StarAlgebra, Vector
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.symbolic.tower import rational
 
-#: Largest dimension of the Lie algebra, that of sp(6); for larger ones, A has more than MOST_UNKNOWNS dimensions.
+#: Largest dimension of the Lie algebra: that of sp(6), whose algebra A has 36 dimensions, as many as MOST_UNKNOWNS
+#: allows.
 MOST_SIMPLE = 21
 
-#: Largest number of terms in the table of products. The bases of `named` algebras, permuted and scaled, have up to
-#: 1,700. so(5) in a dense basis has 4,000, which make 120,000 operations in the tangent map of a stage, more than
+#: Largest number of nonzero structure constants of A. The algebras of `named`, in permuted and scaled bases, have up to
+#: 1,700. so(5) in a dense basis has 4,000: with these, the tangent map of a stage takes 120,000 operations, more than
 #: programs may have.
 MOST_TERMS = 2000
 
 
 def enveloping(lie: LieAlgebra) -> StarAlgebra | None:
-    """Return the algebra A of a simple Lie algebra, or of the sum of a simple and a one-dimensional algebra.
+    """Return the algebra A of a simple Lie algebra, or of the sum of a simple and a one-dimensional Lie algebra.
 
-    Returns None if there is none, or if it exceeds the limits.
+    Returns None if A does not exist, or if it exceeds MOST_UNKNOWNS or MOST_TERMS.
     """
     field, m = lie.field, lie.dimension
     if not field.is_rational or m > MOST_SIMPLE:
@@ -91,9 +92,10 @@ def _kernel(a: fmpq_mat) -> list[list[fmpq]]:
 
 
 def _derived_and_centre(ad: Sequence[fmpq_mat], m: int) -> tuple[fmpq_mat, fmpq_mat, int] | None:
-    """Return a basis of [g, g] and the centre as rows, its inverse, and dim [g, g].
+    """Return a basis of g that is adapted to [g, g] and the centre: the basis as rows, its inverse, and dim [g, g].
 
-    Returns None if [g, g] and the centre do not span g, or if the centre has more than one dimension.
+    The rows span [g, g] first, then the centre. Returns None if [g, g] and the centre do not span g, or if the centre
+    has more than one dimension.
     """
     brackets = fmpq_mat(m * m, m, [ad[i][k, j] for i in range(m) for j in range(m) for k in range(m)])
     reduced, rank = brackets.rref()
@@ -113,7 +115,10 @@ def _unit_rows(m: int) -> list[list[fmpq]]:
 
 
 def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: int, simple: int) -> fmpq_mat:
-    """Return ad of basis element ``k`` of [g, g], as a matrix in the basis of [g, g]."""
+    """Return the adjoint matrix ad e_k of basis element ``k`` of [g, g], in the basis of [g, g].
+
+    ``basis`` and ``inverse`` are the adapted basis of g and its inverse, and ``simple`` is dim [g, g].
+    """
     m = len(ad)
     total = _matrix(m, m)
     for i in range(m):
@@ -123,7 +128,7 @@ def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: i
 
 
 def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
-    """Yield the modules S that are possible for the dimension of g, in the order of the size of A."""
+    """Yield the candidates for the module S that fit the dimension of g, those with the smallest algebra A first."""
     m = len(ad)
     form = fmpq_mat(m, m, [_trace(a * b) for a in ad for b in ad])
     if m < 8 or form.det() == 0:
@@ -131,13 +136,13 @@ def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
     eigenvalues: list[tuple[int, Fraction, bool]] = []
     n = isqrt(m + 1)
     if n * n == m + 1:
-        eigenvalues.append((m, Fraction(1), True))  # sl(n): symmetric products without trace
+        eigenvalues.append((m, Fraction(1), True))  # sl(n): S ≅ g, symmetric products without trace
     n = (1 + isqrt(1 + 8 * m)) // 2
     if n * (n - 1) == 2 * m and not centre:
-        eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices without trace
+        eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices of trace 0
     n = (isqrt(1 + 8 * m) - 1) // 4
     if n * (2 * n + 1) == m and not centre:
-        # sp(2n): skew-Hamiltonian matrices without trace
+        # sp(2n): S are the skew-Hamiltonian matrices of trace 0
         eigenvalues.append((n * (2 * n - 1) - 1, Fraction(n, n + 1), False))
     for size, eigenvalue, central in sorted(eigenvalues):
         if 1 + m + size + central > MOST_UNKNOWNS:
@@ -152,13 +157,13 @@ def _trace(a: fmpq_mat) -> fmpq:
 
 
 def _eigenspace(ad: Sequence[fmpq_mat], form: fmpq_mat, eigenvalue: Fraction) -> list[fmpq_mat]:
-    """Return a basis of the symmetric tensors that belong to an eigenvalue of the Casimir operator.
+    """Return a basis of an eigenspace of the Casimir operator on symmetric tensors over g.
 
-    The operator is normalised so that its eigenvalue on g is 1.
+    The operator is normalised so that it has the eigenvalue 1 on g.
     """
     m = len(ad)
     flat = fmpq_mat(m * m, m, [ad[a][i, p] for i in range(m) for p in range(m) for a in range(m)])
-    # the matrix of Σ κ^ab ad_a ⊗ ad_b, with pairs (i, p) as rows and (j, q) as columns
+    # This is the matrix of Σ κ^ab ad_a ⊗ ad_b, with pairs (i, p) as rows and (j, q) as columns; κ is the Killing form.
     crossed = flat * form.inv() * flat.transpose()
     pairs = [(i, j) for i in range(m) for j in range(i + 1)]
     half = _number((eigenvalue - 2) / 2)
@@ -180,9 +185,10 @@ def _eigenspace(ad: Sequence[fmpq_mat], form: fmpq_mat, eigenvalue: Fraction) ->
 
 @dataclass(frozen=True)
 class _Module:
-    """The module S of a simple Lie algebra, as symmetric ``tensors``; ``central`` says that A has the element z.
+    """Module S of a simple Lie algebra g, spanned by symmetric ``tensors`` over g.
 
-    ``ad`` are the adjoint matrices of g, and ``form`` is the Killing form.
+    ``central`` says whether A has the central element z. ``ad`` are the adjoint matrices of g, and ``form`` is the
+    Killing form.
     """
 
     ad: Sequence[fmpq_mat]
@@ -198,7 +204,8 @@ class _Module:
     def products(self) -> list[fmpq_mat] | None:
         """Return the matrices of left multiplication by the basis elements of A = K ⊕ g ⊕ S ⊕ Z.
 
-        Returns None if c, μ, ν or ι do not exist.
+        The factors c, μ, ν and the isomorphism ι are defined at the head of the module. Returns None if one of them
+        does not exist.
         """
         m, d = len(self.ad), len(self.tensors)
         lowered = [self.form * s * self.form for s in self.tensors]
@@ -208,7 +215,8 @@ class _Module:
         action = [self._action(a, lowered, extract) for a in self.ad]
         metric = fmpq_mat(d, d, [_trace(q * s) for q in lowered for s in self.tensors]).inv()
         raised = [s * self.form for s in self.tensors]
-        # the matrices of τ(·, f_l) for the basis f_l of S
+        # These are the matrices of τ(·, f_l) for the basis elements f_l of S, where τ is the transpose of the
+        # projection σ.
         right_factors = [_combination(raised, [metric[k, k2] for k in range(d)]) for k2 in range(d)]
         iota = _isomorphism(self.ad, action) if self.central else None
         if self.central and iota is None:
@@ -220,7 +228,7 @@ class _Module:
         return self._completed(left, lowered, factors, iota)
 
     def _action(self, a: fmpq_mat, lowered: Sequence[fmpq_mat], extract: fmpq_mat) -> fmpq_mat:
-        """Return the matrix by which a basis element of g acts on S."""
+        """Return the matrix of the action of ``a`` on S, where ``a`` is the adjoint matrix of a basis element of g."""
         m, d = a.nrows(), len(lowered)
         images = [a.transpose() * q + q * a for q in lowered]
         return fmpq_mat(d, m * m, [e[i, j] for e in images for i in range(m) for j in range(m)]) * extract
@@ -232,12 +240,13 @@ class _Module:
         right_factors: Sequence[fmpq_mat],
         iota: fmpq_mat | None,
     ) -> tuple[fmpq, fmpq, fmpq] | None:
-        """Return c, μ, ν from the equations for a few elements of g; None if these have no solution.
+        """Return the factors c, μ, ν in the products of A, from linear equations for a few pairs of elements of g.
 
-        The axioms of A are decided later.
+        Returns None if the equations have no solution. The caller of `enveloping` gets A only if it satisfies all
+        axioms.
         """
         m, d, rows = len(self.ad), len(self.tensors), list[list[fmpq]]()
-        pairing = None if iota is None else self.form * iota.inv()  # the pairing with ⟨a, ι(b)⟩ = κ(a, b)
+        pairing = None if iota is None else self.form * iota.inv()  # ⟨a, ι(b)⟩ = κ(a, b) defines the pairing ⟨a, f⟩
         for a, b in ((0, 1), (1, 2), (0, m - 1)):
             bracket = [self.ad[a][k, b] for k in range(m)]
             twice = _combination(self.ad, bracket)
@@ -303,9 +312,10 @@ class _Module:
         factors: tuple[fmpq, fmpq, fmpq],
         iota: fmpq_mat | None,
     ) -> list[fmpq_mat] | None:
-        """Return the matrices of left multiplication by all basis elements of A, given those of g.
+        """Return the matrices of left multiplication by all basis elements of A; ``left`` has those for g.
 
-        Elements of S and z are combinations of products of elements of g. Returns None if these products do not span S.
+        Elements of S, and z, are combinations of products of elements of g. Returns None if these products do not span
+        S.
         """
         m, d, size = len(self.ad), len(self.tensors), self.size
         identity = fmpq_mat(size, size, [fmpq(int(i == j)) for i in range(size) for j in range(size)])
@@ -316,7 +326,7 @@ class _Module:
             return None
         square = fmpq_mat(d, d, [values[k, c] for k in range(d) for c in pivot_rows])
         symmetric = []
-        for c in pivot_rows:  # σ(a, b) = ½(ab + ba) − c κ(a, b), as a matrix of left multiplication
+        for c in pivot_rows:  # left multiplication by σ(a, b) = ½(ab + ba) − c κ(a, b)
             a, b = pairs[c]
             product = left[a] * left[b] + left[b] * left[a]
             symmetric.append(product * fmpq(1, 2) - identity * (factors[0] * self.form[a, b]))
@@ -330,9 +340,9 @@ class _Module:
     def _centre(
         self, left: Sequence[fmpq_mat], by_module: Sequence[fmpq_mat], factors: tuple[fmpq, fmpq, fmpq], iota: fmpq_mat
     ) -> fmpq_mat:
-        """Return the matrix of left multiplication by z.
+        """Return the matrix of left multiplication by the central element z.
 
-        It follows from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z) for any a and f with ⟨a, f⟩ ≠ 0.
+        It follows from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z), with any a in g and f in S such that ⟨a, f⟩ ≠ 0.
         """
         m, d, pairing = len(self.ad), len(self.tensors), self.form * iota.inv()
         a, f = next((a, f) for a in range(m) for f in range(d) if pairing[a, f] != 0)
@@ -366,8 +376,11 @@ def _pivots(a: fmpq_mat) -> list[int]:
 
 
 def _isomorphism(ad: Sequence[fmpq_mat], action: Sequence[fmpq_mat]) -> fmpq_mat | None:
-    """Return an invertible matrix ι with D_x ι = ι ad_x for all x, where D_x is the action of x on S; None if there is
-    none."""
+    """Return an invertible matrix ι with D_x ι = ι ad_x for all x in g; None if there is none.
+
+    D_x is the matrix by which x acts on S: ``action`` has these matrices for the basis of g, and ``ad`` the adjoint
+    matrices.
+    """
     m, d = len(ad), action[0].nrows()
     rows: list[fmpq] = []
     for weights in ([fmpq(1 + k % 3) for k in range(m)], [fmpq(1 - 2 * (k % 2) + k) for k in range(m)]):
@@ -390,9 +403,9 @@ def _isomorphism(ad: Sequence[fmpq_mat], action: Sequence[fmpq_mat]) -> fmpq_mat
 def _assembled(
     lie: LieAlgebra, module: _Module, left: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat
 ) -> StarAlgebra:
-    """Return the star algebra in the basis K, g, S, Z.
+    """Return the star algebra A in the basis of K, g, S, Z, from the matrices ``left`` of left multiplication.
 
-    The rows of ``basis`` are elements of [g, g], followed by that of the centre if there is one.
+    The rows of ``basis`` are elements of [g, g], followed by a basis element of the centre if there is a centre.
     """
     field, size, simple, m = lie.field, module.size, len(module.ad), lie.dimension
 
@@ -402,7 +415,7 @@ def _assembled(
     table = {(i, j): vector([left[i][k, j] for k in range(size)]) for i in range(size) for j in range(size)}
     skew = {*range(1, 1 + simple), *([size - 1] if module.central else [])}
     star = [{k: -field.one if k in skew else field.one} for k in range(size)]
-    # positions in A of the rows of ``basis``
+    # A has the basis 1, [g, g], S, z. These are the positions there of the elements in the rows of ``basis``.
     row_numbers = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]
     elements = [{row_numbers[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
     functional: list[Vector] = [{} for _ in range(size)]

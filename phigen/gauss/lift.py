@@ -1,10 +1,10 @@
-"""Frames of group elements, for which the functionals on quaternions are constant.
+"""Frames of group elements. With them, momenta are quadratic forms with constant coefficients.
 
-Let 1, i, j, k be the basis of a copy of the quaternions in a star algebra. There, x̃(q) = y·Im q with a vector y, and
-y = F* k F for some quaternion F, the frame. Let the unknown be U = FG in place of G. Then momenta need no products with
-x̃: they are x̃(GaG*) = k̃(UaU*) with k̃(q) = (Im q)_3. The U at the end of a step is the frame at the start of the next
-step. Left multiplication commutes with the vector field, so the step is the same as with G. F is only determined up to
-a left factor exp(tk); any choice is possible, since F changes with U.
+Let 1, i, j, k be the basis of a copy of the quaternions in a star algebra. On this copy, x̃(q) = y·Im q with a vector
+y, and y = F* k F for some quaternion F, the frame. Let U = FG be the unknown in place of the group element G. Then the
+momenta are x̃(GaG*) = k̃(UaU*) with k̃(q) = (Im q)_3, which does not depend on x. The value of U at the end of a step
+is the frame at the start of the next step. Left multiplication by F commutes with the vector field, so the step is the
+same as with G. F is determined only up to a left factor exp(tk). Any such factor gives the same step.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from collections.abc import Mapping, Sequence
 from phigen.gauss.star_algebra import StarAlgebra, Vector
 from phigen.geometry.field import Scalar
 
-#: Basis elements 1, i, j, k of a copy of the quaternions.
+#: Indices of the basis elements 1, i, j, k of a copy of the quaternions in a star algebra.
 Copy = tuple[int, int, int, int]
 
 
 def quaternion_copies(algebra: StarAlgebra) -> tuple[Copy, ...]:
-    """Return the copies of the quaternions whose direct sum is the algebra; () if it is no such sum.
+    """Return the copies of the quaternions whose direct sum is the algebra; () if the algebra is no direct sum of
+    these.
 
-    Each copy consists of elements of the basis.
+    The basis elements 1, i, j, k of each copy must be elements of the basis of the algebra.
     """
     field, n = algebra.field, range(algebra.dimension)
     if not field.is_rational or algebra.dimension % 4:
@@ -54,7 +55,10 @@ def _products(copy: Copy, one: Scalar) -> dict[tuple[int, int], Vector]:
 def momentum_form(
     algebra: StarAlgebra, copies: Sequence[Copy], element: Mapping[int, Scalar]
 ) -> dict[tuple[int, int], Scalar]:
-    """Return the quadratic form k̃(U a U*) for a = ``element``: coefficients by ascending pairs of components of U."""
+    """Return the quadratic form k̃(U a U*) of U for a = ``element``, where k̃ adds the k-components of all copies.
+
+    The form maps ascending pairs of indices of components of U to coefficients.
+    """
     unit, last = algebra.field.one, {copy[3] for copy in copies}
     form: dict[tuple[int, int], Scalar] = {}
     for i in range(algebra.dimension):

@@ -1,10 +1,10 @@
 """Brackets that are constant in the logarithms of some coordinates, such as those of Lotka–Volterra systems and Toda
 chains.
 
-Suppose {x_i, x_j} = c_ij x_i^e_i x_j^e_j with constant c_ij and e_i = 0 or 1. Then the brackets of the log |x_i| with
-e_i = 1 and of the other x_i are constant. A Gauss method whose unknowns are these logarithms and coordinates is a
-Poisson map. A step multiplies each x_i with e_i = 1 by the exponential of an increment, so signs do not change, and 0
-stays 0.
+Suppose {x_i, x_j} = c_ij x_i^e_i x_j^e_j with constant c_ij and exponents e_i = 0 or 1. Replace x_i by log |x_i|
+wherever e_i = 1. Then all brackets are constant. A Gauss method whose unknowns are these logarithms and the remaining
+coordinates is a Poisson map. A step multiplies each x_i with e_i = 1 by the exponential of an increment, so signs do
+not change, and 0 stays 0.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ from collections.abc import Sequence
 from phigen.geometry.shapes import Matrix, coordinate_terms
 from phigen.symbolic.expression import Expression, symbol
 
-#: {x_i, x_j}/x_i by the pair (i, j).
+#: The bracket {log x_i, x_j} = {x_i, x_j}/x_i by the pair (i, j).
 Rates = dict[tuple[int, int], Expression]
 
 
 def logarithmic(coordinates: Sequence[str], poisson: Matrix) -> Rates | None:
-    """Return the brackets {log x_i, x_j} = {x_i, x_j}/x_i by (i, j), for all i with e_i = 1; None if no choice of e_i
-    exists."""
+    """Return the brackets {log x_i, x_j} = {x_i, x_j}/x_i by (i, j), for all i whose exponent e_i is 1.
+
+    Returns None if there are no exponents with {x_i, x_j} = c_ij x_i^e_i x_j^e_j.
+    """
     pairs = [(i, j) for i, row in enumerate(poisson) for j in range(i) if not row[j].is_zero]
     terms = coordinate_terms(coordinates, [poisson[i][j] for i, j in pairs])
     if terms is None:

@@ -1,9 +1,9 @@
 """Star algebras of matrix Lie algebras.
 
-Let ρ(e) be the matrices of a Lie algebra. If they are skew for an invertible form B, ρᵀB + Bρ = 0, the associative
-algebra that they generate together with 1 has the involution a ↦ B⁻¹aᵀB. If there is no such form, ρ ⊕ −ρᵀ has one,
-which pairs the two halves. So the number of unknowns is at most n² or 4n² for so(n), so(p, q) and sp(2n), and 2n² for
-su(n), sl(n) and gl(n).
+Let the matrices ρ represent a Lie algebra. If there is an invertible bilinear form B with ρᵀB + Bρ = 0, then the
+associative algebra that the ρ and 1 generate has the involution a ↦ B⁻¹aᵀB. If there is no such form, the
+representation ρ ⊕ −ρᵀ has one: it pairs the two summands. So the number of unknowns is at most n² or 4n² for so(n),
+so(p, q) and sp(2n), and 2n² for su(n), sl(n) and gl(n).
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from phigen.geometry.linear import Span, add_multiple, kernel
 from phigen.geometry.matrix_algebras import product
 from phigen.geometry.representations import known_representation
 
-#: Largest dimension of a star algebra. The operations of a sweep at a stage grow as the third power of the square root
-#: of the dimension.
+#: Largest dimension of a star algebra. Evaluating the vector field at one stage takes a number of operations that grows
+#: as the power 3/2 of the dimension.
 MOST_UNKNOWNS = 36
 
 
@@ -48,11 +48,10 @@ def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
 
 
 def _affine(lie: LieAlgebra) -> list[SparseMatrix]:
-    """Return matrices of affine maps that represent the Lie algebra on an abelian ideal; [] if there is none.
+    """Return matrices that represent the Lie algebra by affine maps of an abelian ideal; [] if there is no such ideal.
 
-    The ideal is the radical of the Killing form. Let π be a linear map of g onto the ideal, the identity on the ideal,
-    whose kernel is a complement. Then X is represented by the matrix of ad X on the ideal with the additional column
-    π(X).
+    The ideal is the radical of the Killing form. Let π be a linear map of g onto the ideal that is the identity on the
+    ideal. Then X is represented by the matrix of ad X on the ideal, with the additional column π(X).
     """
     m, field = lie.dimension, lie.field
     ad = [{(k, j): field.convert(c) for j in range(m) for k, c in lie.bracket(i, j).items()} for i in range(m)]
@@ -77,9 +76,11 @@ def _affine(lie: LieAlgebra) -> list[SparseMatrix]:
 
 
 def _projection(lie: LieAlgebra, ideal: Sequence[Vector], action: Sequence[SparseMatrix]) -> Vector | None:
-    """Return π as a vector with entry k·m + i in row k and column i; None if there is none.
+    """Return a linear projection π of the Lie algebra onto an ideal as a vector with entry k·m + i in row k and column
+    i.
 
-    π is the identity on the ideal, and π([X, Y]) = X π(Y) − Y π(X).
+    m is the dimension of the Lie algebra, and π([X, Y]) = X π(Y) − Y π(X) for all X, Y. Returns None if there is no
+    such π.
     """
     m, size, field = lie.dimension, len(ideal), lie.field
     last = size * m
@@ -119,14 +120,15 @@ def _transposed(a: SparseMatrix) -> SparseMatrix:
 
 
 def _doubled(a: SparseMatrix, n: int, field: Field) -> SparseMatrix:
-    """Return a ⊕ −aᵀ for a matrix a with n rows."""
+    """Return the block matrix a ⊕ −aᵀ for a matrix a with n rows."""
     return {**a, **{(n + j, n + i): -v for (i, j), v in a.items()}}
 
 
 def _form(matrices: Sequence[SparseMatrix], n: int, field: Field) -> SparseMatrix | None:
     """Return an invertible form B, symmetric or skew, with mᵀB + Bm = 0 for all matrices m.
 
-    Returns None if no element of a basis of these forms has an invertible symmetric or skew part.
+    The symmetric and the skew part of each form in a basis of the solutions are tried. Returns None if none of them is
+    invertible.
     """
     rows: list[dict[int, Scalar]] = []
     for m in matrices:
@@ -159,7 +161,7 @@ def _inverse(a: SparseMatrix, n: int, field: Field) -> SparseMatrix | None:
 
 
 def _hull(generators: Sequence[SparseMatrix], n: int, field: Field) -> list[SparseMatrix]:
-    """Return a sparse basis of the associative algebra that the generators span with their products.
+    """Return a sparse basis of the associative algebra that the generators generate.
 
     Returns [] if its dimension exceeds MOST_UNKNOWNS.
     """
@@ -206,10 +208,11 @@ def _functional(
     basis: Sequence[Vector],
     field: Field,
 ) -> list[Vector] | None:
-    """Return the functional x̃ at each basis element of the hull, as a linear form in x; None if there is none.
+    """Return the functionals x̃ at each basis element of the algebra ``hull``, as linear forms in x; None if there is
+    none.
 
-    x̃ vanishes on symmetric elements, and on the skew elements that are orthogonal to g with respect to the trace of
-    products.
+    x̃ vanishes on symmetric elements, and on the skew elements that are orthogonal to the Lie algebra by the trace form
+    tr ab.
     """
     half = field.one / field.number(2)
     skew: list[Vector] = []
@@ -223,10 +226,10 @@ def _functional(
         part = {i: half}
         add_multiple(part, star[i], half)
         symmetric.append(part)
-    # linear equations for elements that are skew and orthogonal to g
+    # These are linear equations for elements that are skew and orthogonal to the Lie algebra.
     rows = [{i: v[k] for i, v in enumerate(symmetric) if k in v} for k in range(len(hull))]
     solutions = kernel(field, [*traces, *(r for r in rows if r)], len(hull))
-    if Span(field, skew).dimension == len(basis):  # all skew elements are in g, as for se(n)
+    if Span(field, skew).dimension == len(basis):  # all skew elements are in the Lie algebra, as for se(n)
         solutions = []
     span = Span(field, [*basis, *solutions])
     if span.dimension < len(basis) + len(solutions):

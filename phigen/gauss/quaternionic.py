@@ -2,10 +2,10 @@
 elements.
 
 A = K ⊕ g with ab = β(a, b) + ½[a, b] for a, b in g, where K commutes with all elements. A exists if there is a
-symmetric β, whose values are linear maps of g that commute with the bracket, with [[a, b], c] = 4(β(b, c)a − β(a, c)b).
-K is spanned by the identity and these maps. For so(3), A are the quaternions; for sl(2), the 2×2 matrices; for so(3,1)
-and se(3), quaternions with complex and dual coefficients. Heisenberg algebras have β = 0, and so(4) gives two copies of
-so(3).
+symmetric β, whose values are linear maps of g that commute with the bracket, and that satisfy [[a, b], c] = 4(β(b, c)a
+− β(a, c)b). K is spanned by the identity and these maps. A is the algebra of quaternions for so(3), that of 2×2
+matrices for sl(2), that of quaternions with complex coefficients for so(3,1), and that of quaternions with dual
+coefficients for se(3). Heisenberg algebras have β = 0, and so(4) gives two copies of so(3).
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ from phigen.symbolic.tower import rational
 #: Linear map of g: its entries by (row, column).
 Map = dict[tuple[int, int], Scalar]
 
-#: Largest dimension of a Lie algebra. The number of unknowns in the linear equations for β grows as its third power.
+#: Largest dimension of a Lie algebra. The linear equations for β have a number of unknowns that grows as its third
+#: power.
 MOST_QUATERNIONIC = 12
 
 
 def quaternionic(algebra: LieAlgebra) -> StarAlgebra | None:
-    """Return the algebra A of a Lie algebra; None if there is none, or if the Lie algebra is too large."""
+    """Return the star algebra A of quaternionic type; None if there is none, or if the Lie algebra is too large."""
     m, field = algebra.dimension, algebra.field
     if m > MOST_QUATERNIONIC:
         return None
@@ -44,7 +45,7 @@ def quaternionic(algebra: LieAlgebra) -> StarAlgebra | None:
 
 
 def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
-    """Return a basis of the linear maps φ of g with φ[a, b] = [φa, b]; the identity is the first."""
+    """Return a basis of the linear maps φ of g with φ[a, b] = [φa, b]; the first is the identity."""
     m = len(ad)
     rows: list[dict[int, Scalar]] = []
     for i in range(m):
@@ -64,15 +65,18 @@ def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
 
 
 def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> dict[tuple[int, int], Map] | None:
-    """Return β(e_i, e_j) by (i, j), as linear maps of g; None if β does not exist."""
+    """Return the symmetric form β: a linear map of g for each pair (i, j) of basis elements; None if β does not
+    exist.
+    """
     m, count = len(ad), len(maps)
     pair_numbers = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(m) for j in range(i + 1))}
     four, last = field.number(4), len(pair_numbers) * count
 
     def unknowns(i: int, j: int, component: int, sign: Scalar) -> Iterator[tuple[int, dict[int, Scalar]]]:
-        """Yield the coefficients of the unknowns in each component of sign·4·β(e_i, e_j)e_c, where c is ``component``.
+        """Yield sign·4·β(e_i, e_j)e_c for basis element c = ``component``, as pairs of a row and a linear form in the
+        unknowns.
 
-        The unknowns are the coefficients of β(e_i, e_j) in the basis ``maps``.
+        The unknowns are the coefficients of each β(e_i, e_j) in the basis ``maps``.
         """
         pair_number = pair_numbers[max(i, j), min(i, j)]
         for number, phi in enumerate(maps):
@@ -105,7 +109,7 @@ def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> 
 
 
 def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> list[Map]:
-    """Return a basis of the algebra that the values of β generate; the identity is the first."""
+    """Return a basis of the algebra that the values of β generate; the first is the identity."""
     basis: list[Map] = [{(i, i): field.one for i in range(m)}]
     pending = [value for value in form.values() if value]
     while pending:
@@ -118,7 +122,7 @@ def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> lis
 
 
 def _normalised(a: Map) -> Map:
-    """Return a multiple of the map whose first entry is 1, so that products with it need fewer multiplications."""
+    """Return the multiple of a linear map whose first entry is 1. Products with it need fewer multiplications."""
     first = a[min(a)]
     return {position: v / first for position, v in a.items()}
 
@@ -135,7 +139,7 @@ def _assembled(
 ) -> StarAlgebra:
     """Return the algebra K ⊕ g; the caller checks its axioms.
 
-    Its basis has the elements of K, then 2e for the basis elements e of g, with 2a·2b = 4β(a, b) + 2[a, b].
+    Its basis has the elements of K, then 2e for each basis element e of g. The products are 2a·2b = 4β(a, b) + 2[a, b].
     """
     m, count, unit = len(ad), len(scalars), field.one
     span, twice_unit, one_half = Span(field, scalars), field.number(2), unit / field.number(2)
@@ -162,7 +166,7 @@ def _assembled(
 def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
     """Return the algebra as the direct sum of two algebras, if K has two dimensions and a rational idempotent.
 
-    Other algebras are returned unchanged.
+    Returns the algebra unchanged if there is no such idempotent. ``count`` is the dimension of K.
     """
     field, unit = algebra.field, algebra.field.one
     idempotent = _idempotent(algebra) if count == 2 else None
@@ -182,7 +186,7 @@ def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
 def _idempotent(algebra: StarAlgebra) -> Vector | None:
     """Return an idempotent of K = span(1, k) other than 0 and 1; None if no rational one exists.
 
-    If k² = p + qk and r² = p + q²/4, it is (1 + (k − q/2)/r)/2.
+    If k² = p + qk and r² = p + q²/4, the idempotent is (1 + (k − q/2)/r)/2.
     """
     field = algebra.field
     if not field.is_rational:

@@ -1,11 +1,11 @@
 """Realisations of systems for Gauss methods: choices of unknowns with which a step is a Poisson map.
 
 Coordinates with constant brackets are unknowns themselves, since Gauss methods are symplectic. Coordinates with the
-brackets of a Lie algebra are written as x̃(G ξ G*), where the group element G is 1 at the start of each step, and the
-method is applied to G (`phigen.gauss.star_algebra`). Coordinates whose logarithms have constant brackets are written as
-exponentials of unknowns (`phigen.gauss.logarithms`). Gauss methods preserve quadratic first integrals and constant
-two-forms, and commute with linear maps. So the step of G is presymplectic. Therefore the step of x is exactly a Poisson
-map, with all its Casimirs.
+brackets of a Lie algebra are written as functions of a group element G, which is 1 at the start of each step and to
+which the method is applied (`phigen.gauss.star_algebra`). Coordinates whose logarithms have constant brackets are
+written as exponentials of unknowns (`phigen.gauss.logarithms`). Gauss methods preserve quadratic first integrals and
+constant two-forms, and commute with linear maps. The space of group elements has a constant two-form, so the step of G
+preserves this two-form. Therefore the step of x is exactly a Poisson map, and preserves all Casimirs.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from phigen.symbolic.expression import ONE, ZERO, Expression
 
 @dataclass(frozen=True)
 class Plain:
-    """Part of a system: coordinates, given by their indices, that are unknowns themselves.
+    """Part of a system: coordinates, given by their indices, that are themselves unknowns of the Gauss method.
 
     If their brackets are not constant, a step is a Poisson map only up to its order.
     """
@@ -41,10 +41,10 @@ class Plain:
 
 @dataclass(frozen=True)
 class LogarithmicBlock:
-    """Part of a system: coordinates, given by their indices, whose logarithms are unknowns.
+    """Part of a system: coordinates, given by their indices, whose logarithms are unknowns of the Gauss method.
 
-    Brackets of the logarithms with each other and with plain coordinates are constant. ``rates`` has the brackets {log
-    x_i, x_j} by (i, j).
+    Brackets of the logarithms with each other and with plain coordinates are constant. ``rates`` maps (i, j) to the
+    bracket {log x_i, x_j}.
     """
 
     indices: tuple[int, ...]
@@ -53,12 +53,14 @@ class LogarithmicBlock:
 
 @dataclass(frozen=True)
 class AlgebraBlock:
-    """Part of a system: coordinates, given by their indices, with the brackets of a Lie algebra ``lie``.
+    """Part of a system: coordinates, given by their indices, with the brackets of a Lie algebra ``lie``. A group
+    element G is the unknown.
 
-    x_i + ``shift``_i is a momentum map of the star algebra ``algebra``. If ``central`` is set, the last basis element
-    of the Lie algebra has no coordinate, and the constant value 1. ``ideal`` are the basis elements of a square-zero
-    ideal whose components of G are replaced by functionals (`phigen.gauss.square_zero`); () if there is none.
-    ``copies`` are copies of the quaternions, if G starts from F in place of 1 (`phigen.gauss.lift`).
+    The functions x_i + ``shift``_i are a momentum map of the star algebra ``algebra``. If ``central`` is set, the last
+    basis element of the Lie algebra has no coordinate: its value is the constant 1. ``ideal`` lists the basis elements
+    of a square-zero ideal; the components of G along these are replaced by functionals (`phigen.gauss.square_zero`). It
+    is () if there is no such ideal. ``copies`` lists copies of the quaternions if G starts from a frame F in place of 1
+    (`phigen.gauss.lift`), else it is ().
     """
 
     indices: tuple[int, ...]
@@ -71,7 +73,7 @@ class AlgebraBlock:
 
     @property
     def subalgebra(self) -> tuple[int, ...]:
-        """The basis elements of the star algebra outside the ideal, along which G has unknowns."""
+        """The basis elements of the star algebra outside ``ideal``: the components of G along these are unknowns."""
         return tuple(i for i in range(self.algebra.dimension) if i not in self.ideal)
 
     @property
@@ -85,7 +87,10 @@ Part = Plain | LogarithmicBlock | AlgebraBlock
 
 @dataclass(frozen=True)
 class Realisation:
-    """The parts of a system; ``exact`` says whether the step is a Poisson map, not only up to its order."""
+    """The parts of a system, with their unknowns for a Gauss method.
+
+    ``exact`` says whether the step is a Poisson map exactly, and not only up to the order of the method.
+    """
 
     parts: tuple[Part, ...]
     exact: bool
@@ -102,16 +107,15 @@ class Realisation:
 
     @property
     def with_elements(self) -> Realisation:
-        """The realisation in which all components of group elements are unknowns, so that translations follow from
-        these."""
+        """The same parts without functionals: all components of the group elements are unknowns."""
         parts = (replace(part, ideal=()) if isinstance(part, AlgebraBlock) else part for part in self.parts)
         return Realisation(tuple(parts), self.exact)
 
     @property
     def lifted(self) -> Realisation | None:
-        """The realisation with frames F for all group elements, see `phigen.gauss.lift`.
+        """The same parts with frames F for all group elements, see `phigen.gauss.lift`.
 
-        None if there are no group elements, or if one of them has no frame.
+        None if the system has no group elements, or if a group element has no frame.
         """
         parts: list[Part] = []
         for part in self.parts:
@@ -125,13 +129,15 @@ class Realisation:
     def label(self) -> str:
         """The kind of the method as text for users."""
         if not self.exact:
-            return "Gauss collocation, structure to truncation"
+            return "Gauss collocation, π preserved up to the truncation error"
         kinds = ["collective"] * bool(self.groups) + ["in logarithms"] * bool(self.logarithms)
         return ", ".join(["Gauss collocation", " and ".join(kinds)] if kinds else ["Gauss collocation"])
 
 
 def direct(system: System) -> Realisation:
-    """Return the realisation whose unknowns are all coordinates; it is exact if π is constant."""
+    """Return the realisation in which all coordinates are unknowns; its step is a Poisson map exactly if π is
+    constant.
+    """
     constant = isinstance(system.shape, Constant | Canonical)
     return Realisation((Plain(tuple(range(system.dimension))),), constant)
 
@@ -143,7 +149,7 @@ def collective(system: System) -> Realisation | None:
 
 
 def _parts(coordinates: Sequence[str], poisson: Matrix, shape: Shape) -> list[Part] | None:
-    """Return parts that make a step a Poisson map; None if phigen knows none.
+    """Divide the coordinates into parts with which a step is a Poisson map; None if phigen knows none.
 
     If the shape of π is unknown, the blocks of π are treated separately.
     """
@@ -165,7 +171,7 @@ def _parts(coordinates: Sequence[str], poisson: Matrix, shape: Shape) -> list[Pa
 
 
 def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] | None:
-    """Return the parts of all blocks of π; None if π is one block, or if a block has no known parts."""
+    """Return the parts of all diagonal blocks of π; None if π is one block, or if phigen knows no parts for a block."""
     blocks_of_poisson = blocks(coordinates, poisson)
     if len(blocks_of_poisson) < 2:
         return None
@@ -181,7 +187,10 @@ def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] 
 
 
 def _with_global_indices(part: Part, block: Sequence[int]) -> Part:
-    """Return a part of a block with indices into all coordinates; ``block`` has the indices of the block."""
+    """Return a part whose indices count within a block, with indices into all coordinates instead.
+
+    ``block`` has the indices of the coordinates of the block.
+    """
     indices = tuple(block[i] for i in part.indices)
     if isinstance(part, LogarithmicBlock):
         return LogarithmicBlock(indices, {(block[i], block[j]): rate for (i, j), rate in part.rates.items()})
@@ -191,7 +200,7 @@ def _with_global_indices(part: Part, block: Sequence[int]) -> Part:
 def _merged_parts(parts: Sequence[Part]) -> Iterator[Part]:
     """Yield the parts with all plain parts merged into one, and all logarithmic parts merged into one.
 
-    The order is plain, logarithmic, Lie algebras.
+    First comes the plain part, then the logarithmic part, then the parts with Lie algebras.
     """
     plain_indices = [i for part in parts if isinstance(part, Plain) for i in part.indices]
     if plain_indices:
@@ -206,9 +215,10 @@ def _merged_parts(parts: Sequence[Part]) -> Iterator[Part]:
 
 
 def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
-    """Yield the indecomposable parts of a linear or affine structure: indices, Lie algebra, flag.
+    """Yield the indecomposable parts of a linear or affine Poisson structure.
 
-    The flag says whether the last basis element of the Lie algebra is the constant 1.
+    Each part is a triple: the indices of its coordinates, its Lie algebra, and whether the last basis element of the
+    Lie algebra stands for the constant 1.
     """
     if isinstance(shape, LiePoisson):
         for indices in indecomposable_parts(shape.algebra):
@@ -217,8 +227,8 @@ def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
         extension = shape.extension
         unit_index = extension.dimension - 1
         linear = {ij: {k: c for k, c in row.items() if k != unit_index} for ij, row in extension.constants.items()}
-        # A constant bracket couples its two coordinates as well. It is replaced by a multiple of one of them to make
-        # this visible.
+        # A bracket that is constant couples its two coordinates too. Here it is replaced by a multiple of the first
+        # coordinate, so that `indecomposable_parts` sees the coupling.
         completed = {ij: row or {ij[0]: ONE} for ij, row in linear.items()}
         for indices in indecomposable_parts(LieAlgebra("", unit_index, completed)):
             pairs = [ij for ij in extension.constants if set(ij) <= set(indices)]
@@ -229,7 +239,9 @@ def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
 
 
 def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | None:
-    """Return the part for some coordinates with the brackets of a Lie algebra; None if no star algebra is known."""
+    """Return the part for some coordinates with the brackets of a Lie algebra; None if phigen knows no star algebra for
+    it.
+    """
     last = len(indices)
     if all(set(row) <= {last} for row in lie.constants.values()):  # all brackets are constant
         return Plain(tuple(indices))
@@ -244,7 +256,7 @@ def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | N
 
 
 def star_algebra(lie: LieAlgebra) -> StarAlgebra | None:
-    """Return a star algebra whose skew elements contain the Lie algebra; None if phigen knows none."""
+    """Return a star algebra whose skew elements (a* = −a) contain the Lie algebra; None if phigen knows none."""
     return quaternionic(lie) or of_matrices(lie) or enveloping(lie)
 
 
@@ -254,9 +266,10 @@ def _without_constants(lie: LieAlgebra, last: int) -> LieAlgebra:
 
 
 def _shift(lie: LieAlgebra, last: int) -> list[Expression] | None:
-    """Return the shift s with {x_i, x_j} = Σ_k c_ij^k (x_k + s_k), where c_ij^k are the linear terms of the brackets.
+    """Return a shift s of the coordinates that absorbs the constant terms of affine brackets.
 
-    Returns None if there is no shift that replaces the constant terms.
+    With the linear terms c_ij^k, the brackets are {x_i, x_j} = Σ_k c_ij^k (x_k + s_k). Returns None if there is no such
+    s.
     """
     field = lie.field
     rows: list[Vector] = []

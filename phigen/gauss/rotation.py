@@ -1,8 +1,8 @@
 """Attitudes for Gauss steps: the group element of a step as a rotation, by a homomorphism to dual quaternions.
 
 A dual quaternion q + εr with ε² = 0 stands for the rotation q and the translation 2r q̄. The homomorphism maps the
-elements E_a that rotate to ½i, ½j, ½k or to −½i, −½j, −½k, by the sign of the bracket, those that translate to ε times
-these, and all others to 0.
+elements E_a that generate rotations to ½i, ½j, ½k or to −½i, −½j, −½k, by the sign of the bracket. It maps generators
+of translations to ε times these, and all other E_a to 0.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from phigen.geometry.field import Scalar
 from phigen.geometry.linear import Span
 from phigen.symbolic.expression import ONE, Expression, number, total
 
-#: The eight components of a dual quaternion q + εr: those of q, then those of r.
+#: Dual quaternion q + εr by its eight components: those of q, then those of r.
 Dual = list[Scalar]
 
 
 def group_element(points: StageMap, attitude: Group) -> list[Expression] | None:
-    """Return the group element of a step minus 1, with its translation if the group has one, as a function of the
-    unknowns.
+    """Return the attitude increment of a Gauss step as a function of the unknowns: its quaternion minus 1.
 
-    Returns None if the coordinates that rotate belong to no star algebra, or if there is no homomorphism.
+    The three components of the translation follow if the group has translations. Returns None if the coordinates that
+    belong to rotations are in no star algebra, or if there is no homomorphism to dual quaternions.
     """
     for group, places in zip(points.realisation.groups, points.places, strict=True):
         if set(attitude.rotation) <= set(group.indices):
@@ -45,7 +45,7 @@ def _element(
         total(algebra.field.expression(image[k]) * z for image, z in zip(images, offsets, strict=True) if image[k])
         for k in range(8)
     ]
-    if attitude.spatial:  # elements act from the left on the attitude, which needs the inverse
+    if attitude.spatial:  # then the attitude is multiplied from the left by the inverse of G
         w = [w[0], *(-v for v in w[1:4]), w[4], *(-v for v in w[5:])]
     inverse = [ONE + w[0], *(-v for v in w[1:4])]
     translation = quaternion_product(w[4:], inverse)[1:]

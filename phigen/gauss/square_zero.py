@@ -1,11 +1,14 @@
-"""Square-zero ideals of star algebras, whose components of a group element act on momenta only through a functional.
+"""Square-zero ideals of star algebras. They reduce the number of unknowns of a step.
 
-Let A = B ⊕ N with a subalgebra B, an ideal N, N² = 0, B* = B and N* = N. For G = g + n, the momenta of a = b + c are
-x̃(GaG*) = λ(bg*) + κ(cg*), since x̃(gbn*) = x̃(nbg*). Here λ(b) = x̃(gb) + 2x̃(nb) is a functional on B, and κ(c) =
-x̃(gc) a functional on N. If Ġ = G(e + v) with e in B and v in N, then ġ = ge and λ̇(b) = λ(eb) + 2κ(vb). So the
-derivatives of g and λ depend on g and λ alone, and λ is a linear function of G. Gauss methods commute with linear maps,
-so they make the same step with the unknowns g and λ. The number of these unknowns is 2 dim B. For motions of a body, N
-are translations, or the directions of several fields, and (g, λ) is a point of T*B.
+Let A = B ⊕ N with a subalgebra B and an ideal N such that N² = 0, B* = B and N* = N. Write group elements as G = g + n,
+with g in B and n in N. For b in B and c in N, the momenta are x̃(G(b + c)G*) = λ(bg*) + κ(cg*), since x̃(gbn*) =
+x̃(nbg*). Here λ(b) = x̃(gb) + 2x̃(nb) is a functional on B, and κ(c) = x̃(gc) is a functional on N. So n enters only
+through λ.
+
+If Ġ = G(e + v) with e in B and v in N, then ġ = ge and λ̇(b) = λ(eb) + 2κ(vb). So the derivatives of g and λ depend on
+g and λ alone, and λ is a linear function of G. Gauss methods commute with linear maps, so a method with the unknowns g
+and λ makes the same step as with the unknown G. The number of these unknowns is 2 dim B. In the motion of a body, N are
+the translations, or the directions of several fields, and (g, λ) is a point of T*B.
 """
 
 from __future__ import annotations
@@ -16,10 +19,10 @@ from phigen.gauss.star_algebra import StarAlgebra
 
 
 def square_zero_ideal(algebra: StarAlgebra) -> tuple[int, ...]:
-    """Return the basis elements of a square-zero ideal N with 2 dim B ≤ dim A (see the module); () if there is none.
+    """Return a square-zero ideal N with 2 dim B ≤ dim A (see the module), by the indices of its basis elements.
 
-    N is the radical of the form tr ab. Basis elements must span N and B, and each element of the frame must lie in N or
-    in B.
+    N is the radical of the bilinear form tr ab. Returns () if there is no such ideal, if N and a complement B are not
+    spanned by basis elements, or if an element of the frame of the algebra lies in neither.
     """
     n, zero = range(algebra.dimension), algebra.field.zero
     products = {at: row for at, row in algebra.table.items() if row}

@@ -1,8 +1,10 @@
 """Stages of a Gauss step: coordinates and derivatives as functions of the unknowns, and the change of frame.
 
 The unknowns are offsets, which are 0 at the start of a step, so that small steps lose no digits. They are x − x_start
-for a plain coordinate, t − t_start for the time, log x − log x_start for a coordinate with a logarithm, and G − 1 for a
-group element.
+for a plain coordinate, t − t_start for the time, and log x − log x_start for a coordinate whose logarithm is an
+unknown. For a group element G they are the components of G − 1, or those of U − F if there is a frame F
+(`phigen.gauss.lift`), where U = FG. If the star algebra has a square-zero ideal (`phigen.gauss.square_zero`), the
+components of G along the ideal are replaced by λ − λ_start for the functional λ.
 """
 
 from __future__ import annotations
@@ -30,19 +32,19 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.symbols import Symbol
 
-#: The kinds of the symbols that stand for unknowns, and for components of the frames F of group elements.
+#: Kinds of symbols: unknowns of a stage, and components of the frames F of group elements.
 OFFSET, FRAME = "z", "frame"
 
 
 @dataclass(frozen=True)
 class StageMap:
-    """The state at a stage as a function of the start of the step and of the unknowns.
+    """The state at a stage of a Gauss step, as a function of the state at the start of the step and of the unknowns.
 
-    ``unknowns`` are names of symbols. The first unknowns are offsets of the coordinates with the indices ``moved``.
-    Then come the offset of the time if H depends on it, the offsets of functionals of star algebras with ideals, the
-    offsets of the logarithms of the coordinates with the indices ``scaled``, and the entries of group elements minus 1.
-    ``places`` has the indices of the unknowns of each group: those of the group element, then those of its functional.
-    ``change`` is x − x_start for each coordinate.
+    ``unknowns`` are names of symbols, in this order: the offsets of the coordinates with the indices ``moved``; the
+    offset of the time if H depends on the time; the offsets of the functionals λ of star algebras with ideals; the
+    offsets of the logarithms of the coordinates with the indices ``scaled``; the components of the group elements,
+    minus 1 or minus the frame F. ``places`` has, for each group, the indices of the unknowns of its group element, then
+    those of its functional. ``change`` is x − x_start for each coordinate.
     """
 
     system: System
@@ -52,45 +54,52 @@ class StageMap:
     scaled: tuple[int, ...]
     places: tuple[tuple[int, ...], ...]
     change: tuple[Expression, ...] = field(default=())
-    pace: Expression = ONE  # the factor of ∇H and covector forces: the rate g of a monitor with forces
+    pace: Expression = ONE  # multiplies ∇H and covector forces: the rate g of a monitor with forces
 
     @property
     def logarithms(self) -> dict[int, Expression]:
-        """The unknowns that are offsets of logarithms, by the indices of their coordinates."""
+        """The unknowns that are offsets of logarithms, as symbols by the index of the coordinate."""
         first = self.plain
         return {i: symbol(self.unknowns[first + k]) for k, i in enumerate(self.scaled)}
 
     @property
     def plain(self) -> int:
-        """The number of the unknowns that have the scale of the state; these are the first ones."""
+        """The number of unknowns with the scale of the state: coordinates, time, functionals. They come first."""
         groups = self.realisation.groups
         return len(self.moved) + len(self.system.times) + sum(len(g.subalgebra) for g in groups if g.ideal)
 
     @property
     def start(self) -> tuple[str, ...]:
-        """The names of the symbols at the start of a step: coordinates, the time, then frames of group elements."""
+        """The names of the symbols for the state at the start of a step: coordinates, the time, then frames of group
+        elements.
+        """
         return (*self.system.coordinates, *self.system.times, *self.frames)
 
     @property
     def frames(self) -> tuple[str, ...]:
-        """The names of the components of frames of group elements, in the order of the last unknowns."""
+        """The names of the symbols for the components of all frames F, in the order of the unknowns for group
+        elements.
+        """
         groups = zip(self.realisation.groups, self.places, strict=True)
         return tuple(frame_symbol(k) for group, places in groups if group.copies for k in places)
 
 
 def frame_symbol(place: int) -> str:
-    """Return the symbol of the component of a frame that belongs to an unknown."""
+    """Return the symbol for the component of a frame F that belongs to the unknown with index ``place``."""
     return Symbol(FRAME, place)
 
 
 def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) -> StageMap:
-    """Return the state of a system at a stage; ``pace`` multiplies ∇H and covector forces."""
+    """Return the state of a system at a stage as a function of the unknowns; ``pace`` multiplies ∇H and covector
+    forces.
+    """
     plain_indices = tuple(i for part in realisation.parts if isinstance(part, Plain) for i in part.indices)
     scaled = tuple(i for part in realisation.logarithms for i in part.indices)
     if realisation.exact:
         plain_indices = tuple(i for i in plain_indices if any(not e.is_zero for e in system.poisson[i]))
     if not (plain_indices or scaled or realisation.groups or system.times):
-        # If all brackets are zero, one coordinate is an unknown, since arrays in C have at least one entry.
+        # If all brackets are zero, no unknown is needed. One coordinate is an unknown nevertheless, since arrays in C
+        # have at least one entry.
         plain_indices = (0,)
     places, count = _places(realisation, len(plain_indices) + len(system.times), len(scaled))
     unknowns = tuple(Symbol(OFFSET, k) for k in range(count))
@@ -110,7 +119,8 @@ def stage_map(system: System, realisation: Realisation, pace: Expression = ONE) 
 def _places(realisation: Realisation, plain: int, scaled: int) -> tuple[tuple[tuple[int, ...], ...], int]:
     """Return the indices of the unknowns of each group, and the number of all unknowns.
 
-    ``plain`` and ``scaled`` are the numbers of unknowns of coordinates and time, and of logarithms.
+    ``plain`` is the number of unknowns for coordinates and the time, and ``scaled`` the number of unknowns for
+    logarithms.
     """
     functional = plain
     element = plain + scaled + sum(len(g.subalgebra) for g in realisation.groups if g.ideal)
@@ -124,8 +134,10 @@ def _places(realisation: Realisation, plain: int, scaled: int) -> tuple[tuple[tu
 
 
 def group_values(system: System, group: AlgebraBlock) -> list[Expression]:
-    """Return the coordinates of a Lie algebra part at the start of a step, plus their shifts; 1 for a central
-    element."""
+    """Return the values of the basis elements of a Lie algebra at the start of a step: shifted coordinates x_i + s_i.
+
+    A central basis element without a coordinate has the value 1.
+    """
     coordinates = [symbol(system.coordinates[i]) + s for i, s in zip(group.indices, group.shift, strict=True)]
     return [*coordinates, *([ONE] if group.central else [])]
 
@@ -141,10 +153,10 @@ def _combined(algebra: StarAlgebra, factors: Mapping[int, object], values: Seque
 
 @dataclass(frozen=True)
 class _Scaled:
-    """The functional x̃ divided by q at the basis elements, and the frame elements f divided by numbers c.
+    """The functional x̃/q at the basis elements of a star algebra, and the frame elements f/c, with numbers q and c.
 
-    q and c are chosen such that products need few multiplications by numbers. ``combination`` gives x̃ at the E_a as
-    combinations of x̃/q at the f/c.
+    The numbers are chosen such that products need few multiplications by constants. ``combination`` has the
+    coefficients by which x̃(E_a) is a combination of the values of x̃/q at the f/c.
     """
 
     at_basis: list[Expression]
@@ -172,13 +184,15 @@ def _scaled(group: AlgebraBlock, x: Sequence[Expression]) -> _Scaled:
 
 
 def offset_element(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[Expression]:
-    """Return the components of w = G − 1 from the unknowns of a group; components in its ideal are 0."""
+    """Return the components of w = G − 1, or of w = U − F, from the unknowns of a group; components in its ideal
+    are 0.
+    """
     components = dict(zip(group.subalgebra, offsets, strict=False))
     return [components.get(k, ZERO) for k in range(group.algebra.dimension)]
 
 
-def _start_of(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return the components of a group element at the start of a step: 1, or its frame F."""
+def _start_of(group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
+    """Return the components of a group element at the start of a step: those of 1, or the symbols of its frame F."""
     if group.copies:
         return [symbol(frame_symbol(k)) for k in places]
     unit = group.algebra.unit
@@ -186,21 +200,24 @@ def _start_of(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> l
 
 
 def _element_at(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return the components of G = 1 + w, or F + w, from the unknowns of a group; those in its ideal count as 0."""
+    """Return the components of the group element, G = 1 + w or U = F + w, from the unknowns w of a group.
+
+    Components in the ideal of the group have no unknowns, and are those of 1.
+    """
     offsets = offset_element(group, offsets_of(points, places))
-    return [w + start for w, start in zip(offsets, _start_of(points, group, places), strict=True)]
+    return [w + start for w, start in zip(offsets, _start_of(group, places), strict=True)]
 
 
 def _momentum_change(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return x̃(G E_a G*) − x_a for G = 1 + w and all a.
+    """Return the change x̃(G E_a G*) − x_a of the momenta since the start of a step, for all a, without cancellation.
 
-    This is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. For E_a in a subalgebra with a functional λ = x̃ + u, it is
-    u(E_a) + λ(E_a w*).
+    For G = 1 + w it is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. For E_a in a subalgebra with a functional λ = x̃ +
+    u, it is u(E_a) + λ(E_a w*). With frames it is the change of the quadratic forms k̃(U E_a U*).
     """
     algebra, offsets = group.algebra, offsets_of(points, places)
     scaled, w = _scaled(group, group_values(points.system, group)), offset_element(group, offsets)
     if group.copies:
-        start = _start_of(points, group, places)
+        start = _start_of(group, places)
         forms = [momentum_form(algebra, group.copies, f) for f in scaled.frame]
         at_frame = [_form_change(algebra, form, start, w) for form in forms]
         return [_combined(algebra, parts, at_frame) for parts in scaled.combination]
@@ -219,20 +236,22 @@ def _form_change(
     start: Sequence[Expression],
     w: Sequence[Expression],
 ) -> Expression:
-    """Return the change of a quadratic form from ``start`` to start + w."""
+    """Return the change of the quadratic form ``form`` if its argument changes from ``start`` to start + w."""
     terms = ((c, w[i] * (start[j] + w[j]) + w[j] * start[i]) for (i, j), c in form.items())
     return total(_scalar(algebra, c) * change for c, change in terms)
 
 
 def _momentum(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return x̃(G E_a G*) for a group element G and all a; ``places`` are those of the unknowns of the group."""
+    """Return the momenta x̃(G E_a G*) of a group element G for all a; ``places`` are the indices of its unknowns."""
     at_frame, combination = _at_frame(points, group, places)
     return [_combined(group.algebra, parts, at_frame) for parts in combination]
 
 
 def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> tuple[list[Expression], list[Vector]]:
-    """Return multiples of x̃(G f G*) for the frame elements f, and the coefficients that combine them to x̃(G E_a
-    G*)."""
+    """Return multiples of the momenta x̃(G f G*) for the frame elements f, and coefficients for all basis elements E_a.
+
+    The coefficients of E_a combine the multiples to x̃(G E_a G*).
+    """
     algebra, g = group.algebra, _element_at(points, group, places)
     scaled = _scaled(group, group_values(points.system, group))
     if group.copies:
@@ -244,8 +263,11 @@ def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> t
 
 
 def _left(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return x̃(Gb)/q for the basis elements b of the algebra; if there is an ideal, λ(b)/q for those in the
-    subalgebra."""
+    """Return the functional b ↦ x̃(Gb)/q at the basis elements b of the algebra.
+
+    If the group has an ideal, the values at the basis elements of the subalgebra are λ(b)/q. The number q is that of
+    `_scaled`.
+    """
     scaled = _scaled(group, group_values(points.system, group))
     left = _functional_times(group.algebra, scaled, _element_at(points, group, places))
     if group.ideal:
@@ -256,7 +278,7 @@ def _left(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[
 
 
 def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Expression]) -> list[Expression]:
-    """Return x̃(wb)/q for the basis elements b of the algebra."""
+    """Return the functional b ↦ x̃(wb)/q at the basis elements b of the algebra; the number q is that of ``scaled``."""
     left = []
     for k in range(algebra.dimension):
         values = [_combined(algebra, algebra.table.get((i, k), {}), scaled.at_basis) for i in range(algebra.dimension)]
@@ -267,7 +289,7 @@ def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Express
 def _with_star(
     algebra: StarAlgebra, f: Mapping[int, Scalar], left: Sequence[Expression], w: Sequence[Expression]
 ) -> Expression:
-    """Return x̃(wfw*)/q for a frame element f; ``left`` has the values x̃(wb)/q of `_functional_times`."""
+    """Return f̃(w*) = x̃(wfw*)/q for a frame element f; ``left`` has the values x̃(wb)/q at the basis elements b."""
     unit = algebra.field.one
     terms = []
     for j in range(algebra.dimension):
@@ -318,8 +340,9 @@ def vector_field(
     """Return the derivatives of the unknowns at a stage, times ``weight``.
 
     ``stage_values`` has the coordinates and the time at the stage by name. ``slopes`` replaces ∇H if it is not None.
-    ``hold`` maps each component of a velocity in a Lie algebra to its replacement. With ``collected``, velocities that
-    are affine in the momenta are written as sums over x̃(G f G*) for the frame elements f.
+    Group elements follow Ġ = Gξ with a velocity ξ in the Lie algebra; ``hold`` replaces each component of ξ by another
+    expression. With ``collected``, components of ξ that are affine in the momenta are written as sums over the momenta
+    x̃(G f G*) of the frame elements f.
     """
     system, realisation = points.system, points.realisation
     slopes = gradient(system.hamiltonian, system.coordinates) if slopes is None else slopes
@@ -337,7 +360,8 @@ def vector_field(
     derivatives += [ZERO] * (len(points.unknowns) - len(derivatives))
     rates = [-weight * value for value in substitute(slopes, stage_values)]
     for group, at in zip(realisation.groups, points.places, strict=True):
-        # A constant among the basis elements is central, so that it does not act.
+        # If the last basis element stands for the constant 1, it has no rate. It is central, so it would not act
+        # anyway.
         velocity = _element(group.algebra, group.algebra.basis, [rates[i] for i in group.indices])
         if collected:
             sums = _collected(points, group, at, slopes, weight)
@@ -353,7 +377,10 @@ def vector_field(
 def _derivatives(
     points: StageMap, group: AlgebraBlock, places: Sequence[int], velocity: Sequence[Expression]
 ) -> list[Expression]:
-    """Return the derivatives of the unknowns of a group, from its ``velocity``, a component for each basis element."""
+    """Return the derivatives of the unknowns of a group if G follows Ġ = Gξ; ``velocity`` has the components of ξ.
+
+    If the group has an ideal, components of ξ along the ideal are passed with the factor 2.
+    """
     of_element = multiplied(group.algebra, _element_at(points, group, places), velocity)
     if not group.ideal:
         return of_element
@@ -362,15 +389,19 @@ def _derivatives(
 
 
 def functional_offsets(group: AlgebraBlock, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
-    """Return the offsets of the functional λ of the subalgebra at G = 1 + w, from all components of w."""
+    """Return λ − λ_start for the functional λ of the subalgebra at G = 1 + w, where w has components in the ideal too.
+
+    ``x`` are the values of the basis elements of the Lie algebra at the start, see `group_values`.
+    """
     doubled = [number(2) * v if k in group.ideal else v for k, v in enumerate(w)]
     left = _functional_times(group.algebra, _scaled(group, x), doubled)
     return [left[k] for k in group.subalgebra]
 
 
 def _pulled_back(group: AlgebraBlock, a: Sequence[Expression], left: Sequence[Expression]) -> list[Expression]:
-    """Return f(ab) for the basis elements b of the subalgebra; ``left`` has the values of the functional f at all basis
-    elements."""
+    """Return f(ab) for a functional f and the basis elements b of the subalgebra; ``left`` has f at all basis
+    elements.
+    """
     n = range(group.algebra.dimension)
     rows = [[_combined(group.algebra, group.algebra.table.get((i, k), {}), left) for i in n] for k in group.subalgebra]
     return [total(a[i] * value for i, value in enumerate(row) if not (a[i].is_zero or value.is_zero)) for row in rows]
@@ -379,9 +410,9 @@ def _pulled_back(group: AlgebraBlock, a: Sequence[Expression], left: Sequence[Ex
 def _collected(
     points: StageMap, group: AlgebraBlock, places: Sequence[int], slopes: Sequence[Expression], weight: Expression
 ) -> list[Expression | None]:
-    """Return the components of −w Σ_a E_a ∂H/∂x_a for w = ``weight``, as sums over x̃(G f G*) for the frame elements f.
+    """Return the components of the velocity −w Σ_a E_a ∂H/∂x_a for w = ``weight``, written with fewer multiplications.
 
-    Components that are not affine in the momenta are None.
+    Components that are affine in the momenta are sums over x̃(G f G*) for the frame elements f. All others are None.
     """
     system, algebra = points.system, group.algebra
     names = [system.coordinates[i] for i in group.indices]
@@ -412,7 +443,7 @@ def _logarithmic_rate(points: StageMap, i: int, slopes: Sequence[Expression]) ->
 
 
 def multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
-    """Return the components of the product of two elements."""
+    """Return the components of the product ab of two elements of a star algebra."""
     terms: list[list[Expression]] = [[] for _ in range(algebra.dimension)]
     for (i, j), row in sorted(algebra.table.items()):
         if a[i].is_zero or b[j].is_zero:
@@ -423,9 +454,9 @@ def multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expres
 
 
 def lifted_functionals(points: StageMap) -> list[Expression]:
-    """Return the vectors y with x̃(q) = y·Im q, for all copies of the quaternions one after the other.
+    """Return the vectors y with x̃(q) = y·Im q, the components of all copies of the quaternions in one list.
 
-    Components are in the order of i, j, k. At the start of a step, F* k F = y.
+    The components of y are in the order of i, j, k. At the start of a step, the frame F satisfies F* k F = y.
     """
     values: list[Expression] = []
     for group in points.realisation.groups:
@@ -436,10 +467,11 @@ def lifted_functionals(points: StageMap) -> list[Expression]:
 
 
 def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) -> list[Expression]:
-    """Return ``slopes``, derivatives of the unknowns, in the frame of the end of the step.
+    """Transform ``slopes``, derivatives of the unknowns, to the frame at the end of the step, where the next step
+    starts.
 
-    Derivatives of group elements are multiplied by G* = G⁻¹ from the left, those of functionals are transformed, and
-    the other ones do not change.
+    Derivatives of group elements are multiplied by G* = G⁻¹ from the left. Derivatives of functionals λ are transformed
+    likewise. Those of coordinates, time and logarithms do not change.
     """
     values = list(slopes)
     for group, places in zip(points.realisation.groups, points.places, strict=True):
@@ -462,10 +494,10 @@ def _functional_in_next_frame(
     k: Sequence[Expression],
     turned: Sequence[Expression],
 ) -> list[Expression]:
-    """Return derivatives ``k`` of the functional λ in the frame of the end of a step: k(bg*) − λ(sg*).
+    """Transform derivatives ``k`` of the functional λ to the frame at the end of a step: k(bg*) − λ(sg*) for all b.
 
-    Here ġ is the derivative ``turned`` of g in that frame, and s is the symmetric part of ġb. The second term follows
-    from nb + gn* = 0 at the end of a step.
+    ``turned`` is the derivative ġ in that frame, and s is the symmetric part of ġb. The second term follows from nb +
+    gn* = 0 at the end of a step, where G = g + n.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
     left = _left(points, group, places)

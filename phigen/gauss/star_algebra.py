@@ -1,8 +1,8 @@
 """Star algebras: associative algebras with an involution, whose skew elements contain a Lie algebra.
 
-Let A be such an algebra, g a Lie subalgebra of its skew elements (a* = −a), and x̃ a functional on A that vanishes on
+Let A be a star algebra, g a Lie subalgebra of its skew elements (a* = −a), and x̃ a functional on A that vanishes on
 symmetric elements. A is a vector space with the constant two-form ω(u, v) = x̃(u v*). On A, right multiplication by
-exp(ξ) with ξ ∈ g is linear and symplectic, and its momentum map is quadratic: J_ξ(G) = x̃(G ξ G*). At G = 1, this is
+exp(ξ) with ξ ∈ g is linear and symplectic, and its momentum map is quadratic: J_ξ(G) = x̃(G ξ G*). At G = 1, J_ξ is
 x̃(ξ).
 """
 
@@ -24,10 +24,11 @@ Vector = dict[int, Scalar]
 class StarAlgebra:
     """Star algebra in a basis.
 
-    ``table[i, j]`` is the product of two basis elements, without entries for products 0. ``star[i]`` is the image of a
-    basis element under the involution, and ``unit`` is the unit element. ``basis`` has the elements E_a of g. ``frame``
-    has skew elements by which momenta are computed: E_a = Σ_k combination[a][k]·frame[k]. The functional x̃ of a point
-    x has the value Σ_a functional[i][a]·x_a at basis element i.
+    ``table[i, j]`` is the product of the basis elements i and j; products that are 0 have no entry. ``star[i]`` is the
+    image of a basis element under the involution, and ``unit`` is the unit element. ``basis`` has the elements E_a that
+    span the Lie algebra g. ``frame`` has skew elements by which momenta are computed: E_a = Σ_k
+    combination[a][k]·frame[k]. A point x of the phase space defines the functional x̃ on the algebra; its value at
+    basis element i is Σ_a functional[i][a]·x_a.
     """
 
     field: Field
@@ -50,7 +51,7 @@ class StarAlgebra:
         return product
 
     def starred(self, a: Mapping[int, Scalar]) -> Vector:
-        """Return the image of an element under the involution."""
+        """Return a*, the image of an element a under the involution."""
         return combined(self.star, a)
 
     def commutator(self, a: Mapping[int, Scalar], b: Mapping[int, Scalar]) -> Vector:
@@ -58,12 +59,12 @@ class StarAlgebra:
         return difference(self.product(a, b), self.product(b, a), self.field.one)
 
     def value(self, a: Mapping[int, Scalar]) -> Vector:
-        """Return x̃(a) as a linear form in x: its coefficients by index."""
+        """Return x̃(a) as a linear form in x: the coefficient of each x_k, by the index k."""
         return combined(self.functional, a)
 
     @cached_property
     def skew(self) -> list[Vector]:
-        """A basis of the skew elements."""
+        """A basis of the skew elements, which have a* = −a."""
         unit = self.field.one
         rows: list[Vector] = [{} for _ in range(self.dimension)]
         for i, image in enumerate(self.star):
@@ -78,7 +79,11 @@ class StarAlgebra:
         return not any(any(residuals) for _, residuals in self.axioms())
 
     def axioms(self) -> Iterator[tuple[str, Iterator[Vector]]]:
-        """Yield the axioms of the momentum map: a name, and residuals that are all empty if the axiom holds."""
+        """Yield the axioms by which coordinates are a momentum map: the name of each axiom, and an iterator of
+        residuals.
+
+        An axiom holds if all its residuals are empty.
+        """
         n, unit = range(self.dimension), self.field.one
         units = [{i: unit} for i in n]
         yield "A is associative", self._associators()
@@ -96,7 +101,7 @@ class StarAlgebra:
     def _associators(self) -> Iterator[Vector]:
         """Yield (ab)c − a(bc) for basis elements a, b, c.
 
-        For rational coefficients, the residuals of all b and c are yielded together, one vector for each a.
+        For rational coefficients, the residuals of all b and c are yielded together, in one vector for each a.
         """
         n = range(self.dimension)
         if not self.field.is_rational:
@@ -106,7 +111,7 @@ class StarAlgebra:
         entries = {(i, k, j): v for (i, j), row in self.table.items() for k, v in row.items()}
         left = [fmpq_mat(size, size, [entries.get((i, k, j), zero) for k in n for j in n]) for i in n]
         flat = fmpq_mat(size, size * size, [v for m in left for v in m.entries()])
-        for i in n:  # left multiplication by e_i e_j is Σ_k (e_i e_j)_k times left multiplication by e_k
+        for i in n:  # basis elements e_i: left multiplication by e_i e_j is Σ_k (e_i e_j)_k left[k]
             of_products = left[i].transpose() * flat
             apart = [left[i] * m for m in left]
             together = [v for m in apart for v in m.entries()]
@@ -134,9 +139,9 @@ class StarAlgebra:
             yield difference(self.starred(f), f, -self.field.one)
 
     def _commutators_of_skew(self) -> Iterator[Vector]:
-        """Yield x̃([u, n]) for all skew u and all skew n on which every x̃ vanishes.
+        """Yield x̃([u, n]) for all skew u, and for all skew n that every functional x̃ maps to 0.
 
-        These residuals are 0 if the n form an ideal of the skew elements.
+        If these residuals are 0, the elements n form an ideal of the skew elements.
         """
         rows: list[Vector] = [{} for _ in self.basis]
         for i, u in enumerate(self.skew):
@@ -164,7 +169,7 @@ def difference(a: Mapping[int, Scalar], b: Mapping[int, Scalar], factor: Scalar)
 
 
 def in_basis(algebra: StarAlgebra, vectors: Sequence[Vector]) -> StarAlgebra:
-    """Return the algebra in another basis, whose elements are ``vectors``."""
+    """Return the same algebra in the basis ``vectors``, which are given in the present basis."""
     span = Span(algebra.field, vectors)
 
     def converted(a: Mapping[int, Scalar]) -> Vector:

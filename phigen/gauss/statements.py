@@ -1,9 +1,9 @@
 """Statements about a Gauss step, decided for each system: symplecticity, order, brackets, momentum map.
 
 A Gauss method is symplectic and preserves quadratic first integrals if its coefficients, as the solver uses them,
-satisfy μ_ij + μ_ji = 1. By the axioms of `phigen.gauss.star_algebra`, the components of the momentum map J are
-quadratic, and J is a Poisson map from the presymplectic space of group elements. J is x at the unit element. Hence the
-step in x is a Poisson map.
+satisfy μ_ij + μ_ji = 1. Coordinates with the brackets of a Lie algebra are a momentum map J on the space of group
+elements. By the axioms of `phigen.gauss.star_algebra`, J is quadratic and a Poisson map, and it has the value x at the
+unit element. Hence the step in x is a Poisson map.
 """
 
 from __future__ import annotations
@@ -41,16 +41,17 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, Statement, decide_zero
 
-#: Largest residual of the order conditions that the rounding of coefficients to double precision explains.
+#: Largest residual of the order conditions that rounding the coefficients to double precision can explain.
 ROUNDED = Fraction(1, 10**15)
 
 
 def check(
     system: System, discretised: System, realisation: Realisation, tableau: Tableau, pace: Expression = ONE
 ) -> Iterator[Statement]:
-    """Yield the statements about the coefficients, then those about the realisation.
+    """Yield the statements about the coefficients of a Gauss method, then those about the realisation, with their
+    proofs.
 
-    ``pace`` is the factor of ∇H and covector forces, g for a monitor with forces.
+    ``pace`` multiplies ∇H and covector forces: the rate g of a monitor if there are forces, else 1.
     """
     yield _symplectic(tableau)
     yield _order(tableau)
@@ -84,7 +85,7 @@ def _order(tableau: Tableau) -> Statement:
         residuals += [
             abs(sum(v * y**k for v, y in zip(values, c, strict=True)) - x ** (k + 1) / (k + 1)) for k in range(s)
         ]
-    name = f"the weights integrate polynomials of degree {2 * s - 1}, the stages those of degree {s - 1}: order {2 * s}"
+    name = f"order {2 * s}: weights are exact for polynomials of degree {2 * s - 1}, stages for degree {s - 1}"
     worst = max(residuals)
     if worst > ROUNDED:
         return Statement(name, REFUTED, residual=f"{float(worst):.1e}")
@@ -92,7 +93,9 @@ def _order(tableau: Tableau) -> Statement:
 
 
 def _brackets(system: System, realisation: Realisation) -> Statement:
-    """Decide whether π has the brackets that the parts assume: those of Lie algebras, and constant ones."""
+    """Decide whether the brackets of π are those that the realisation assumes: brackets of Lie algebras, and
+    constants.
+    """
     n = system.dimension
     expected: dict[tuple[int, int], Expression] = {}
     group_of = {i: group for group in realisation.groups for i in group.indices}
@@ -112,7 +115,7 @@ def _brackets(system: System, realisation: Realisation) -> Statement:
                 scales = product(symbol(system.coordinates[k]) for k in (i, j) if k in logs)
                 residuals += [(label, slope) for slope in gradient(entry * power(scales, -1), system.coordinates)]
     logarithms = ", ".join(f"log {system.coordinates[i]}" for i in sorted(logs))
-    name = "brackets are those of Lie algebras, and constant ones" + f", with {logarithms}" * bool(logarithms)
+    name = "each bracket belongs to a Lie algebra or is constant" + f", with {logarithms}" * bool(logarithms)
     return decide_zero(name, residuals, system.positive)
 
 
@@ -142,14 +145,14 @@ def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
             for k, c in constants.items():
                 expected = difference(expected, algebra.basis[k], -field.convert(c))
             if difference(algebra.commutator(e, f), expected, field.one):
-                failing.append(f"[E_{a + 1}, E_{b + 1}] is that of the brackets")
+                failing.append(f"[E_{a + 1}, E_{b + 1}] agrees with the brackets of the coordinates")
     if failing:
         return Statement(name, REFUTED, failing[0])
-    return Statement(name, PROVED, "associative, with involution; its skew elements have the brackets")
+    return Statement(name, PROVED, "associative, with an involution; commutators of its skew elements are the brackets")
 
 
 def _functionals(system: System, points: StageMap) -> Statement:
-    """Decide whether steps with functionals of subalgebras are those of group elements: equal momenta and velocities.
+    """Decide whether a step with functionals λ as unknowns is the step of group elements: equal changes and velocities.
 
     Symbols stand for ∇H, so that the statement holds for any H.
     """
@@ -160,7 +163,10 @@ def _functionals(system: System, points: StageMap) -> Statement:
 
 
 def _frames(system: System, points: StageMap, lifted: StageMap) -> Statement:
-    """Decide that the step with unknowns U − F, where U = FG, is the step with G − 1 if x̃(q) = k̃(FqF*)."""
+    """Decide whether the step with the unknowns U − F, where U = FG, is the step with the unknowns G − 1.
+
+    F is the frame at the start of the step; x̃(q) = k̃(FqF*) holds there (see `phigen.gauss.lift`).
+    """
     others = points.unknowns[: len(points.unknowns) - len(lifted.frames)]
     values = {name: symbol(name) for name in others}
     for group, places in zip(lifted.realisation.groups, lifted.places, strict=True):
@@ -181,9 +187,11 @@ def _differences(
     values: Mapping[str, Expression],
     states: Mapping[str, Expression],
 ) -> list[tuple[str, Expression]]:
-    """Return differences of changes and of velocities, for any ∇H, of two sets of unknowns.
+    """Return the differences between the steps of two sets of unknowns, in the changes of x and in the velocities.
 
-    ``values`` are the unknowns of ``points`` in terms of those of ``reference``; ``states`` replace coordinates.
+    The symbols "slope" stand for ∇H, so that zero differences are equal for any H. ``values`` has the unknowns of
+    ``points`` as functions of the unknowns of ``reference``; ``states`` replaces coordinates at the start by other
+    expressions.
     """
     slopes = [symbol(Symbol("slope", i)) for i in range(system.dimension)]
     reference_rates = substitute(vector_field(reference, at_unknowns(reference), slopes=slopes), states)
@@ -198,7 +206,10 @@ def _differences(
 
 
 def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Expression]:
-    """Return the unknowns of ``points`` by name, as functions of those of ``complete``, which has no functionals."""
+    """Return the unknowns of ``points`` by name, as functions of the unknowns of ``complete``.
+
+    All unknowns of the groups of ``complete`` are components of group elements; ``points`` has functionals as well.
+    """
     first, size = len(points.moved) + len(points.system.times), len(points.scaled)
     common = [*range(first), *range(points.plain, points.plain + size)]
     values = {points.unknowns[k]: symbol(complete.unknowns[i]) for i, k in enumerate(common)}
@@ -213,8 +224,9 @@ def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Exp
 
 
 def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> Iterator[Statement]:
-    """Yield statements about the start of a step: the unknowns 0 stand for the start, and there the method follows ẋ =
-    π∇H."""
+    """Decide whether the unknowns 0 stand for the state at the start of a step, and whether the method follows ẋ = π∇H
+    there.
+    """
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]
     yield decide_zero("the unknowns 0 belong to the state at the start of a step", start, system.positive)
@@ -225,4 +237,4 @@ def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> I
         for row in columns
     ]
     residuals = [(c, r - f) for c, r, f in zip(system.coordinates, rates, field, strict=True)]
-    yield decide_zero("ẋ = π∇H there", residuals, system.positive)
+    yield decide_zero("ẋ = π∇H at the start of a step", residuals, system.positive)

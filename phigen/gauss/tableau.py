@@ -1,9 +1,10 @@
 """Coefficients of Gauss collocation, in a form that remains exactly symplectic after rounding.
 
-A step from z solves Z_i = z + Σ_j μ_ij L_j, where L_j = h b_j f(Z_j) and μ_ij = a_ij/b_j, and ends at z + Σ_j L_j. If
-μ_ij + μ_ji = 1, the step is symplectic and preserves the quadratic first integrals of f, for any b_j. The exact μ_ij
-satisfy this condition, since b_i a_ij + b_j a_ji = b_i b_j. Here the μ_ij below the diagonal are rounded to multiples
-of 2⁻⁵². Then 1 − μ_ij is a floating-point number too, and the condition holds without error.
+Let a_ij and b_j be the coefficients of the Runge–Kutta method, and μ_ij = a_ij/b_j. A step of ż = f(z) from z solves
+Z_i = z + Σ_j μ_ij L_j with L_j = h b_j f(Z_j), and ends at z + Σ_j L_j. If μ_ij + μ_ji = 1, the step is symplectic and
+preserves the quadratic first integrals of f, for any b_j. The exact μ_ij satisfy this condition, since b_i a_ij + b_j
+a_ji = b_i b_j. Here the μ_ij below the diagonal are rounded to multiples of 2⁻⁵². Then 1 − μ_ij is a floating-point
+number too, and the condition holds without error.
 """
 
 from __future__ import annotations
@@ -20,27 +21,29 @@ DIGITS = 60
 #: Largest number of stages; a method of s stages has order 2s.
 MOST_STAGES = 8
 
-#: Band of the predictor, for each stage of the method, in units of 1/h. The predictor of the next step is optimal for
-#: motions with frequencies up to the band; methods with more stages are used with longer steps.
+#: Band of the predictor, an angular frequency in units of 1/h, for each stage of the method. The predictor of the next
+#: step is optimal for motions with frequencies up to the band. Methods with more stages are used with longer steps, so
+#: their band is wider.
 BAND = Fraction(1, 4)
 
 
-#: Largest number of previous steps that the predictors of vectorised C read.
+#: Largest number of previous steps that the predictors of C with vectorised stages read.
 EARLIER = 2
 
-#: Bands of several predictors, as `BAND`, with the number of previous steps that each reads. Vectorised C uses the
-#: predictor that was best in recent steps. Errors of predicted slopes of the Kowalevski top with steps of 0.1, 0.25,
-#: 0.5 and 1 are 3e-10, 4e-8, 8e-5 and 0.1; with `BAND` alone they are 3e-5, 6e-5, 3e-4 and 0.2.
+#: Bands of several predictors, as `BAND`, each with the number of previous steps that the predictor reads. C with
+#: vectorised stages uses the predictor that was best in recent steps. For the Kowalevski top with steps of 0.1, 0.25,
+#: 0.5 and 1, the errors of its predicted derivatives are 3e-10, 4e-8, 8e-5 and 0.1. With `BAND` alone they are 3e-5,
+#: 6e-5, 3e-4 and 0.2.
 BANDS = ((Fraction(3, 32), EARLIER), (Fraction(3, 16), EARLIER), (Fraction(3, 8), 1))
 
 
 @dataclass(frozen=True)
 class Precision:
-    """Floating-point format for which coefficients are rounded.
+    """Floating-point format to which coefficients are rounded.
 
-    ``spacing`` is the distance of its numbers between 1 and 2. Multiples of ``spacing`` below 2, and 1 minus them, are
-    exact. Predictors assume relative errors ``noise`` in the values that they read; those of `predictors` assume
-    ``fine_noise``.
+    ``spacing`` is the distance between neighbouring numbers of the format in [1, 2]. For multiples a of ``spacing``
+    below 2, a and 1 − a are numbers of the format. The predictor in `Tableau` assumes relative errors ``noise`` in the
+    values that it reads, and the predictors of `predictors` assume ``fine_noise``.
     """
 
     spacing: Fraction
@@ -54,12 +57,13 @@ SINGLE = Precision(Fraction(1, 2**23), Fraction(1, 10**5), Fraction(1, 10**5))
 
 @dataclass(frozen=True)
 class Tableau:
-    """Coefficients of a Gauss method: ``nodes`` c_i, ``weights`` b_i, and the matrix ``mixing`` μ, rounded.
+    """Coefficients of a Gauss method, rounded: ``nodes`` c_i, ``weights`` b_i, and the matrix ``mixing`` μ, μ_ij =
+    a_ij/b_j.
 
-    μ_ij + μ_ji = 1 holds exactly. ``prediction`` extrapolates one step: the offsets Z_i − z of the next step are about
-    Σ_j prediction[i][j]·L_j with L_j of the last step. ``doubled`` is ν = μ diag(b) μ, which gives the integrals of the
-    Z_i − z from the start of a step to each stage, by the L_j of this step. ``times`` are nodes τ such that ν_ij − ν_ji
-    = τ_i − τ_j holds exactly.
+    A step from z solves Z_i = z + Σ_j μ_ij L_j with L_j = h b_j f(Z_j). μ_ij + μ_ji = 1 holds exactly. ``prediction``
+    extrapolates by one step: with the L_j of the last step, Σ_j prediction[i][j]·L_j approximates the offset Z_i − z of
+    the next step. ``doubled`` is ν = μ diag(b) μ: h Σ_j ν_ij L_j is the integral of the offsets from the start of the
+    step to stage i. ``times`` are rounded nodes τ such that ν_ij − ν_ji = τ_i − τ_j holds exactly.
     """
 
     nodes: tuple[float, ...]
@@ -83,7 +87,7 @@ class Tableau:
 
 @cache
 def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
-    """Return the coefficients of the method with some number of stages, rounded for a floating-point format."""
+    """Return the coefficients of the method with a number of stages, rounded for a floating-point format."""
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
     times = [_nearest(c, precision.spacing / 2) for c in nodes]
@@ -100,11 +104,12 @@ def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
 
 @cache
 def continuation(stages: int) -> list[list[float]]:
-    """Return the matrix like ``prediction`` of `Tableau` that evaluates the collocation polynomial of the last step.
+    """Return the matrix that predicts the stages of a step by the collocation polynomial of the last step.
 
-    Solvers with loops over the stages use it: C, JavaScript and NumPy. On ten systems at orders 4 to 16 it takes as
-    many sweeps as the second of `BANDS`, within 6 %, and up to 25 % less at small steps. It needs no change of frame of
-    the step before, and no kick spoils it.
+    It has the form of ``prediction`` of `Tableau`, and is used by solvers with loops over the stages, in C, JavaScript
+    and NumPy. On ten systems at orders 4 to 16, it takes as many sweeps as the second predictor of `BANDS`, within 6 %,
+    and up to 25 % fewer at small steps. It reads only the last step, so derivatives of earlier steps need no change of
+    frame, and a kick between earlier steps does not spoil it.
     """
     weights, _ = _exact(stages)
     nodes = gauss_nodes(stages)
@@ -116,8 +121,8 @@ def continuation(stages: int) -> list[list[float]]:
 def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool = False) -> list[list[list[float]]]:
     """Return the matrix of each predictor in `BANDS`, in the form of ``prediction`` of `Tableau`.
 
-    Columns belong to the L_j of the last step, then to those of the step before. With ``integrated``, the matrices
-    predict integrals of offsets, as ``doubled`` gives them.
+    The first columns belong to the L_j of the last step, and further columns to the step before, if the predictor reads
+    it. With ``integrated``, the matrices predict the integrals of the offsets that ``doubled`` of `Tableau` defines.
     """
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
@@ -128,10 +133,9 @@ def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool =
 def _integrated(
     weights: Sequence[Fraction], mixing: Sequence[Sequence[Fraction]], values: Sequence[Sequence[Fraction]]
 ) -> list[list[Fraction]]:
-    """Return μ diag(b) V, the integrals from the start of the step to each stage of functions with the values V at
-    stages.
+    """Return μ diag(b) V: integrals of functions from the start of a step to each stage, in units of the step.
 
-    The integrals are in units of the step.
+    Column k of V = ``values`` has function k at the stages.
     """
     columns = list(zip(*values, strict=True))
     return [[sum((m * w * v for m, w, v in zip(row, weights, column, strict=True)), Fraction(0)) for column in columns]
@@ -160,9 +164,10 @@ def gauss_nodes(stages: int) -> tuple[Fraction, ...]:
 
 
 def _legendre_zero(n: int, k: int) -> Decimal:
-    """Return zero number k of the Legendre polynomial of degree n on [−1, 1], by Newton's method.
+    """Return zero number k of the Legendre polynomial of degree n on [−1, 1], in descending order from k = 0, by
+    Newton's method.
 
-    Tricomi's starting values are so close to each zero that no deflation is needed.
+    Tricomi's starting values are so close to the zeros that each iteration converges to its own zero.
     """
     import math
 
@@ -177,8 +182,10 @@ def _legendre_zero(n: int, k: int) -> Decimal:
 
 
 def _lagrange(nodes: Sequence[Fraction]) -> list[list[Fraction]]:
-    """Return the Lagrange polynomials of the nodes, 1 at one node and 0 at the others, by coefficients from the lowest
-    on."""
+    """Return the Lagrange polynomial of each node, which is 1 at its node and 0 at all other nodes.
+
+    A polynomial is the list of its coefficients, the constant term first.
+    """
     polynomials = []
     for i, c in enumerate(nodes):
         p = [Fraction(1)]
@@ -208,7 +215,10 @@ def _nearest(value: Fraction, spacing: Fraction) -> Fraction:
 
 
 def _skew_by(times: Sequence[Fraction], exact: Sequence[Sequence[Fraction]], spacing: Fraction) -> list[list[Fraction]]:
-    """Return ν rounded to multiples of the spacing, with ν_ij − ν_ji = τ_i − τ_j exactly."""
+    """Return the matrix ν = μ diag(b) μ rounded to multiples of the spacing, such that ν_ij − ν_ji = τ_i − τ_j exactly.
+
+    ``exact`` is ν before rounding, and ``times`` are the rounded nodes τ_i.
+    """
     nu = [[_nearest(v, spacing) for v in row] for row in exact]
     for i in range(len(nu)):
         for j in range(i):
@@ -223,9 +233,10 @@ def _prediction(
     band: tuple[Fraction, int],
     noise: Fraction,
 ) -> list[list[Fraction]]:
-    """Return μ diag(b) W diag(1/b), where W extrapolates f from the stages of previous steps to those of the next step.
+    """Return a predictor: μ diag(b) W diag(1/b), where W extrapolates f from the stages of previous steps to the next
+    step.
 
-    ``band`` is an entry of `BANDS`, and ``noise`` the relative error of the values.
+    ``band`` is an entry of `BANDS`, and ``noise`` is the relative error of the known values of f.
     """
     n, (width, step_count) = len(nodes), band
     known_times = [c - steps_back for steps_back in range(1, step_count + 1) for c in nodes]
@@ -236,10 +247,10 @@ def _prediction(
 def _extrapolation(
     known_times: Sequence[Fraction], times: Sequence[Fraction], band: Fraction, noise: Fraction
 ) -> list[list[Fraction]]:
-    """Return weights W: Σ_j W[i][j]·f(known_times[j]) predicts f(times[i]).
+    """Return the weights W with which Σ_j W[i][j]·f(known_times[j]) predicts f(times[i]).
 
-    They give the best linear prediction of a signal whose spectrum is flat up to the angular frequency ``band`` and 0
-    beyond, from values with errors of relative size ``noise``.
+    It is the best linear prediction of a signal whose spectrum is flat up to the angular frequency ``band`` and 0
+    beyond, from known values with errors of relative size ``noise``.
     """
     rows = [[_sinc(band * (a - b)) + (noise**2 if a == b else 0) for b in known_times] for a in known_times]
     sides = [[_sinc(band * (a - b)) for b in times] for a in known_times]
@@ -258,7 +269,12 @@ def _sinc(x: Fraction) -> Fraction:
 
 
 def _linear_solutions(rows: Sequence[Sequence[Fraction]], sides: Sequence[Sequence[Fraction]]) -> list[list[Fraction]]:
-    """Return the solutions of linear equations for several right-hand sides ``sides``, by Gaussian elimination."""
+    """Return the solution of a system of linear equations for each right-hand side in ``sides``, by Gaussian
+    elimination.
+
+    ``rows`` is the matrix of the equations. Row k of ``sides`` has equation k of all right-hand sides, and row k of the
+    result has unknown k of all solutions.
+    """
     n = len(rows)
     table = [[*row, *side] for row, side in zip(rows, sides, strict=True)]
     for k in range(n):

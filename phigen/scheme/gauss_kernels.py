@@ -108,11 +108,11 @@ def lift_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
 
 
 def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
-    """Return the kernel that transforms derivatives of group elements to the frame of the next step; None if no frame
-    changes.
+    """Return the kernel that transforms derivatives of the unknowns to the frame in which the next step starts.
 
-    The group element of each step starts at 1. So derivatives from a step that ends at G are multiplied by G* = G⁻¹, to
-    predict the stages of the next step.
+    The derivatives predict the stages of the next step. Each step starts with the group element 1, so derivatives of a
+    group element that ends at G are multiplied by G* = G⁻¹ from the left. Returns None if no unknown needs a
+    transformation: without group elements, or if all group elements have frames F (see `phigen.gauss.lift`).
     """
     if all(group.copies for group in points.realisation.groups):
         return None

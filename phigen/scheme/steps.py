@@ -412,11 +412,13 @@ class Gauss(_Staged):
 
     Fixed-point sweeps solve the stage equations Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j). Then x' = x + D(x, Σ_j
     L_j). The unknowns Z are offsets from the start of the step, where they are 0. ``slope`` is f; its input x is the
-    start of the step, followed by the time if f depends on it. ``change`` is D.
+    start of the step, followed by the time if f depends on the time. ``change`` is D. ``frame`` transforms the L_j to
+    the frame of the next step, if that frame differs. The first ``plain`` unknowns have the scale of the state; all
+    further unknowns are increments of logarithms or of group elements, and have the scale 1.
 
-    ``frame`` transforms the L_j to the frame of the next step, if that is another one. The first ``plain`` unknowns
-    have the scale of the state; the other ones belong to group elements and have the scale 1. ``lifted`` is the same
-    step in frames that follow the state, or None; its ``lift`` describes these frames.
+    ``lifted`` is the same step with the unknowns U = FG in place of the group elements G, where the frame F is the
+    value of U at the start of the step. It is None if some group element has no frame. The ``lift`` of that step
+    describes the frames.
     """
 
     slope: Kernel
