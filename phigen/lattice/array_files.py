@@ -1,7 +1,7 @@
 """Arrays and bonds of lattices in files: ``.npy`` arrays, and ``.csv`` tables with or without a line of names.
 
-A file that does not fit is refused as a whole: `ValueError`, with the line number where one applies. `OSError` is
-raised if the file cannot be read.
+A file with wrong contents raises `ValueError`; for a ``.csv`` file the message has the number of the wrong line. A file
+that cannot be read raises `OSError`.
 """
 
 from __future__ import annotations
@@ -28,21 +28,23 @@ ENDS = ("a", "b")
 
 @dataclass(frozen=True)
 class NumberTable:
-    """The numbers of a ``.csv`` file, and the column names of its first line, if there are any."""
+    """The numbers of a ``.csv`` file as ``rows``, and the column ``names`` of its first line; () if this line has
+    numbers.
+    """
 
     path: Path
     names: tuple[str, ...]
     rows: Floats
 
     def line(self, row: int) -> str:
-        """Return the line number of a row, for messages."""
+        """Return the text "line N" for row ``row`` of the numbers, for messages."""
         with opened_text(self.path) as stream:
             line_numbers = [number for number, text in enumerate(stream, 1) if text.split("#")[0].strip()]
         return f"line {line_numbers[row + bool(self.names)]}"
 
 
 def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
-    """Return the array of that shape in a ``.npy`` or ``.csv`` file.
+    """Return the array in a ``.npy`` or ``.csv`` file, which must have the shape ``shape``.
 
     A table of one column may have the ``name`` of the field or parameter as the column name. Raises `ValueError` for
     other contents.
@@ -60,9 +62,11 @@ def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
 
 
 def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64], dict[str, Floats]]:
-    """Return the ends of bonds (bonds, 2) in a ``.csv`` file, and the columns of ``parameters``, by name.
+    """Return the sites that bonds connect, an array (bonds, 2) from a ``.csv`` file, and the columns of parameters by
+    name.
 
-    Without column names, the file contains the ends only.
+    ``parameters`` are the names that the file may have as columns. Without column names, the file has two columns of
+    sites.
     """
     table = _table(path)
     names = table.names or ENDS
@@ -123,7 +127,7 @@ def _is_number(text: str) -> bool:
 
 
 def _array(path: Path, shape: tuple[int, ...]) -> Floats:
-    """Return the array of a ``.npy`` file; its header is checked before memory is allocated."""
+    """Return the array of a ``.npy`` file. Its shape and type are checked in the header, before memory is allocated."""
     with opened(path) as file:
         try:
             file_shape, dtype = _header(file)
@@ -145,7 +149,7 @@ def _array(path: Path, shape: tuple[int, ...]) -> Floats:
 
 
 def _header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype]:
-    """Return the shape of the array in a file and the kind of its elements."""
+    """Return the shape and the element type that the header of a ``.npy`` file states."""
     version = np.lib.format.read_magic(file)
     readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
     if version not in readers:

@@ -1,6 +1,6 @@
 """Cancellation of parameters at sites that may be 0, such as the masses of test particles.
 
-A factor m of H and a factor 1/m of a bracket cancel, so that equations of motion have their limits at m = 0.
+A factor m of H and a factor 1/m of a bracket are cancelled, so that the equations of motion are defined at m = 0.
 """
 
 from __future__ import annotations
@@ -12,22 +12,26 @@ from phigen.lattice.cell import GRID, Cell
 from phigen.symbolic.expression import ONE, Expression, fold, gradient, mul, power, product, rebuild, symbol
 from phigen.symbolic.neighbours import ENDS
 
-#: An expression without factors that are powers of some symbols, and the exponents of these powers.
+#: Expression as two factors: one without powers of some symbols, and the exponents of these powers.
 Factored = tuple[Expression, Mapping[str, int]]
 
 
 def cancelled(values: Sequence[Expression], names: Iterable[str]) -> list[Expression]:
-    """Return equal expressions in which powers of the named symbols, which are not 0, have been multiplied together."""
+    """Return equal expressions in which the powers of each symbol of ``names`` in a product are combined, as in m·m⁻¹ =
+    1.
+    """
     return [_multiplied(f) for f in _factored(values, names)]
 
 
 def divided(e: Expression, exponents: Mapping[str, int]) -> Expression:
-    """Return the quotient of an expression and powers of symbols."""
+    """Return the expression ``e`` divided by the product of the symbols raised to ``exponents``, with powers
+    cancelled.
+    """
     return cancelled([mul(e, powers({name: -k for name, k in exponents.items()}))], exponents)[0]
 
 
 def common_powers(values: Sequence[Expression], names: Iterable[str]) -> dict[str, int]:
-    """Return the exponents of the powers of symbols that divide all expressions."""
+    """Return the exponents of the greatest powers of the symbols ``names`` that divide all expressions."""
     exponent_maps = [exponents for _, exponents in _factored(values, names)]
     lowest = (
         {name: min(exponents.get(name, 0) for exponents in exponent_maps) for name in names} if exponent_maps else {}
@@ -36,7 +40,7 @@ def common_powers(values: Sequence[Expression], names: Iterable[str]) -> dict[st
 
 
 def powers(exponents: Mapping[str, int]) -> Expression:
-    """Return the product of the symbols raised to these ``exponents``."""
+    """Return the product of the symbols, each raised to its exponent."""
     return product(power(symbol(name), k) for name, k in exponents.items())
 
 
@@ -45,7 +49,7 @@ class SumFactors:
     """Common factors of the forces of bonds or pairs on one field: powers of parameters at sites that may be 0.
 
     The sums over bonds and pairs are computed without these factors, and multiplied by ``at_site`` afterwards.
-    ``at_end`` has the exponents of the factors by the symbols ``m[a]``.
+    ``at_end`` has the exponents of the same factors by their symbols at the end of a bond, such as ``m[a]``.
     """
 
     at_site: Expression = ONE
@@ -53,9 +57,9 @@ class SumFactors:
 
 
 def sum_factors(cell: Cell, name: str) -> SumFactors:
-    """Return the powers that all terms of the sums in the force on a field have in common.
+    """Return the factors that all terms of the sums in the force on the field ``name`` have in common.
 
-    There are none on a grid, with brackets along bonds, or if no parameter may be 0.
+    The factors are 1 on a grid, with brackets along bonds, or if no parameter may be 0.
     """
     if not cell.vanishing or cell.bond_bracket or cell.relation == GRID:
         return SumFactors()

@@ -1,9 +1,10 @@
 """One cell of a lattice: the fields of a site, their brackets with neighbours, and the density of H.
 
-Neighbours are ordinary symbols of the expression engine. On a grid ``x[i+1]`` and ``x[i-1,j+2]`` are x at the site with
-these offsets along the axes i and j; axes come in their order, those of offset 0 are left out, and ``x`` alone is
-x at the site itself. On graphs, and for all pairs, ``x[a]`` and ``x[b]`` are x at the two ends. Parameters that have a
-value at every site are written in the same way.
+Values at neighbours are ordinary symbols of expressions. On a grid, ``x[i-1,j+2]`` is x at the site with the offset −1
+along the axis i and 2 along the axis j. Axes come in their order, and axes with the offset 0 are left out: ``x[i+1]``
+is x at the next site along i, and ``x`` is x at the site itself. On graphs, and if all pairs of sites interact,
+``x[a]`` and ``x[b]`` are x at the two ends of a bond or pair. Parameters that have a value at every site are written in
+the same way.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ PERIODIC, OPEN = "periodic", "open"
 
 @dataclass(frozen=True)
 class Cell:
-    """A lattice, defined by one cell.
+    """A lattice of identical sites, defined by its fields, brackets and energy densities at one site.
 
     ``axes`` name the directions of a grid, the slowest first; ``boundary`` is `PERIODIC` or `OPEN` for each axis.
-    Graphs and pairs have neither. ``bracket`` maps a pair of symbols, f at the site and g at some offset, to {f, g}; it
+    Graphs and pairs have neither. ``bracket`` maps a pair of symbols, f at the site and g at an offset, to {f, g}; it
     has all nonzero brackets, in both orders. ``bond_bracket`` maps ("f[a]", "g[b]") and ("g[b]", "f[a]") to their
-    bracket along a bond. ``hamiltonian`` is the density of a site, ``bond_hamiltonian`` that of a bond from a to b, and
-    ``pair_hamiltonian`` that of a pair. H is the sum of the densities, without the `terms` that reach beyond an open
-    end.
+    bracket along a bond. ``hamiltonian`` is the energy density of a site, ``bond_hamiltonian`` the energy of a bond
+    from a to b, and ``pair_hamiltonian`` the energy of a pair. H is the sum of these over all sites, bonds and pairs,
+    without the `terms` that reach beyond an open end.
 
     ``casimirs`` maps names to a density and its kind: ``sites`` (one Casimir for each site), ``sum`` or ``product``.
     ``invariants`` are sums over sites. ``time`` is the symbol of t, which H and the invariants may contain, or "".
@@ -73,39 +74,46 @@ class Cell:
 
     @property
     def times(self) -> tuple[str, ...]:
-        """The symbol of the time; empty without a time."""
+        """The symbol of the time t as a tuple; () if H does not depend on the time."""
         return (self.time,) if self.time else ()
 
     @cached_property
     def neighbours(self) -> Neighbours:
-        """The symbols of all quantities with a value at every site: fields, then parameters at sites, then noise."""
+        """The symbols of all quantities with a value at every site: fields, then parameters at sites, then noise
+        increments, then derived values.
+        """
         at_sites = (p.name for p in self.parameters if p.at == "sites")
         return Neighbours((*self.fields, *at_sites, *self.increments, *self.derived), self.axes)
 
     @property
     def vanishing(self) -> frozenset[str]:
-        """The parameters at sites that may be 0."""
+        """The parameters at sites whose values may be 0, that is, those not declared positive."""
         return frozenset(p.name for p in self.parameters if p.at == "sites" and not p.positive)
 
     @property
     def origin(self) -> Offset:
-        """The offset of the site itself."""
+        """The offset of a site from itself, which is zero along all axes."""
         return self.neighbours.origin
 
     def at(self, name: str, offset: Offset) -> str:
-        """Return the symbol of a field, or of a parameter at sites, at an offset."""
+        """Return the symbol of a field, or of a parameter at sites, at the site ``offset`` away."""
         return self.neighbours.at(name, offset)
 
     def place(self, name: str) -> Place:
-        """Return the field, or parameter at sites, of a symbol, and its offset. `KeyError` for any other symbol."""
+        """Return the field, or parameter at sites, that a symbol stands for, and the offset of its site.
+
+        Raises `KeyError` for symbols of any other kind.
+        """
         return self.neighbours.place(name)
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
-        """Return the places of those symbols of the expressions that have a value at every site, by symbol."""
+        """Return (name, offset) by symbol, for all symbols of the expressions that have a value at every site."""
         return self.neighbours.places(*expressions)
 
     def shifted(self, expression: Expression, offset: Offset) -> Expression:
-        """Return the expression translated by an offset of the grid."""
+        """Return the expression moved by ``offset`` on a grid: each symbol is replaced by that of the site ``offset``
+        away.
+        """
         return self.neighbours.shifted([expression], offset)[0]
 
     def on(self, expression: Expression, end: str) -> Expression:
@@ -117,12 +125,14 @@ class Cell:
 
     @cached_property
     def terms(self) -> tuple[Expression, ...]:
-        """The additive terms of the density of a site; a term that reaches beyond an open end is left out there."""
+        """The additive terms of the energy density of a site. A term is omitted where it reaches beyond an open end."""
         return tuple(self.additive_terms(self.hamiltonian))
 
     def additive_terms(self, density: Expression) -> Iterator[Expression]:
-        """Yield the additive terms of a density. A common factor that is the same at all sites is multiplied into each
-        term."""
+        """Yield the additive terms of a density.
+
+        Factors of a bracketed sum that do not depend on the site are multiplied into its terms.
+        """
         yield from self._terms(density, ())
 
     def _terms(self, density: Expression, factors: tuple[Expression, ...]) -> Iterator[Expression]:
@@ -142,16 +152,16 @@ class Cell:
             yield density
 
     def extent(self, expression: Expression) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Return the smallest offsets along the axes, then the largest, over the site itself and all symbols of a
-        term."""
+        """Return the smallest and the largest offset along each axis among the site itself and all symbols of an
+        expression.
+        """
         offsets = [steps(self.origin), *(steps(o) for _, o in self.places(expression).values())]
         return tuple(map(min, zip(*offsets, strict=True))), tuple(map(max, zip(*offsets, strict=True)))
 
     @cached_property
     def poisson_reach(self) -> tuple[int, ...]:
-        """Largest offset along each axis in the brackets.
-
-        The offsets are those of the second fields of the brackets, and of the symbols in their values.
+        """The largest offset along each axis that occurs in a bracket {f, g}: that of g, or of a symbol in its
+        value.
         """
         second_fields = [symbol(other) for _, other in self.bracket]
         return self._reach([*second_fields, *self.bracket.values()])
@@ -167,7 +177,7 @@ class Cell:
         return self._widest(self.observables.values())
 
     def _widest(self, expressions: Iterable[Expression]) -> tuple[int, ...]:
-        """Return the largest distance along each axis between two sites of one of the expressions."""
+        """Return the largest distance along each axis between two sites in one expression."""
         grid = expressions if self.axes else ()
         widths = [[high - low for low, high in zip(*self.extent(e), strict=True)] for e in grid]
         return tuple(max((w[k] for w in widths), default=0) for k in range(len(self.axes)))
@@ -178,7 +188,7 @@ class Cell:
 
     @property
     def is_local(self) -> bool:
-        """Whether brackets couple the fields of one site only."""
+        """Whether all brackets are between fields of one and the same site."""
         return not self.bond_bracket and not any(self.poisson_reach)
 
 
@@ -186,8 +196,8 @@ class Cell:
 class Contribution:
     """A term of ∂H/∂f at a site.
 
-    ``low`` and ``high`` are the extreme offsets of the term of H that it derives from. Beside an open end the
-    contribution exists only if all offsets from ``low`` to ``high`` are on the lattice.
+    It is the derivative of a term of H, which reads the sites between the offsets ``low`` and ``high``. Near an open
+    end, the contribution is omitted unless all these sites are on the lattice.
     """
 
     expression: Expression
@@ -196,7 +206,9 @@ class Contribution:
 
 
 def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
-    """Return, for each field f, the terms of ∂H/∂f at a site of a grid, from all densities that mention the site."""
+    """Return, for each field f, the terms of ∂H/∂f at a site of a grid: derivatives of all terms of H that read the
+    site.
+    """
     terms_by_field: dict[str, list[Contribution]] = {f: [] for f in cell.fields}
     for term in cell.terms:
         field_places = {name: p for name, p in cell.places(term).items() if p[0] in cell.fields}
@@ -210,9 +222,9 @@ def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
 
 
 def forces(cell: Cell) -> dict[str, Expression]:
-    """Return ∂H/∂f at a site, for each field f, from the densities of sites; away from open ends.
+    """Return ∂H/∂f at a site for each field f, from the energy densities of sites, for sites away from open ends.
 
-    On graphs and for pairs, `bond_forces` has the contributions of bonds and pairs.
+    On graphs and for pairs, the contributions of bonds and pairs are left out; `bond_forces` returns these.
     """
     if cell.relation != GRID:
         return dict(zip(cell.fields, gradient(cell.hamiltonian, cell.fields), strict=True))
@@ -220,8 +232,11 @@ def forces(cell: Cell) -> dict[str, Expression]:
 
 
 def bond_forces(cell: Cell) -> dict[str, Expression]:
-    """Return the nonzero derivatives of the density of a bond or a pair with respect to ``f[a]`` and ``f[b]``, by
-    symbol."""
+    """Return the derivatives of the energy of a bond or pair with respect to the fields ``f[a]`` and ``f[b]`` of its
+    ends.
+
+    The result maps these symbols to derivatives; zeros are left out.
+    """
     density = cell.bond_hamiltonian + cell.pair_hamiltonian
     names = [cell.at(f, (end,)) for end in ENDS for f in cell.fields]
     return {n: slope for n, slope in zip(names, gradient(density, names), strict=True) if not slope.is_zero}
@@ -241,7 +256,7 @@ def vector_field(cell: Cell) -> dict[str, Expression]:
 
 
 def _tangent(cell: Cell, covector: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return πp at a site of a grid, by field, for a covector p that is given at the same site."""
+    """Return πp at a site of a grid, by field; ``covector`` has the components of p at the site, by field."""
     rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         base, offset = cell.place(other)

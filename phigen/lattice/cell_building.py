@@ -15,7 +15,10 @@ from phigen.symbolic.neighbours import Neighbours, minus
 
 @dataclass(frozen=True)
 class Misfit:
-    """A size of a run that is not a multiple of the period of the colouring; ``fitting`` is a multiple near it."""
+    """A size in a run that is not a multiple of the period of the colouring along its axis.
+
+    ``fitting`` is a multiple of the period near ``size``.
+    """
 
     run: str
     axis: str
@@ -28,7 +31,9 @@ class Misfit:
 
 
 class MisfitError(SpecError):
-    """Sizes of runs that are not multiples of the periods of the colouring; ``reason`` says so in one line."""
+    """Error for runs with sizes that are not multiples of the periods of the colouring; ``reason`` states it in one
+    line.
+    """
 
     def __init__(self, diagnostics: list[Diagnostic], reason: str = "") -> None:
         super().__init__(diagnostics)
@@ -38,7 +43,8 @@ class MisfitError(SpecError):
 def cell_from_spec(spec: Spec) -> Cell:
     """Return the cell of a spec.
 
-    Raises `SpecError` if a form of π is not possible on this lattice, or a run is smaller than the stencil.
+    Raises `SpecError` if the lattice does not allow the form of π, forces or noise of the spec, or if a run has fewer
+    sites along an axis than a term spans.
     """
     lattice = spec.lattice
     if lattice is None:
@@ -75,22 +81,22 @@ def cell_from_spec(spec: Spec) -> Cell:
 
 
 def least_sizes(cell: Cell) -> tuple[int, ...]:
-    """Return the least size along each axis of a grid.
+    """Return the least number of sites along each axis of a grid.
 
-    No site is then its own neighbour, and each term of H, π and the observables fits between open ends.
+    With these numbers no site is its own neighbour, and each term of H, π and the observables fits between open ends.
     """
     reaches = zip(cell.hamiltonian_reach, cell.poisson_reach, cell.observed_reach, strict=True)
     return tuple(1 + max(reach) for reach in reaches)
 
 
 def expect_coloured(spec: Spec, cell: Cell, periods: Sequence[int]) -> None:
-    """Raise `MisfitError` for runs whose sizes are no multiples of the periods of the colouring of a splitting."""
+    """Raise `MisfitError` for runs whose sizes are not multiples of the ``periods`` of the colouring of a splitting."""
     if wrong_sizes := misfits(spec, cell, periods):
         raise MisfitError(misfit_diagnostics(spec, wrong_sizes))
 
 
 def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
-    """Return the sizes of runs that are not multiples of the periods."""
+    """Return the sizes of all runs that are not multiples of the ``periods`` of a colouring along the axes."""
     return [
         Misfit(run.name, axis, size, period, max(size // period, -(-least // period)) * period)
         for run in spec.runs.values()
@@ -102,7 +108,7 @@ def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
 
 
 def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagnostic]:
-    """Return an error message for each size that does not fit, at its place in the spec."""
+    """Return an error message for each size that is not a multiple of its period, at its place in the spec."""
     return [
         spec.diagnostic(
             ("runs", m.run, "sizes"),
@@ -114,15 +120,20 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
 
 
 def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
-    """Return one line on all sizes that do not fit, for a splitting with this number of ``colours``; "" if all fit."""
+    """Return one line that names all sizes which are not multiples of the periods, for the header of generated files.
+
+    It says that a splitting with this number of ``colours`` needs multiples. It is "" if there is no wrong size.
+    """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     requirement = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"
     return f"{' and '.join(distinct)}, {requirement}" if wrong_sizes else ""
 
 
 def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
-    """Return one line on the sizes that are no multiples of the period, for a splitting that treats them by a boundary
-    seam."""
+    """Return one line that names all sizes which are not multiples of the periods, if a boundary seam allows them.
+
+    It says which sizes need no seam.
+    """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would do without"
 
@@ -134,7 +145,7 @@ def _local(spec: Spec) -> dict[tuple[str, str], Expression]:
 
 
 def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression]:
-    """Return the brackets between different sites in both orders."""
+    """Return the brackets between different sites that a spec states in one order, completed to both orders."""
     at_sites = (p.name for p in spec.parameters if p.at == "sites")
     neighbours = Neighbours((*spec.coordinates, *at_sites), lattice.axes)
     brackets: dict[tuple[str, str], Expression] = {}
@@ -152,7 +163,8 @@ def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression
 def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
     """Yield an error for forces and noise that a spec with brackets along bonds cannot have.
 
-    With such brackets π of a covector field at a site is a sum over bonds, which these features do not compute.
+    With brackets along bonds, πp at a site is a sum over bonds for every covector field p. Forces and noise do not
+    compute this sum.
     """
     declared = {("damping",): spec.forces.damping is not None, ("forces", "covector"): bool(spec.forces.covector)}
     for path, is_declared in {**declared, ("noise",): bool(spec.noise)}.items():
@@ -171,7 +183,7 @@ def _noise_beyond(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
 
 
 def _too_small(spec: Spec, cell: Cell, run: Run) -> Iterator[Diagnostic]:
-    """Yield an error for each size of a run that is smaller than the stencil."""
+    """Yield an error for each size of a run that is smaller than the least size (see `least_sizes`)."""
     sizes = run.lattice.sizes if run.lattice else ()
     for axis, size, least in zip(cell.axes, sizes, least_sizes(cell), strict=False):
         if size < least:

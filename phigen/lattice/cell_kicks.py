@@ -1,7 +1,7 @@
 """Search for a kick part V among two parts of H of a lattice, and its modified potential V + κ{V, {V, T}}.
 
-See `phigen.splitting.kicks`. The bracket of two sums over sites is a sum over sites, {F, G} = Σ_s Σ ∂F/∂f(s) {f, g}(s)
-∂G/∂g(s + d). The range of its density is at most the sum of the ranges of F and G.
+See `phigen.splitting.kicks`. The bracket of two sums over sites is again a sum over sites s: {F, G} = Σ_s Σ ∂F/∂f(s)
+{f, g}(s) ∂G/∂g(s + d), where the inner sum runs over the brackets of fields f and g at the distance d.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from phigen.symbolic.tower import Tower
 
 
 def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
-    """Return the parts of H that can be the V of a Nyström method: {V, {V, {V, T}}} = 0 is proved by degrees.
+    """Return the parts of H that can be the potential V of a Nyström method, which requires {V, {V, {V, T}}} = 0.
 
-    Only a splitting into two parts without colours has such parts. On a grid the flow of the modified potential is
-    added.
+    The condition is proved by polynomial degrees. It is only examined for splittings into two parts, V and T, without
+    colours. On a grid, each result also has the flow of the modified potential V + κ{V, {V, T}}.
     """
     coloured = splitting.colouring.count > 1 or any(flow.by_colour for flow in splitting.flows)
     if len(splitting.flows) != 2 or coloured or cell.bond_bracket:
@@ -75,7 +75,7 @@ def _modified(cell: Cell, splitting: CellSplitting, v: CellFlow, t: CellFlow) ->
 
 
 def _bracket(cell: Cell, left: Sequence[Summand], right: Sequence[Summand]) -> Iterator[Summand]:
-    """Yield the terms of {Σ left, Σ right}."""
+    """Yield the terms of the bracket {Σ left, Σ right} of two sums over sites."""
     slopes = {f: list(_slopes(cell, left, f)) for f in cell.fields}
     right_slopes = {f: list(_slopes(cell, right, f)) for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
@@ -89,7 +89,9 @@ def _bracket(cell: Cell, left: Sequence[Summand], right: Sequence[Summand]) -> I
 
 
 def _slopes(cell: Cell, summands: Sequence[Summand], field: str) -> Iterator[Summand]:
-    """Yield the derivatives of a sum over sites with respect to a field at one site, term by term."""
+    """Yield the derivatives of a sum over sites with respect to a field at one site, one for each term and each symbol
+    of the field.
+    """
     for s in summands:
         places = {n: o for n, (f, o) in cell.places(s.expression).items() if f == field}
         for slope, offset in zip(gradient(s.expression, list(places)), places.values(), strict=True):

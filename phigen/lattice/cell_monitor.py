@@ -1,7 +1,8 @@
-"""The explicit monitor of all pairs of sites, H = A + B: K = log(A + e) − log(−B).
+"""The monitor K = log(A + e) − log(−B) with H = A + B, for lattices in which all pairs of sites interact.
 
-A and B are sums over all sites and pairs, and each is constant along its own flow, so that the flow of a part of K is
-that of the part of H over another time; see `phigen.scheme.logarithmic`. All sites have the same steps.
+A and B are sums over all sites and pairs, and e = −H(x₀). A is constant along its own flow, and so is B. Therefore the
+flow of each part of K is the flow of A or B over another duration; see `phigen.scheme.logarithmic`. The steps in time
+vary, but are the same for all sites.
 """
 
 from __future__ import annotations
@@ -25,12 +26,12 @@ from phigen.symbolic.neighbours import ENDS
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.symbols import GATHERED, Symbol
 
-#: Symbol of the variation of the duration of a flow, in tangent kernels.
+#: Symbol for the variation of the duration of a flow, in kernels of the tangent map.
 LATE = Symbol("late")
 
 
 def expect_applicable(cell: Cell, spec: Spec) -> None:
-    """Raise `SpecError` for a monitor that is not of the form of this module."""
+    """Raise `SpecError` for a monitor that the spec requests and lattices do not offer."""
     if spec.monitor is None:
         return
     message, hint = "", "remove monitor; then all steps have the same size in time"
@@ -53,9 +54,10 @@ def expect_applicable(cell: Cell, spec: Spec) -> None:
 
 
 def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
-    """Return the index of the part B. Raises `SpecError` unless there are two parts, one of them negative.
+    """Return the index of the part B, which must be negative.
 
-    The sign is decided for all states or, if that fails, at the initial states of all runs.
+    The sign is decided for all states or, if that fails, at the initial states of all runs. Raises `SpecError` unless
+    there are two parts, one of them negative.
     """
     if len(flows) != 2:
         message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
@@ -82,7 +84,7 @@ def _positive(cell: Cell, e: Expression) -> set[str]:
 
 
 def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
-    """Return the energy of a part at the start of a run."""
+    """Return the energy of the part of a ``flow`` at the initial state of a run."""
     import numpy as np  # numpy is imported here: its import takes as long as the compilation of a small system
 
     from phigen.lattice.states import start_of
@@ -105,7 +107,11 @@ def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
 def rates_of(
     cell: Cell, flows: Sequence[CellFlow], negative: int, *, tangent: bool
 ) -> tuple[PartRates, list[tuple[str, BondSum]]]:
-    """Return the kernels of the energies of both parts, and the sums over pairs that they read, by their names."""
+    """Return the kernels of the energies of A and B, and the sums over pairs that these kernels read.
+
+    Each sum comes with the name of its kernel. With ``tangent``, kernels and sums for the variations of the energies
+    are added.
+    """
     energies, slopes, sums = list[Kernel](), list[Kernel](), list[tuple[str, BondSum]]()
     sum_symbol = Symbol(GATHERED, "energy")
     for k, flow in enumerate(flows, 1):
@@ -123,14 +129,14 @@ def rates_of(
 
 
 def fact(flows: Sequence[CellFlow], negative: int) -> str:
-    """Return the line about the monitor in the header of generated files."""
+    """Return the line that describes the monitor in the header of generated files."""
     return fact_of(f"the sum of {shortened(flows[negative].hamiltonian)}")
 
 
 def delayed(increments: Sequence[Expression], slopes: Sequence[Expression]) -> list[Expression]:
     """Return the variations of the increments of a flow whose duration varies by `LATE`.
 
-    ``slopes`` are the variations at fixed duration.
+    ``slopes`` are the variations of the increments at a fixed duration.
     """
     rates = (gradient(e, [TIME])[0] for e in increments)
     return [slope + rate * symbol(LATE) for slope, rate in zip(slopes, rates, strict=True)]

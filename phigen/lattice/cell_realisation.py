@@ -1,9 +1,9 @@
 """Bi-realisations on a lattice: α and β at a site depend on covectors p in its neighbourhood.
 
-Where π is local, so are α and β, and any bi-realisation in closed form of the system of one site can be used. Where π
-couples neighbours, it must be constant in coordinates φ(f) of each field f, with φ(f) = f or log f. With p' the
-covector in these coordinates and D = π'p', which is a stencil, α = φ⁻¹(φ − ½D) and β = φ⁻¹(φ + ½D). This covers
-constant π, log-canonical π, and the brackets of the Toda lattice.
+If brackets are between fields of one site only, any symmetric bi-realisation in closed form of the system of one site
+can be used. If π couples neighbours, it must be constant in coordinates φ(f) of each field f, with φ(f) = f or log f.
+Let π' and p' be π and the covector in these coordinates, and D = π'p', a sum over neighbouring sites. Then α = φ⁻¹(φ −
+½D) and β = φ⁻¹(φ + ½D). This covers constant π, log-canonical π, and the brackets of the Toda lattice.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.symbols import Symbol, initial, momentum
 
-#: The kind of a bi-realisation for brackets that couple neighbours.
+#: Kind of the bi-realisation if brackets couple neighbours and are constant in the logarithms of some fields.
 KIND = "constant in logarithms"
 
 
 @dataclass(frozen=True)
 class CellRealisation:
-    """α and β at a site, symmetric and exact.
+    """Symmetric and exact bi-realisation of a lattice: α and β at a site.
 
-    ``displacement`` is α − x and ``increment`` β − α, for each field, in the symbols of the fields at offsets and of
-    their covectors (`momentum` of these symbols). Where π is local, ``site`` has the system of one site and its
-    bi-realisation; elsewhere ``logarithmic`` has the fields f with φ = log f.
+    ``displacement`` is α − x and ``increment`` is β − α, by field. They are expressions in the fields around the site,
+    and in the symbols `momentum` of covectors. If brackets are between fields of one site only, ``site`` has the system
+    of one site and its bi-realisation. Otherwise ``logarithmic`` has the fields f that enter as log f.
     """
 
     kind: str
@@ -59,7 +59,7 @@ class CellRealisation:
     def middle(self) -> dict[str, Expression]:
         """The solution y of α(y, p) = x at a site, by field, with the symbols `initial` for x at this site.
 
-        The formula is explicit where α is affine in y.
+        The formula is explicit if α is affine in y. Otherwise y also occurs on its right-hand side.
         """
         fields, values = list(self.displacement), list(self.displacement.values())
         slopes = [gradient(e, fields) for e in values]
@@ -76,7 +76,7 @@ class CellRealisation:
 
 
 def realise_cell(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) -> CellRealisation:
-    """Return the bi-realisation of a grid or of pairs. Raises `SpecError` where none in closed form is known."""
+    """Return the bi-realisation for the brackets of a cell. Raises `SpecError` if phigen knows none in closed form."""
     return _of_site(cell, form, choice) if cell.is_local else _of_neighbours(cell, choice)
 
 
@@ -124,7 +124,9 @@ def _of_neighbours(cell: Cell, choice: BirealisationChoice) -> CellRealisation:
 
 
 def _logarithms(cell: Cell) -> tuple[frozenset[str], dict[tuple[str, str], Expression]] | None:
-    """Return the fewest fields whose logarithms make π constant, and π in these coordinates, or None."""
+    """Return the fewest fields whose logarithms make all brackets constant, and the constant brackets; None if there
+    are none.
+    """
     for count in range(len(cell.fields) + 1):
         for logarithmic in itertools.combinations(cell.fields, count):
             constants = {pair: _constant(cell, *pair, logarithmic) for pair in cell.bracket}
@@ -135,7 +137,10 @@ def _logarithms(cell: Cell) -> tuple[frozenset[str], dict[tuple[str, str], Expre
 
 
 def _constant(cell: Cell, f: str, other: str, logarithmic: Sequence[str]) -> Expression | None:
-    """Return the bracket of two fields in coordinates that may be logarithms, or None if it is not constant."""
+    """Return the bracket of the symbols ``f`` and ``other``, or of their logarithms; None if it is not constant.
+
+    ``logarithmic`` has the fields of which logarithms are taken.
+    """
     entry = cell.bracket[f, other]
     fields = [n for n, (base, _) in cell.places(entry, symbol(f), symbol(other)).items() if base in cell.fields]
     terms = coordinate_terms(fields, [entry])

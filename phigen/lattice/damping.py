@@ -1,8 +1,9 @@
 """Flows of damping at sites, as parts of the splitting of a lattice: ẋ = λππb with b = ∇H.
 
-b depends on neighbours, which are damped too. The terms of b that do not depend on the site itself have a flow while
-the neighbours stand still. This flow is applied colour by colour: no two sites of one colour are neighbours. The other
-terms of b depend on the site alone; their flow is applied to all sites.
+b depends on neighbours, which are damped too. The flow is split. The terms of b that do not depend on the site itself
+have a flow while the neighbours stand still. It is applied to the sites of one colour after the other, where no two
+sites of one colour are neighbours. The remaining terms of b depend on the fields of the site; their flow is applied to
+all sites at once.
 """
 
 from __future__ import annotations
@@ -34,10 +35,10 @@ _HINT = "that of a spin has one where H is linear or quadratic along an axis in 
 
 
 def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """Return the flows of damping.
+    """Return the flows of damping for sites that are coloured by ``colouring``.
 
-    Raises `SpecError` with the reason if there is no flow in closed form, and its subclass `TogetherError` if another
-    colouring might have one.
+    Raises `SpecError` with the reason if there is no flow in closed form. If another colouring might have a flow, the
+    error is a `TogetherError`.
     """
     try:
         return tuple(_flows(cell, colouring))
@@ -48,7 +49,7 @@ def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlo
 
 
 class TogetherError(SpecError):
-    """Error of a colouring in which neighbours have one colour, so that they would be damped at the same time."""
+    """Error for a colouring that gives neighbours one colour, so that they would be damped at the same time."""
 
 
 class _NoFlowError(Exception):
@@ -64,7 +65,7 @@ def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
         raise _NoFlowError("brackets couple sites" if not cell.is_local else "every site is a neighbour of all others")
     fixed_slopes, own_slopes = _slopes(cell)
     sums = _sums(cell)
-    _flow(cell, fixed_slopes, [0], sums)  # raises the error that no colouring avoids
+    _flow(cell, fixed_slopes, [0], sums)  # raises the error if there is no flow with any colouring
     for colour in _colours(cell, colouring, fixed_slopes):
         flow = _flow(cell, fixed_slopes, [colour], sums)
         if colouring.seams and colour is not None:
@@ -82,7 +83,7 @@ def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
 
 
 def _slopes(cell: Cell) -> tuple[Covector, Covector]:
-    """Return ∂H/∂f at a site, by field: the terms that do not depend on the site itself, and the rest."""
+    """Return ∂H/∂f at a site for each field f, as two sums: terms without fields of the site itself, and all others."""
     site_fields = SiteFields(cell, sums_by_field(cell))
     slopes = [site_fields.slope(f) for f in cell.fields]
     ring = bracketless_ring(cell.fields, slopes)
@@ -95,9 +96,9 @@ def _slopes(cell: Cell) -> tuple[Covector, Covector]:
 
 
 def _sums(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums over bonds in the slopes at sites of the colour.
+    """Return the sums over bonds in ∂H/∂f at the sites of the colour that is damped.
 
-    Raises `_NoFlowError` if they depend on the site itself.
+    Raises `_NoFlowError` if a sum contains fields of the damped site itself.
     """
     sums = site_sums(cell) if cell.relation == GRAPH else ()
     for base, offset in cell.places(*(e for s in sums for e in s.values.values())).values():
@@ -107,8 +108,11 @@ def _sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def _colours(cell: Cell, colouring: Colouring, fixed_slopes: Covector) -> list[int | None]:
-    """Return the colours that are damped one after the other; one entry if sites are independent of their
-    neighbours."""
+    """Return the colours that are damped one after the other.
+
+    There is one entry if the damping of a site does not depend on its neighbours, or on a graph, whose colours are
+    known only at run time. Raises `_TogetherError` if neighbours have one colour.
+    """
     if cell.relation == GRAPH:
         return [0]
     places = cell.places(*fixed_slopes.values(), *([cell.forces.damping] if cell.forces.damping is not None else []))
@@ -127,7 +131,7 @@ def _flow(
     sums: tuple[BondSum, ...] = (),
     weight: Expression = ONE,
 ) -> CellFlow:
-    """Return the flow of λππb for a covector b at sites of these colours; ``weight`` multiplies the motion."""
+    """Return the flow of ẋ = w λππb at the sites of ``colours``, with b = ``covector`` and w = ``weight``."""
     site_fields, n = SiteFields(cell), cell.fields
     fields_in_covector = {f for f, e in covector.items() if set(symbols_of(e)) & set(n)}
     b = {f: e if fields_in_covector or e.is_zero else symbol(Symbol(FORCE, f)) for f, e in covector.items()}

@@ -2,8 +2,8 @@
 
 P = dH/dt is a sum over sites, bonds and pairs: the change of each density along the motion, plus its derivative with
 respect to time. The Hamiltonian vector field itself contributes nothing to the sum. P is evaluated after every step,
-and integrated by interpolating polynomials through eight neighbouring values, so frames may be any number of steps
-apart.
+and its integral is that of polynomials which interpolate eight neighbouring values. So the accuracy does not depend on
+the number of steps between frames.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from phigen.symbolic.expression import Expression, gradient, symbol, symbols_of,
 from phigen.symbolic.neighbours import ENDS, Offset
 from phigen.symbolic.symbols import VARIATION, Symbol, variation
 
-#: Numbers of nodes of the interpolating polynomials, and of the coarser ones for the error estimate: the error is
-#: estimated by the difference of the two integrals.
+#: Numbers of nodes of the interpolating polynomials. The error of the fine integral is estimated by its difference from
+#: the coarse integral.
 FINE_NODES, COARSE_NODES = 8, 6
 
 
@@ -51,7 +51,7 @@ class Power:
         return power
 
     def _rate(self, density: Expression) -> Expression:
-        """Return the time derivative of a density, in the fields and their rates."""
+        """Return the time derivative of a density, as an expression in the fields and their time derivatives."""
         names = [n for n, (base, _) in self.cell.places(density).items() if base in self.cell.fields]
         slopes = gradient(density, [*names, *self.cell.times])
         along_motion = total(s * symbol(variation(n)) for s, n in zip(slopes, names, strict=False) if not s.is_zero)
@@ -77,13 +77,17 @@ def _variations(term: Expression) -> Iterator[Symbol]:
 
 
 def shifted(array: Floats, offset: Offset) -> Floats:
-    """Return an array with, at each site, the value of the site ``offset`` away; the grid wraps around."""
+    """Return an array whose entry at each site is the entry of ``array`` at the site ``offset`` away; axes wrap
+    around.
+    """
     return np.roll(array, [-int(o) for o in offset], tuple(range(array.ndim))) if offset else array
 
 
 def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: Sequence[int]) -> NDArray[np.bool_]:
-    """Return a mask (*sizes) that is true at sites where a term of this ``extent`` does not reach beyond an open
-    end."""
+    """Return a mask (*sizes): true where a term fits between open ends if it is placed at the site.
+
+    ``extent`` has the smallest and the largest offset of the term along each axis.
+    """
     mask = np.ones(tuple(sizes), dtype=bool)
     if cell.relation != GRID:
         return mask
@@ -97,18 +101,18 @@ def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: 
 
 
 def integral(values: Floats, h: float, row_positions: Floats | None = None) -> tuple[Floats, float]:
-    """Return the integrals of P from the first time to later times, and an estimate of their error.
+    """Return the integrals of the power P from the first time to later times, and an estimate of their error.
 
-    ``values`` (steps + 1,) are P at times ``h`` apart. There is an integral for each of these times or, with
-    ``row_positions`` (rows,), for times at these numbers of steps, fractions included. Beyond the last value, the
-    polynomial through the last values is integrated.
+    ``values`` (steps + 1,) are P at times ``h`` apart. Without ``row_positions`` there is an integral to each of these
+    times. With ``row_positions`` (rows,), the integrals end at these times instead, given in steps since the first
+    time, which need not be whole numbers. An integral beyond the last value extrapolates the last polynomial.
     """
     fine, coarse = (_integrals_to(values, count, h, row_positions) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())
 
 
 def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | None) -> Floats:
-    """Return the integrals from the first time to the times of `integral`, by polynomials through ``count`` values."""
+    """Return the integrals that `integral` returns, by polynomials through ``count`` neighbouring values."""
     intervals = len(values) - 1
     integrals = np.append(
         0.0, h * np.cumsum(_interval_integrals(values, count, np.arange(intervals), np.ones(intervals)))
@@ -123,8 +127,8 @@ def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | 
 def _interval_integrals(values: Floats, count: int, stencil_starts: NDArray[np.int64], lengths: Floats) -> Floats:
     """Return the integral over each interval, by the polynomial through the ``count`` values around the interval.
 
-    Intervals begin at the values numbered ``stencil_starts``; ``lengths`` are in units of the distance between two
-    values.
+    ``stencil_starts`` are the indices of the values at which intervals begin. ``lengths`` of intervals are in units of
+    the distance between two values.
     """
     count = min(count, len(values))
     starts = np.clip(stencil_starts - (count // 2 - 1), 0, len(values) - count)

@@ -1,6 +1,6 @@
-"""The expansion of a small lattice as an ordinary spec, with a coordinate for each field of each site.
+"""Expansion of a small lattice: an ordinary spec with a coordinate for each field of each site.
 
-The expansion defines the meaning of a cell: both have the same equations of motion.
+The expansion defines the meaning of a lattice spec: the lattice must have the same equations of motion.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ Site = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Expansion:
-    """A cell at given sizes, with all sites written out.
+    """A lattice of given sizes as an ordinary system, with all sites written out.
 
-    Graphs have their bonds; graphs and pairs have one size, the number of sites. ``names`` maps (field or parameter,
-    site) to the coordinate or parameter of the ordinary spec; ``bond_names`` maps (parameter, index of the bond).
-    Coordinates are ordered by field, then by site with the last axis fastest: a state of shape (fields, *sizes),
-    flattened, is a state of the expansion.
+    ``bonds`` are pairs of sites of a graph. Graphs and pairs have one size, the number of sites. ``names`` maps (field
+    or parameter, site) to a coordinate or parameter of the ordinary spec; ``bond_names`` maps (parameter, index of the
+    bond) to a parameter. Coordinates are ordered by field, then by site with the last axis fastest, so a state of shape
+    (fields, *sizes), flattened, is a state of the ordinary system.
     """
 
     cell: Cell
@@ -43,13 +43,13 @@ class Expansion:
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """The coordinates of the ordinary spec."""
+        """The coordinates of the ordinary spec, by field, then by site."""
         return tuple(self.names[f, s] for f in self.cell.fields for s in self.sites)
 
     # --- expressions at sites
 
     def neighbour(self, site: Site, offset: Offset) -> Site | None:
-        """Return the site at an offset, or None beyond an open end."""
+        """Return the site at an ``offset`` from ``site``, or None if it lies beyond an open end."""
         position = plus(site, offset)
         is_inside = [0 <= n < size for n, size in zip(position, self.sizes, strict=True)]
         if any(b == OPEN and not i for b, i in zip(self.cell.boundary, is_inside, strict=True)):
@@ -57,7 +57,7 @@ class Expansion:
         return tuple(n % size for n, size in zip(position, self.sizes, strict=True))
 
     def at(self, expression: Expression, site: Site) -> Expression | None:
-        """Return the value of an expression at a site, or None if the expression reaches beyond an open end."""
+        """Return an expression of the cell, placed at a site, or None if it reaches beyond an open end there."""
         values = {}
         for name, (base, offset) in self.cell.places(expression).items():
             source = self.neighbour(site, offset) if self.cell.axes else site
@@ -67,7 +67,10 @@ class Expansion:
         return substitute([expression], values)[0]
 
     def between(self, expression: Expression, a: Site, b: Site, bond: int | None = None) -> Expression:
-        """Return a density of a bond, or of a pair, between two sites."""
+        """Return the density of a bond, or of a pair, whose ends are the sites ``a`` and ``b``.
+
+        ``bond`` is the index of the bond, for parameters at bonds.
+        """
         site_of_end = dict(zip(ENDS, (a, b), strict=True))
         places = self.cell.places(expression)
         values = {n: symbol(self.names[base, site_of_end[str(end[0])]]) for n, (base, end) in places.items()}
@@ -77,7 +80,7 @@ class Expansion:
         return substitute([expression], values)[0]
 
     def summed(self, density: Expression) -> list[Expression]:
-        """Return the terms of the sum of a density over the sites, without those that reach beyond open ends."""
+        """Return the terms of Σ density over all sites. Terms that reach beyond open ends are left out."""
         terms = [term for site in self.sites for t in self.cell.additive_terms(density) for term in [self.at(t, site)]]
         return [t for t in terms if t is not None]
 
@@ -94,7 +97,7 @@ class Expansion:
         return terms
 
     def poisson(self) -> dict[tuple[str, str], Expression]:
-        """Return the brackets of coordinates that are not 0, in both orders."""
+        """Return the brackets {a, b} of coordinates by (a, b), in both orders, without those that are 0."""
         entries: dict[tuple[str, str], list[Expression]] = {}
         for (f, other), value in self.cell.bracket.items():
             g, offset = self.cell.place(other)
@@ -115,7 +118,9 @@ class Expansion:
         return {pair: e for pair, e in sums.items() if not e.is_zero}
 
     def casimirs(self) -> dict[str, Expression]:
-        """Return the Casimirs by name: one for each site, a sum or a product."""
+        """Return the Casimirs by name. A Casimir of the cell stands for one Casimir of each site, a sum or a product
+        over sites.
+        """
         casimirs: dict[str, Expression] = {}
         plain_names = (*(p.name for p in self.cell.parameters), *self.cell.times)
         used_names = {*self.names.values(), *self.bond_names.values(), *plain_names}
@@ -131,7 +136,7 @@ class Expansion:
         return casimirs
 
     def forces(self) -> SpecForces:
-        """Return the forces of all sites. Damping that differs from site to site becomes a covector."""
+        """Return the forces on all sites. Damping whose coefficient depends on the site becomes a covector force."""
         cell_forces = self.cell.forces
         if not cell_forces:
             return cell_forces
@@ -149,7 +154,7 @@ class Expansion:
         return SpecForces(covector, vector, damping)
 
     def _field(self) -> dict[tuple[str, Site], Expression]:
-        """Return π∇H, by field and site."""
+        """Return the vector field π∇H: its component by field and site."""
         slopes = dict(zip(self.coordinates, gradient(total(self.hamiltonian_terms()), self.coordinates), strict=True))
         rates: dict[str, list[Expression]] = {c: [] for c in self.coordinates}
         for (a, b), entry in self.poisson().items():
@@ -157,12 +162,16 @@ class Expansion:
         return {(f, site): total(rates[self.names[f, site]]) for f in self.cell.fields for site in self.sites}
 
     def _terms(self, e: Expression, site: Site) -> list[Expression]:
-        """Return the additive terms of an expression at a site, without those that reach beyond open ends."""
+        """Return the additive terms of an expression placed at a site. Terms that reach beyond open ends are left
+        out.
+        """
         values = (self.at(term, site) for term in self.cell.additive_terms(e))
         return [value for value in values if value is not None]
 
     def noise(self) -> dict[str, SpecNoise]:
-        """Return the sources of noise of all sites, site by site."""
+        """Return the sources of noise by name: all sources of the first site, then those of the next site, and so
+        on.
+        """
         sources: dict[str, SpecNoise] = {}
         used_names = {*self.names.values(), *self.bond_names.values(), *(p.name for p in self.cell.parameters)}
         for site in self.sites:
@@ -172,12 +181,14 @@ class Expansion:
         return sources
 
     def matrix(self) -> MatrixForm:
-        """Return π as a matrix."""
+        """Return π as a matrix in the order of the coordinates."""
         entries = self.poisson()
         return MatrixForm(tuple(tuple(entries.get((a, b), ZERO) for b in self.coordinates) for a in self.coordinates))
 
     def spec(self) -> Spec:
-        """Return the ordinary spec. Parameters at sites and bonds become scalars with the default of the cell."""
+        """Return the ordinary spec. Each parameter at a site or a bond becomes a number, with the default of the
+        cell.
+        """
         cell = self.cell
         parameters: list[Parameter] = []
         for p in cell.parameters:
@@ -201,7 +212,9 @@ class Expansion:
         )
 
     def numbers(self, parameters: Mapping[str, Any]) -> dict[str, float]:
-        """Return the parameters of the ordinary spec, from numbers and arrays of the lattice."""
+        """Return the values of the parameters of the ordinary spec, from the numbers and arrays that a lattice solver
+        receives.
+        """
         numbers = {}
         for p in self.cell.parameters:
             value = parameters[p.name]
@@ -215,10 +228,10 @@ class Expansion:
 
 
 def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()) -> Expansion:
-    """Return the lattice at these sizes.
+    """Return the expansion of a lattice with the given sizes.
 
-    Graphs and pairs have one size, the number of sites; graphs need their bonds. Raises `ValueError` for sizes that
-    do not fit.
+    Graphs and pairs have one size, the number of sites; graphs need their bonds. Raises `ValueError` for wrong sizes,
+    or for bonds that do not connect two different sites.
     """
     if len(sizes) != (len(cell.axes) or 1) or any(n < 1 for n in sizes):
         axes = f"{len(cell.axes)} positive integers, for the axes {', '.join(cell.axes)}"
@@ -237,13 +250,13 @@ def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()
 
 
 def ring(sites: int) -> list[tuple[int, int]]:
-    """Return the bonds of a ring and a chord, the graph of a lattice for which the user names no graph."""
+    """Return bonds that form a ring with a chord: an example graph for lattices for which the user gives no graph."""
     chord = [(0, sites // 2)] if sites > 3 else []
     return [(k, (k + 1) % sites) for k in range(sites if sites > 2 else sites - 1)] + chord
 
 
 def run_of(expansion: Expansion, run: Run, state: Any, numbers: Mapping[str, float]) -> Run:
-    """Return a run of the ordinary spec, from the state and the parameters of a run of the lattice.
+    """Return a run of the ordinary spec, from the initial state and the parameters of a run of the lattice.
 
     Sections and stops are left out: they refer to observables, which the ordinary spec does not have.
     """
@@ -259,12 +272,15 @@ def run_of(expansion: Expansion, run: Run, state: Any, numbers: Mapping[str, flo
 
 
 def _decimal(value: float) -> Fraction:
-    """Return the shortest decimal that is read back as the same double."""
+    """Return the shortest decimal that rounds to the given double, as a fraction."""
     return Fraction(repr(float(value)))
 
 
 def _unused_name(name: str, site: Site, used_names: set[str]) -> str:
-    """Return ``x_1_2``, followed by underscores until the name is unused, and record it in ``used_names``."""
+    """Return a name such as ``x_1_2`` for ``x`` at site (1, 2), and record it in ``used_names``.
+
+    Underscores are appended while the name is used already.
+    """
     candidate = "_".join([name, *map(str, site)])
     while candidate in used_names:
         candidate += "_"

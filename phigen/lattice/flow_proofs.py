@@ -1,8 +1,8 @@
 """Proofs that the splitting of a lattice is correct, for all sizes at once.
 
-Three kinds of statements are proved: the parts sum to H; the coordinates of a part commute over the whole lattice, so
-the components of its gradient are constant along its flow; with constant components and fixed neighbours, the motion of
-a site solves its equation.
+Two kinds of statements are proved. First, the parts sum to H, and the force parts to πζ + f. Second, the flow of each
+part solves its equation of motion at a site. There the components of the gradient of the part and the values at
+neighbours count as constants, since the coordinates of a part commute over the whole lattice.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 
 def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
-    """Yield the statements on a splitting; statements on single flows follow the order of the parts."""
+    """Yield the statements on a splitting: on the sum of the parts, on forces, then on each flow in the order of the
+    parts.
+    """
     count, flows = plan.parts.colouring.count, plan.flows
     positive = tuple(p.name for p in cell.parameters if p.positive)
     parts = [number(len(colours)) * s.expression for flow in flows for s, colours in flow.summands]
@@ -43,7 +45,7 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
 
 
 def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequence[str]) -> Statement:
-    """Decide that the force parts sum to πζ + f."""
+    """Decide whether the parts of the forces sum to πζ + f, with the covector force ζ and the vector force f."""
     site_fields = SiteFields(cell, sums_by_field(cell))
     force_flows = [flow for flow in flows if flow.force]
     residuals = []
@@ -62,8 +64,7 @@ def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequenc
 
 
 def motion_residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals, by field, that vanish if and only if the increments of a motion solve its equation ẋ =
-    ``rates``."""
+    """Yield residuals, labelled by field, that vanish if and only if the increments of a motion solve ẋ = ``rates``."""
     names, increments = list(motion.solution), list(motion.solution.values())
     start = substitute(increments, {TIME: ZERO})
     speeds = derivatives(increments, TIME)

@@ -1,8 +1,8 @@
 """Flows of forces and of noise at sites, as parts of the splitting of a lattice.
 
-The force part is the flow of πζ + f or, where that is not elementary, the flows of its summands. Each source of noise
-has the flow of Σ ΔW_s σ g(s), where the sum runs over all sites s, and ΔW_s is the increment at s for a part of a
-step.
+Forces have the flow of πζ + f, with the covector force ζ and the vector force f. If this flow is not elementary, its
+summands have flows of their own. Each source of noise has the flow of the Hamiltonian Σ ΔW_s σ g(s), where the sum runs
+over all sites s, and ΔW_s is the noise increment at s.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ Rates = Mapping[str, Expression]
 
 
 def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """Return the flows of the forces; none without forces.
+    """Return the flows of the forces; () if the lattice has no forces.
 
-    Raises `SpecError`, naming the summand of πζ + f that has no flow in closed form.
+    Raises `SpecError` if a summand of πζ + f has no flow in closed form; the error names the summand.
     """
     if not cell.forces:
         return ()
@@ -60,8 +60,11 @@ def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow,
 
 
 def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """Return the flows of πζ: a single flow, else a flow for each covector, else those of damping and of the other
-    covectors."""
+    """Return the flows of πζ, with the covector force ζ, which includes damping.
+
+    There is a single flow if πζ has an elementary flow, else one flow for each component of ζ. If a component has none,
+    damping gets flows of its own (`phigen.lattice.damping`), and the remaining components of ζ are treated again.
+    """
     site_fields = SiteFields(cell, sums_by_field(cell))
     tangent = {f: site_fields.tangent(f, site_fields.push) for f in cell.fields}
     try:
@@ -80,7 +83,11 @@ def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFl
 def _summand_flows(
     cell: Cell, colouring: Colouring, field: Rates, summands: Sequence[tuple[str, Rates]], host: Host
 ) -> Iterator[CellFlow]:
-    """Yield the flow of a field or, where it is not elementary, the flows of its summands."""
+    """Yield the flow of the vector field ``field`` or, if this flow is not elementary, the flow of each of its
+    ``summands``.
+
+    ``summands`` are names and vector fields. Raises `SpecError` if a summand has no elementary flow.
+    """
     common_flow = _flow(cell, colouring, field)
     for name, summand in [("", field)] if isinstance(common_flow, CellFlow) else summands:
         flow = _flow(cell, colouring, summand)
@@ -92,12 +99,14 @@ def _summand_flows(
 
 
 def _tangent_of_covector(cell: Cell, site_fields: SiteFields, field: str) -> dict[str, Expression]:
-    """Return πζ for the covector force whose only component is that of ``field``, by field."""
+    """Return πζ by field, for the part of the covector force ζ that has only the component ``field``."""
     return {f: site_fields.tangent(f, lambda g, d: site_fields.push(g, d) if g == field else ZERO) for f in cell.fields}
 
 
 def _flow(cell: Cell, colouring: Colouring, rates: Rates) -> CellFlow | str:
-    """Return the flow of a vector field in which sites move independently, or the reason why there is none."""
+    """Return the flow of a vector field in which sites move independently, or the reason why it has no elementary
+    flow.
+    """
     nonzero_rates = {f: e for f, e in rates.items() if not e.is_zero}
     names = symbols_of(*nonzero_rates.values())
     if any(kind_of(n) == GATHERED for n in names):
@@ -147,7 +156,9 @@ def _of_unit_time(flow: CellFlow) -> CellFlow:
 
 
 def casimir_rate(cell: Cell, name: str) -> Expression:
-    """Return a density of dC/dt for a Casimir C. Only the vector force f contributes: πζ leaves C constant."""
+    """Return a density whose sum is dC/dt for a Casimir C. Only the vector force f contributes, since πζ preserves
+    C.
+    """
     density, kind = cell.casimirs[name]
     vector, terms = cell.forces.vector, []
     field_places = {n: p for n, p in cell.places(density).items() if p[0] in vector}
@@ -158,13 +169,15 @@ def casimir_rate(cell: Cell, name: str) -> Expression:
 
 
 def pushed_casimirs(cell: Cell) -> tuple[str, ...]:
-    """Return the names of the Casimirs that forces change."""
+    """Return the names of the Casimirs that vector forces change."""
     return tuple(name for name in cell.casimirs if not casimir_rate(cell, name).is_zero)
 
 
 def force_statements(cell: Cell) -> Iterator[Statement]:
-    """Yield the statements on the Casimirs that forces change, and on the energy that damping dissipates; π is known to
-    be skew."""
+    """Yield the statements on forces: which Casimirs they preserve, and at which rate damping dissipates energy.
+
+    The second statement follows from π being skew, which is proved elsewhere.
+    """
     if not cell.forces:
         return
     positive = tuple(p.name for p in cell.parameters if p.positive)
@@ -180,8 +193,8 @@ def force_statements(cell: Cell) -> Iterator[Statement]:
 def noise_statements(cell: Cell) -> Iterator[Statement]:
     """Yield statements on noise: whether the sources commute, and which density is stationary.
 
-    Noise of a single site is examined at one site, for an arbitrary gradient of H there. Other noise is examined on a
-    small periodic box or a small graph.
+    If the noise and the brackets at a site read no neighbours, the statements are decided at one site, with symbols for
+    the gradient of H. Otherwise they are decided on a small periodic box or a small graph.
     """
     if not cell.noise:
         return

@@ -1,12 +1,13 @@
 """Parts of H on a graph: forces and motions are sums over the bonds that meet at a site.
 
 The copies of a term on two bonds may not commute if the bonds share a site. The sites are then coloured at run time,
-when the bonds are known, so that no bond connects two sites of one colour. The part of one colour is the sum of its
-terms over the bonds that begin at sites of the colour or, for some terms, end there. A step applies the flows of all
-colours one after the other.
+when the bonds are known, so that no bond connects two sites of one colour. The part of a colour is the sum of its terms
+over the bonds that begin at sites of this colour or, for some terms, over the bonds that end there. A step applies the
+flows of all colours one after the other.
 
-Two terms may be mirror images under the exchange of the ends, as x[a]*y[b] and y[a]*x[b] in a cross product. They form
-one part, in which each term is assigned to the end for which they commute.
+Two terms may be mirror images under the exchange of the ends a and b, such as x[a]*y[b] and y[a]*x[b] in a cross
+product. Such terms form one part: one term is summed over the bonds that begin at sites of the colour, and its mirror
+image over the bonds that end there, so that they commute.
 """
 
 from __future__ import annotations
@@ -34,11 +35,13 @@ from phigen.symbolic.neighbours import ENDS, Offset
 from phigen.symbolic.symbols import CHOSEN, GATHERED, Symbol, kind_of
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Sets of sites that have a coordinate of a part: all sites; the sites of its colour; the sites of other colours.
+#: Sites at which a part has a coordinate: all sites; the sites of the colour of the part; the sites of all other
+#: colours.
 ANYWHERE, INSIDE, OUTSIDE = 0, 1, 2
-#: Classes of terms: at all sites; over bonds that begin at sites of one colour; over bonds that end at them.
+#: Classes of terms in a part: at all sites and bonds; at bonds that begin at sites of one colour; at bonds that end
+#: there.
 WHOLE, BEGINS, ENDS_THERE = 0, 1, 2
-#: End of a bond at the site that has the colour of the part.
+#: The end of a bond that has the colour of the part, for each class of terms.
 _CHOSEN_END = {BEGINS: "a", ENDS_THERE: "b"}
 
 _OTHER = {"a": "b", "b": "a"}
@@ -46,8 +49,10 @@ _OTHER = {"a": "b", "b": "a"}
 
 @dataclass
 class GraphSearch(PartSearch):
-    """The search for parts on a graph. The second member of a term's pair is `WHOLE`, `BEGINS` or `ENDS_THERE`, not a
-    colour."""
+    """Search for the parts of H on a graph, whose colours are known only at run time.
+
+    A term in a part is a pair: the summand of H, and in place of a colour the class `WHOLE`, `BEGINS` or `ENDS_THERE`.
+    """
 
     _along_bonds: set[tuple[str, str]] = field(default_factory=set)
 
@@ -69,8 +74,9 @@ class GraphSearch(PartSearch):
         return []
 
     def _end_of(self, term: Summand) -> int:
-        """Return the class `BEGINS` or `ENDS_THERE` of a term of a bond; a term and its mirror image get different
-        classes."""
+        """Return the class of the energy of a bond, `BEGINS` or `ENDS_THERE`. Mirror images of a term get different
+        classes.
+        """
         places = self.cell.places(term.expression).values()
         fields_at = {end: sorted(f for f, o in places if o == (end,) and f in self.cell.fields) for end in ENDS}
         return ENDS_THERE if fields_at["b"] > fields_at["a"] else BEGINS
@@ -88,7 +94,7 @@ class GraphSearch(PartSearch):
         return sorted({(f, site_numbers.get(o, ANYWHERE)) for f, o in places if f in self.cell.fields})
 
     def _coupled(self, a: Coordinate, b: Coordinate) -> bool:
-        """Whether two coordinates can have a bracket, at one site or along a bond."""
+        """Whether two coordinates may have a nonzero bracket, at one site or along a bond."""
         same_site_possible = a[1] == b[1] or ANYWHERE in (a[1], b[1])
         different_sites_possible = not (a[1] == b[1] == INSIDE)
         local = same_site_possible and any(g == b[0] for g, _ in self._couples.get(a[0], ()))
@@ -97,7 +103,7 @@ class GraphSearch(PartSearch):
     # --- flows
 
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
-        """Return the flow of a sum of terms that commute."""
+        """Return the flow of a sum of commuting terms. The terms in ``more`` are multiplied by the symbol `KICK`."""
         return replace(super().flow(part, more), by_colour=part[0][1] != WHOLE)
 
     def _motions(
@@ -117,9 +123,10 @@ class GraphSearch(PartSearch):
 
 @dataclass
 class _SiteEquation:
-    """The equation of motion of a site in a part.
+    """The equation of motion of a site in a part: ẋ = ``rates``.
 
-    ``rates`` contain symbols for the ``forces``; the forces depend on the sums over bonds ``gathered``.
+    ``rates`` has symbols that stand for the expressions in ``forces``. These depend on the sums over bonds in
+    ``gathered``.
     """
 
     cell: Cell
@@ -153,7 +160,7 @@ class _SiteEquation:
     def _bond_forces(self) -> list[BondSum]:
         """Return the sums of the forces that bonds exert on this site.
 
-        In a part of one colour, a bond counts at the end to which the part assigns its energy.
+        In a part of one colour, a bond contributes only if the end to which its energy is assigned has the colour.
         """
         sums, selection = [], {ANYWHERE: "", INSIDE: "here", OUTSIDE: "there"}[self.place]
         for end in ENDS:
@@ -163,7 +170,7 @@ class _SiteEquation:
         return sums
 
     def _bond_motions(self, rates: dict[str, list[Expression]]) -> list[BondSum]:
-        """Return the sums of brackets along bonds, and add their contributions to ``rates``.
+        """Return the sums over bonds that come from brackets along bonds, and add their contributions to ``rates``.
 
         A rate is a sum of products: a monomial in the fields of this site times a sum over the neighbours.
         """
@@ -182,10 +189,11 @@ class _SiteEquation:
 
 
 def bond_rates(cell: Cell, density: Expression) -> Iterator[tuple[str, str, Expression]]:
-    """Yield the rates that brackets along a bond cause at its ends, where H is the sum of a ``density`` of sites.
+    """Yield the rates of change that brackets along a bond cause at its ends, if H is the sum of a ``density`` over
+    sites.
 
-    Each item is a field, the end of the bond that the field belongs to, and its rate, written with ``x[a]`` for this
-    end and ``x[b]`` for the other end.
+    Each item is a field, the end of the bond at which the field lies, and its rate. The rate is written with ``x[a]``
+    for this end and ``x[b]`` for the opposite end.
     """
     slopes = dict(zip(cell.fields, gradient(density, cell.fields), strict=True))
     for (f, g), entry in cell.bond_bracket.items():
@@ -196,7 +204,7 @@ def bond_rates(cell: Cell, density: Expression) -> Iterator[tuple[str, str, Expr
 
 
 def energies(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the energy of a bond as sums at its two ends, or the energy of a pair."""
+    """Return the energy of a bond as sums over bonds at a site, for each end of the bond, or the energy of a pair."""
     name = Symbol(GATHERED, "energy")
     if cell.relation == PAIRS:
         return merged_ends([BondSum({name: cell.pair_hamiltonian})])
@@ -206,8 +214,8 @@ def energies(cell: Cell) -> tuple[BondSum, ...]:
 def site_sums(cell: Cell) -> tuple[BondSum, ...]:
     """Return the sums over bonds or pairs of the forces on a site.
 
-    Where brackets run along bonds, the sums are those of rates. Forces on fields without brackets are left out, since
-    they have no effect.
+    If there are brackets along bonds, they are sums of rates of change instead. Forces on fields without brackets are
+    left out, since they have no effect.
     """
     if cell.relation == PAIRS:
         return merged_ends([BondSum(_moving_forces(cell, cell.pair_hamiltonian, "a"))])
@@ -220,15 +228,18 @@ def site_sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def sums_by_field(cell: Cell) -> dict[str, Expression]:
-    """Return the sums in the force on a field, times their factors, by field; with brackets along bonds, those in its
-    rate."""
+    """Return the contribution of all bonds or pairs to the force on each field that has one.
+
+    It is the symbol of a sum times its `SumFactors`. With brackets along bonds, it is the contribution to the rate of
+    change.
+    """
     names = {n for s in site_sums(cell) for n in s.values} if cell.relation != GRID else set()
     at_site = {f: sum_factors(cell, f).at_site for f in cell.fields if _gathered(f) in names}
     return {f: factor * symbol(_gathered(f)) for f, factor in at_site.items()}
 
 
 def field_with_sums(cell: Cell) -> list[Expression]:
-    """Return the vector field at a site, with symbols for the sums over bonds or pairs in it."""
+    """Return the vector field at a site, with symbols for the sums over bonds or pairs in place of these sums."""
     sums = sums_by_field(cell)
     if not cell.bond_bracket:
         return list(field_at_site(cell, sums))
@@ -236,8 +247,7 @@ def field_with_sums(cell: Cell) -> list[Expression]:
 
 
 def with_first_end(cell: Cell, e: Expression, end: str) -> Expression:
-    """Return an expression of a bond as seen from ``end``: symbols of this end get [a], symbols of the other end get
-    [b]."""
+    """Return an expression of a bond with the ends renamed such that ``end`` is called a, and the opposite end b."""
     if end == "a":
         return e
     places = cell.places(e)
@@ -246,7 +256,7 @@ def with_first_end(cell: Cell, e: Expression, end: str) -> Expression:
 
 
 def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
-    """Return the sums of both ends with the same symbols, as one sum if the two are proved to be equal."""
+    """Return the sums of the two ends of a bond as a single one, if they are proved to be equal; else return both."""
     names = dict.fromkeys(n for s in sums for n in s.values)
     completed = [replace(s, values={n: s.values.get(n, ZERO) for n in names}) for s in sums]
     completed = [s for s in completed if any(not e.is_zero for e in s.values.values())]
@@ -258,22 +268,25 @@ def merged_ends(sums: Sequence[BondSum]) -> tuple[BondSum, ...]:
 
 
 def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
-    """Return the derivatives of the density of a bond with respect to the fields of an end, divided by the
-    `sum_factors`."""
+    """Return the derivatives of the energy of a bond with respect to the fields of ``end``, divided by the factors of
+    `sum_factors`.
+    """
     slopes = gradient(density, [cell.at(f, (end,)) for f in cell.fields])
     forces = {f: with_first_end(cell, e, end) for f, e in zip(cell.fields, slopes, strict=True) if not e.is_zero}
     return {_gathered(f): divided(e, sum_factors(cell, f).at_end) for f, e in forces.items()}
 
 
 def _moving_forces(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
-    """Return those forces of `_forces_at` that occur in the vector field."""
+    """Return the forces of `_forces_at`, without those that have no effect in the vector field."""
     read_symbols = symbols_of(*field_at_site(cell, {f: symbol(_gathered(f)) for f in cell.fields}))
     return {name: e for name, e in _forces_at(cell, density, end).items() if name in read_symbols}
 
 
 def _monomials(cell: Cell, rate: Expression) -> Iterator[tuple[Expression, Expression]]:
-    """Yield a rate as pairs of factors: an expression in the fields of this site, written as at a site, and a
-    cofactor."""
+    """Yield factors whose products sum to a rate of change: a monomial in the fields of this site, and its coefficient.
+
+    The monomial is written in the symbols of a site. The coefficient may depend on the opposite end of the bond.
+    """
     ring = bracketless_ring([cell.at(f, ("a",)) for f in cell.fields], [rate])
     site_symbols = {cell.at(f, ("a",)): symbol(f) for f in cell.fields}
     for m, c in ring.terms(ring.tower.convert(rate), ring.state).items():

@@ -1,4 +1,4 @@
-"""A lattice as `phigen.load` returns it: its spec and its cell."""
+"""Lattices as `phigen.load` returns them: a spec and its cell."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from phigen.spec.model import Spec
 
 @dataclass(frozen=True)
 class LatticeSystem:
-    """A lattice of any size: ``spec`` is the whole file, ``cell`` holds the fields, brackets and densities of a site.
+    """A lattice of any size: ``spec`` is the content of the spec file, and ``cell`` holds the fields, brackets and
+    densities of one site.
 
-    `phigen.compile` accepts a lattice like a `System`.
+    `phigen.compile` accepts it as it accepts a `System`.
     """
 
     spec: Spec = field(repr=False)
@@ -25,7 +26,7 @@ class LatticeSystem:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Raise an `AttributeError` that names the attribute of ``spec`` or of a compilation to use instead."""
+            """Raise an `AttributeError`; its message says where to find what an attribute of `System` would hold."""
             raise missing_attribute(self, name)
 
     def __repr__(self) -> str:
@@ -39,7 +40,7 @@ class LatticeSystem:
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates of a site."""
+        """Names of the fields of a site."""
         return self.spec.coordinates
 
     @property
@@ -48,7 +49,7 @@ class LatticeSystem:
         return self.cell.axes
 
     def _repr_latex_(self) -> str:
-        """Return brackets, H, Casimirs and invariants as formulas, for notebooks."""
+        """Return brackets, H, Casimirs and invariants as formulas in LaTeX, which notebooks display."""
         return cast(str, display("formulas of a cell")(self.cell))
 
 

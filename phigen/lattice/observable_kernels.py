@@ -1,7 +1,8 @@
 """Kernels of observables of a lattice: energy, Casimirs, vector field, and the observables of the spec.
 
-An observable that is one number has a density at sites, of which targets compute the sum or an extreme. A sum omits
-the terms that reach beyond an open end, as H does; an extreme omits the sites with such a term.
+An observable that is one number is the sum, the maximum or the minimum of a density over the sites; targets compute it
+from the values of the density. Near an open end, a sum omits single terms of the density that reach beyond the end, as
+H does. A maximum or minimum omits the whole site.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ from phigen.spec.names import ADDITIVE
 from phigen.symbolic.expression import ONE, Expression, call, number, symbol, total
 from phigen.symbolic.symbols import GATHERED, Symbol
 
-#: Share of a pair in the value at each of its two sites.
+#: Weight with which the value of a pair is added at each of its two sites.
 _SHARE = number(Fraction(1, 2))
 
 
 def observables(cell: Cell, *, single: bool = False) -> Observables:
-    """Return the kernels of all observables, for code in ``single`` or in double precision."""
+    """Return the kernels of all observables, for generated code in double precision or, with ``single``, in single
+    precision.
+    """
     origin = [0] * len(cell.axes)
     density = total(present(cell, s.low, s.high, origin) * s.expression for s in summands_of(cell) if not s.bond)
     casimirs = [density for density, _ in cell.casimirs.values()]
@@ -50,9 +53,9 @@ def observables(cell: Cell, *, single: bool = False) -> Observables:
 
 
 def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the sums and extremes over bonds or pairs in the observables.
+    """Return the sums, maxima and minima over bonds or pairs that observables need.
 
-    A bond counts at the site where it starts; a pair counts in both orders.
+    A bond contributes at the site where it starts. A pair contributes at both its sites.
     """
     names = [name for name, reduction in cell.reductions.items() if reduction.over != "sites"]
     sums: dict[str, Expression] = {Symbol(GATHERED, name): cell.observables[name] for name in names}
@@ -62,9 +65,10 @@ def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def _density(cell: Cell, name: str, *, single: bool) -> Expression:
-    """Return the density of an observable at a site, with symbols for sums and extremes over bonds and pairs.
+    """Return the density of the observable ``name`` at a site, with symbols for sums and extremes over bonds and pairs.
 
-    Where the density of an extreme reaches beyond an open end, its value is one that no maximum or minimum selects.
+    If a maximum or minimum is taken, and the density reaches beyond an open end, its value is ∓ the largest number,
+    which is never selected.
     """
     reduction = cell.reductions[name]
     if reduction.over != "sites":
@@ -81,10 +85,10 @@ def _density(cell: Cell, name: str, *, single: bool) -> Expression:
 
 
 def _within(cell: Cell, density: Expression) -> Expression:
-    """Return the density without its terms that reach beyond open ends."""
+    """Return the density with a weight for each additive term, which is 0 where the term reaches beyond an open end."""
     return total(_present(cell, term) * term for term in cell.additive_terms(density))
 
 
 def _present(cell: Cell, term: Expression) -> Expression:
-    """Return the weight of a term: 1 if all its sites are on the lattice, else 0."""
+    """Return the weight of a term: 1 if all sites that the term reads are on the lattice, else 0."""
     return present(cell, *cell.extent(term), [0] * len(cell.axes)) if cell.axes else ONE

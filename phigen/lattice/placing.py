@@ -1,4 +1,6 @@
-"""Positions in a plane for the sites of a graph, whose distances approximate the numbers of bonds between sites."""
+"""Positions in a plane for the sites of a graph, for drawing: distances approximate the numbers of bonds between
+sites.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,8 @@ from numpy.typing import NDArray
 
 from phigen.symbolic.arrays import Floats
 
-#: Largest number of sites that are placed: time and memory grow with its square, and 600 sites take some seconds.
+#: Largest number of sites that are placed. Time and memory grow with the square of this number, and 600 sites take some
+#: seconds.
 MOST_PLACED = 600
 #: Iterations of the majorisation; each decreases the stress.
 ROUNDS = 60
@@ -16,9 +19,9 @@ ROUNDS = 60
 def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
     """Return positions (sites, 2) in the unit square, or None for more than `MOST_PLACED` sites.
 
-    The start is the classical scaling of distances along ``bonds`` (bonds, 2), by the two largest eigenvalues. Then
-    follow iterations of the majorisation of the stress: J. de Leeuw, Applications of convex analysis to
-    multidimensional scaling (1977). The same bonds give the same positions.
+    The start is the classical scaling of distances along ``bonds`` (bonds, 2), with the two largest eigenvalues. It is
+    improved by iterations of stress majorisation: J. de Leeuw, Applications of convex analysis to multidimensional
+    scaling (1977). The same bonds give the same positions.
     """
     if sites > MOST_PLACED:
         return None
@@ -29,7 +32,7 @@ def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
     for k in range(min(2, sites)):
         axis = vectors[:, -1 - k] * np.sqrt(max(values[-1 - k], 0.0))
         positions[:, k] = axis * (np.sign(axis[np.argmax(np.abs(axis))]) or 1.0)
-    positions += 1e-3 * np.random.default_rng(0).normal(size=positions.shape)  # so that no two sites coincide
+    positions += 1e-3 * np.random.default_rng(0).normal(size=positions.shape)  # no two sites may coincide
     for _ in range(ROUNDS):
         lengths = np.linalg.norm(positions[:, None] - positions[None], axis=2)
         weights = distances / np.where(lengths > 0, lengths, 1.0)
@@ -40,9 +43,9 @@ def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
 
 
 def _distances(bonds: NDArray[np.int64], sites: int) -> Floats:
-    """Return the least numbers of bonds between sites, as a matrix (sites, sites).
+    """Return the least number of bonds on a path between each two sites, as a matrix (sites, sites).
 
-    Unconnected sites have a distance larger than all others.
+    Sites that no path connects get a distance larger than all others.
     """
     connected = np.eye(sites, dtype=np.float32)
     for a, b in bonds:

@@ -1,12 +1,13 @@
 """Statements about lattices of every size at once, by translation: brackets, Jacobi identity, Casimirs, invariants.
 
-On a grid the statements are decided on the infinite lattice. A periodic box is its quotient, so brackets, sums and
-telescoping densities carry over to the box. At open ends the functions of the sites inside are closed under brackets,
-so the Jacobi identity and Casimirs of single sites remain true; sums are examined on a box so large that no term
-reaches both ends.
+On a grid the statements are decided on the infinite lattice. A periodic box is a quotient of the infinite lattice by
+translations, so statements on brackets and sums are true on the box too. With open ends, the functions of the sites on
+the lattice are usually closed under brackets, so the Jacobi identity and Casimirs of single sites remain true. Casimirs
+and invariants that are sums are examined on a box so large that no term reaches both ends.
 
-On a graph the statements are at most quadratic in the bonds, so they hold for every graph if they hold for all graphs
-of one or two bonds. For pairs, they hold if they hold for one and for two sites.
+On a graph, each term of a residual depends on at most two bonds. So a statement is true for every graph if it is true
+for all graphs of one or two bonds. If all pairs of sites interact, a statement is true for every number of sites if it
+is true for one and for two sites.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from phigen.symbolic.expression import ZERO, Expression, gradient, number, subst
 from phigen.symbolic.neighbours import Offset, minus, plus, steps
 from phigen.symbolic.verdict import PROVED, REFUTED, UNDECIDED, Statement, decide_zero
 
-#: A coordinate of the infinite lattice: a field and its offset.
+#: Coordinate of the infinite lattice: a field, and the offset of its site from the origin.
 Point = tuple[str, tuple[int, ...]]
 Labelled = tuple[str, Expression]
 
-#: Graphs that represent all graphs: one bond, and two bonds that meet.
+#: Graphs that represent all graphs in proofs: a single bond, and two bonds that share a site in each possible way.
 GRAPHS: tuple[tuple[tuple[int, int], ...], ...] = (
     ((0, 1),),
     ((0, 1), (1, 2)),
@@ -36,13 +37,13 @@ GRAPHS: tuple[tuple[tuple[int, int], ...], ...] = (
     ((0, 1), (0, 1)),
     ((0, 1), (1, 0)),
 )
-#: Most coordinates of a box with open ends; the Jacobi identity has a term for each triple of them.
+#: Largest number of coordinates of a box with open ends. The Jacobi identity has a term for each triple of coordinates.
 _MAX_BOX_COORDINATES = 160
 JACOBI = "Jacobi identity"
 
 
 def tensor(cell: Cell) -> tuple[Statement, ...]:
-    """Return the statements that π is skew and satisfies the Jacobi identity; the second one only if π is skew."""
+    """Return the statement that π is skew and, unless it is refuted, the statement of the Jacobi identity."""
     if cell.relation != GRID:
         return _tensor_of_graphs(cell)
     skew = _decided(cell, "π is skew", _skewness(cell), "for all sizes")
@@ -57,7 +58,9 @@ def tensor(cell: Cell) -> tuple[Statement, ...]:
 
 
 def casimirs(cell: Cell) -> Iterator[Statement]:
-    """Yield the statement π∇C = 0 for each Casimir C: one for each site, a sum or a product."""
+    """Yield the statement π∇C = 0 for each Casimir C. Its kind says whether C belongs to a site, or is a sum or
+    product.
+    """
     for name, (density, kind) in cell.casimirs.items():
         title = f"{name} is a Casimir"
         domain_text = {
@@ -77,8 +80,10 @@ def casimirs(cell: Cell) -> Iterator[Statement]:
 
 
 def invariants(cell: Cell) -> Iterator[Statement]:
-    """Yield the statement {F, H} = 0 for each further first integral F, a sum of densities: the terms of {F, H}
-    telescope."""
+    """Yield the statement {F, H} = 0 for each further first integral F of the spec.
+
+    F is a sum of densities over sites. {F, H} = 0 is proved by showing that its density is a telescoping sum.
+    """
     for name, density in cell.invariants.items():
         title = f"{name} is invariant"
         if cell.relation != GRID:
@@ -99,8 +104,8 @@ def invariants(cell: Cell) -> Iterator[Statement]:
 
 
 def euler(cell: Cell, density: Expression) -> dict[str, Expression]:
-    """Return the discrete Euler operator of a density: the derivatives of its sum over sites by the symbols of one
-    site.
+    """Return the discrete Euler operator of a density: the derivatives of Σ density over all sites with respect to the
+    symbols of one site.
 
     All are 0 if and only if the density is a constant plus a difference of densities of neighbouring sites.
     """
@@ -112,20 +117,23 @@ def euler(cell: Cell, density: Expression) -> dict[str, Expression]:
 
 
 def rate_of(cell: Cell, density: Expression) -> Expression:
-    """Return a density whose sum over sites is the time derivative of the sum of ``density``."""
+    """Return a density whose sum over sites is the time derivative of Σ ``density``."""
     slopes, rates = euler(cell, density), vector_field(cell)
     along_motion = total(slopes[f] * rates[f] for f in cell.fields if not (slopes[f].is_zero or rates[f].is_zero))
     return along_motion + total(gradient(density, cell.times))
 
 
 def _uniform(cell: Cell, density: Expression) -> Expression:
-    """Return a density with all symbols of neighbours replaced by those of the site itself."""
+    """Return a density at a state that is equal at all sites: symbols of neighbours become those of the site itself."""
     same_symbols = {name: symbol(base) for name, (base, _) in cell.places(density).items()}
     return substitute([density], same_symbols)[0]
 
 
 def _decided(cell: Cell, name: str, residuals: Iterable[Labelled], detail: str = "") -> Statement:
-    """Return `decide_zero` of the residuals. A positive parameter at sites counts as positive at every site."""
+    """Return the verdict of `decide_zero` on the residuals.
+
+    A parameter at sites that is declared positive counts as positive at every site.
+    """
     residual_list, positive_parameters = list(residuals), {p.name for p in cell.parameters if p.positive}
     positive = [n for n in symbols_of(*(e for _, e in residual_list)) if n.partition("[")[0] in positive_parameters]
     return decide_zero(name, residual_list, positive, detail)
@@ -142,7 +150,9 @@ def _skewness(cell: Cell) -> Iterator[Labelled]:
 
 
 def _partners(cell: Cell) -> dict[str, list[tuple[Point, Expression]]]:
-    """Return, for each field, the coordinates with a nonzero bracket with this field at the origin, and the bracket."""
+    """Return, for each field f, the list of (coordinate, bracket) for all coordinates that have a bracket with f at the
+    origin.
+    """
     partners: dict[str, list[tuple[Point, Expression]]] = {f: [] for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         g, offset = cell.place(other)
@@ -151,10 +161,10 @@ def _partners(cell: Cell) -> dict[str, list[tuple[Point, Expression]]]:
 
 
 def _jacobi(cell: Cell) -> Iterator[Labelled]:
-    """Yield the residuals of the Jacobi identity, one for each class of triples of coordinates that differ by a
+    """Yield the residuals of the Jacobi identity for triples of coordinates, one residual for each triple up to
     translation.
 
-    All ordered pairs of coordinates contribute, so each residual is twice the cyclic sum.
+    The sum runs over all ordered pairs of coordinates, so each residual is twice the cyclic sum.
     """
     partners, sums = _partners(cell), dict[tuple[Point, ...], list[Expression]]()
     for f, bracket_partners in partners.items():
@@ -174,7 +184,11 @@ def _jacobi(cell: Cell) -> Iterator[Labelled]:
 
 
 def _canonical(triple: tuple[Point, Point, Point]) -> tuple[tuple[Point, ...], int, Offset]:
-    """Return the sorted triple with its first point at the origin, the sign of the permutation, and the translation."""
+    """Return a triple of coordinates in a standard form, with which triples that differ by a translation are equal.
+
+    The result is the sorted triple with its first coordinate at the origin, the sign of the permutation, and the
+    translation.
+    """
     order = min(permutations(range(3)), key=lambda p: [triple[k] for k in p])
     sign = 1 if order in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1
     ordered = [triple[k] for k in order]
@@ -183,7 +197,7 @@ def _canonical(triple: tuple[Point, Point, Point]) -> tuple[tuple[Point, ...], i
 
 
 def _of_site(cell: Cell, name: str, density: Expression) -> Iterator[Labelled]:
-    """Yield {C, f} for a Casimir C of one site and all f that have a bracket with some argument of C."""
+    """Yield {C, f} for a Casimir C of one site, and for all coordinates f that have a bracket with an argument of C."""
     field_places = {n: p for n, p in cell.places(density).items() if p[0] in cell.fields}
     partners, sums = _partners(cell), dict[Point, list[Expression]]()
     for (base, position), slope in zip(field_places.values(), gradient(density, list(field_places)), strict=True):
@@ -194,7 +208,10 @@ def _of_site(cell: Cell, name: str, density: Expression) -> Iterator[Labelled]:
 
 
 def _of_sum(cell: Cell, name: str, density: Expression, product: bool) -> Iterator[Labelled]:
-    """Yield the residuals for a Casimir of the whole lattice: {f, Σ C}, or {f, Π C}/Π C, for all fields f of a site."""
+    """Yield the residuals for a Casimir that is a sum or a product over all sites.
+
+    They are {f, Σ C} or {f, Π C}/Π C with the density C, for each field f of a site.
+    """
     slopes = _logarithmic(cell, density) if product else euler(cell, density)
     for f, bracket_partners in _partners(cell).items():
         terms = [entry * cell.shifted(slopes[g], offset) for (g, offset), entry in bracket_partners]
@@ -213,7 +230,9 @@ def _logarithmic(cell: Cell, density: Expression) -> dict[str, Expression]:
 
 
 def _closed(cell: Cell) -> bool:
-    """Whether every bracket depends only on sites in the smallest box that contains its two sites."""
+    """Whether each bracket depends only on values inside the smallest box that contains the sites of its two
+    arguments.
+    """
     for (_, other), entry in cell.bracket.items():
         offset = steps(cell.place(other)[1])
         low, high = cell.extent(entry)
@@ -223,7 +242,9 @@ def _closed(cell: Cell) -> bool:
 
 
 def _box(cell: Cell) -> tuple[int, ...]:
-    """Return the sizes of a box in which no term reaches both ends of an axis."""
+    """Return sizes of a box in which no term of H, a Casimir or an invariant, nor its bracket, reaches both ends of an
+    axis.
+    """
     densities = [*cell.terms, *(d for d, _ in cell.casimirs.values()), *cell.invariants.values()]
     extents = [cell.extent(t) for d in densities for t in cell.additive_terms(d)]
     widths = [max((high[k] - low[k] for low, high in extents), default=0) for k in range(len(cell.axes))]
@@ -231,8 +252,10 @@ def _box(cell: Cell) -> tuple[int, ...]:
 
 
 def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], domain_text: str = "") -> Statement:
-    """Return a statement decided by ``examine`` on a box with open ends; in one dimension, on all smaller boxes as
-    well."""
+    """Return a statement that ``examine`` decides on a box with open ends.
+
+    In one dimension it is decided on all smaller boxes as well. It is undecided if the box has too many coordinates.
+    """
     sizes = _box(cell)
     count = len(cell.fields)
     for size in sizes:
@@ -282,7 +305,9 @@ def _any(cell: Cell) -> str:
 
 
 def _representative_systems(cell: Cell) -> Iterator[tuple[str, System]]:
-    """Yield the systems that represent all graphs, or all numbers of sites of pairs, each with its name."""
+    """Yield systems that represent all graphs, or all numbers of sites that interact in pairs, each with a
+    description.
+    """
     graphs: Sequence[tuple[int, Sequence[tuple[int, int]]]] = [(1, ()), (2, ())]
     if cell.relation == "graph":
         graphs = [(1, ()), *((1 + max(max(b) for b in bonds), bonds) for bonds in GRAPHS)]
@@ -319,7 +344,7 @@ def _invariant_of_graphs(cell: Cell, name: str) -> Iterator[tuple[str, Statement
 
 
 def pair_symmetry(cell: Cell) -> Iterator[Statement]:
-    """Yield the statement that the density of a pair is symmetric under exchange of its sites."""
+    """Yield the statement that the energy of a pair does not change if its two sites are exchanged."""
     if not cell.pair_hamiltonian.is_zero:
         places = cell.places(cell.pair_hamiltonian)
         other = {"a": "b", "b": "a"}
@@ -329,7 +354,11 @@ def pair_symmetry(cell: Cell) -> Iterator[Statement]:
 
 
 def _worst(name: str, detail: str, statements: Iterator[tuple[str, Statement]]) -> Statement:
-    """Return one statement for several named ones: refuted if one of them is refuted, proved if all are proved."""
+    """Return one statement for a list of (description, statement).
+
+    It is refuted if a statement of the list is refuted, and proved if all are proved. Otherwise it has the verdict of a
+    statement that is not proved.
+    """
     unproved: Statement | None = None
     for graph_name, s in statements:
         if s.verdict == REFUTED:

@@ -1,8 +1,9 @@
 """Recognition of lattices among ordinary systems whose specs list the coordinates of all sites.
 
-Numbers in names are read as sites: ``x1 … x16``, ``q_0_0 … q_7_7``, ``S3_x``. The terms of H are translated to one
-site, and terms that occur at every site form a density; brackets are treated likewise. Terms are compared by their
-values at one point only, so the lattice is expanded afterwards and proved to be the original system.
+Numbers in names of coordinates are read as sites: ``x1 … x16``, ``q_0_0 … q_7_7``, ``S3_x``. Each term of H is
+translated to the site at the origin. Terms that are equal after translation, one for every site, become a term of the
+density of H. Brackets are treated in the same way. Terms are compared only by their values at one point. Therefore the
+lattice found is expanded and proved to be the original system.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from phigen.symbolic.neighbours import Neighbours
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.verdict import decide_zero
 
-#: Least number of sites along an axis; fewer sites may be identical by chance.
+#: Least number of sites along an axis. On fewer sites, equal terms may be a coincidence.
 MIN_SITES_PER_AXIS = 4
 
 Site = tuple[int, ...]
@@ -39,12 +40,16 @@ Terms = list[tuple[Site, Expression]]
 
 
 class _NoLatticeError(Exception):
-    """The system is no lattice, or its names do not show one."""
+    """The system is not a lattice, or the names of its coordinates do not show the sites."""
 
 
 @dataclass(frozen=True)
 class _SiteNames:
-    """Fields and sites of names: ``sites`` maps coordinates, and parameters that differ from site to site, to them."""
+    """The fields and sites that names stand for.
+
+    ``sites`` maps the names of coordinates, and of parameters that differ from site to site, to (field, site).
+    ``space`` has the symbols of neighbours on the lattice. ``point`` has the values at which terms are compared.
+    """
 
     fields: tuple[str, ...]
     sizes: tuple[int, ...]
@@ -55,9 +60,9 @@ class _SiteNames:
 
 
 def recognised_lattice(spec: Spec, least: int) -> Spec | None:
-    """Return the lattice of an ordinary spec with at least ``least`` sites.
+    """Return the spec of a lattice that is equal to an ordinary spec, if the lattice has at least ``least`` sites.
 
-    None if the spec describes no lattice, or its π has the wrong shape.
+    Returns None if phigen recognises no lattice, or if the brackets of the spec are not valid.
     """
     if not any(prod(_sizes(names)) >= least for names in _readings(spec.coordinates)):
         return None
@@ -69,9 +74,9 @@ def recognised_lattice(spec: Spec, least: int) -> Spec | None:
 
 
 def recognised(spec: Spec, poisson: Matrix) -> Spec | None:
-    """Return the lattice of an ordinary spec with this matrix π, for any number of sites.
+    """Return the spec of a lattice that is equal to an ordinary spec with the matrix π = ``poisson``.
 
-    None if the system is no lattice, or has forces, noise or a time-dependent H.
+    Returns None if phigen recognises no lattice, and for systems with forces, noise or a time-dependent H.
     """
     if spec.time or spec.forces or spec.noise:
         return None
@@ -88,7 +93,10 @@ def recognised(spec: Spec, poisson: Matrix) -> Spec | None:
 
 
 def _readings(coordinates: Sequence[str]) -> Iterator[dict[str, tuple[str, Site]]]:
-    """Yield ways to read coordinates as a field and a site: the site is all numbers in a name, or one of them."""
+    """Yield maps from coordinates to (field, site), for all ways to read the numbers in the names of coordinates.
+
+    The site consists of all numbers in a name, or of one of them.
+    """
     groups = {len(re.findall(r"[0-9]+", c)) for c in coordinates}
     if len(groups) != 1 or groups == {0}:
         return
@@ -114,7 +122,7 @@ def _sizes(places: Mapping[str, tuple[str, Site]]) -> tuple[int, ...]:
 
 
 def _is_full(places: Mapping[str, tuple[str, Site]]) -> bool:
-    """Whether the sites of each field fill a box, each site once."""
+    """Whether each field has exactly one coordinate at every site of a box."""
     sizes = _sizes(places)
     sites = Counter(site for _, site in places.values())
     fields = {f for f, _ in places.values()}
@@ -157,9 +165,10 @@ def _lattice(
 
 
 def _names(spec: Spec, coordinates: Mapping[str, tuple[str, Site]], boundary: tuple[str, ...]) -> _SiteNames:
-    """Return the field and the site of each coordinate, and of each parameter with a value at every site.
+    """Return the fields and sites of coordinates, and of parameters with a value at every site.
 
-    Sites are counted from 0.
+    Sites are counted from 0 along each axis, even if the names start at 1. Raises `_NoLatticeError` if names of axes
+    are not free.
     """
     first = tuple(min(c) for c in zip(*(s for _, s in coordinates.values()), strict=True))
     fields = tuple(dict.fromkeys(f for f, _ in coordinates.values()))
@@ -198,9 +207,9 @@ def _parameters(spec: Spec, names: _SiteNames, at_sites: set[str]) -> tuple[Para
 
 
 def _translated(e: Expression, names: _SiteNames, base: Site | None = None) -> tuple[Site, Expression]:
-    """Return the site that a term is assigned to, and the term translated to the origin.
+    """Return the site at which a term is placed, and the term translated from there to the origin.
 
-    The site is the corner of the smallest box that contains all symbols of the term.
+    The site is ``base`` if it is passed, else the corner of the smallest box that contains all symbols of the term.
     """
     places = {n: names.sites[n] for n in symbols_of(e) if n in names.sites}
     if base is None:
@@ -213,7 +222,9 @@ def _translated(e: Expression, names: _SiteNames, base: Site | None = None) -> t
 
 
 def _start(sites: set[int], size: int, boundary: str) -> int:
-    """Return the first site of the shortest interval of an axis that contains all ``sites``."""
+    """Return the first site of the shortest interval along an axis that contains all ``sites``; a periodic axis wraps
+    around.
+    """
     if boundary == "open":
         return min(sites)
     ordered = sorted(sites)
@@ -227,7 +238,7 @@ def _offset(site: Site, base: Site, names: _SiteNames) -> Site:
         step = a - b
         if boundary == "periodic":
             step = (step + n // 2) % n - n // 2
-        # An offset of half a period or more has no unique direction.
+        # On a periodic axis, an offset of half the size or more has no unique direction.
         if abs(step) > limits.OFFSET or 2 * abs(step) >= n:
             raise _NoLatticeError
         offset.append(step)
@@ -235,17 +246,19 @@ def _offset(site: Site, base: Site, names: _SiteNames) -> Site:
 
 
 def _key(e: Expression, names: _SiteNames) -> float:
-    """Return a key for comparing terms of one site: the value of a term at a fixed point, to 9 digits."""
+    """Return the value of a term at a fixed point, rounded to 9 digits. Terms with equal values count as equal."""
     for name in symbols_of(e):
-        # Multiples of the golden ratio modulo 1 are all different, and evenly spread.
+        # Fractional parts of multiples of the golden ratio are all different, and spread evenly. 0.5 is added to avoid
+        # 0.
         names.point.setdefault(name, 0.5 + (0.6180339887498949 * (len(names.point) + 1)) % 1)
     return float(f"{evaluate([e], names.point)[0]:.9g}")
 
 
 def _orbits(terms: Iterable[tuple[Site, Expression]], names: _SiteNames) -> list[Expression]:
-    """Return the distinct terms of a density from the terms of a sum, given with their sites.
+    """Return the terms of the density whose sum over sites is the sum of ``terms``, which are given with their sites.
 
-    Each term must occur equally often at every site at which it fits between open ends. Raises `_NoLatticeError`.
+    Each term must occur equally often at every site at which it fits between open ends; else `_NoLatticeError` is
+    raised.
     """
     kinds: dict[float, tuple[Expression, Counter[Site]]] = {}
     for base, term in terms:
@@ -260,7 +273,7 @@ def _orbits(terms: Iterable[tuple[Site, Expression]], names: _SiteNames) -> list
 
 
 def _room(term: Expression, names: _SiteNames) -> int:
-    """Return the number of sites at which a term fits between open ends."""
+    """Return the number of sites at which a term can be placed without reaching beyond an open end."""
     offsets = [o for _, o in names.space.places(term).values()] or [(0,) * len(names.sizes)]
     wide = [max(map(int, c)) - min(0, *map(int, c)) for c in zip(*offsets, strict=True)]
     return prod(n - (w if b == "open" else 0) for n, w, b in zip(names.sizes, wide, names.boundary, strict=True))
@@ -271,8 +284,10 @@ def _density(e: Expression, names: _SiteNames) -> list[Expression]:
 
 
 def _terms(e: Expression, names: _SiteNames, factor: Expression) -> Iterator[Expression]:
-    """Yield the additive terms of an expression; a factor that is the same at all sites is multiplied into each
-    term."""
+    """Yield the additive terms of an expression, each multiplied by ``factor``.
+
+    Factors of a bracketed sum that do not depend on the site are multiplied into its terms.
+    """
     args = e.args
     if e.op in ("add", "sub"):
         yield from _terms(args[0], names, factor)
@@ -293,7 +308,11 @@ def _varies(e: Expression, names: _SiteNames) -> bool:
 def _brackets(
     spec: Spec, poisson: Matrix, names: _SiteNames
 ) -> tuple[dict[tuple[str, str], Expression], dict[tuple[str, str], Expression]]:
-    """Return two maps of brackets: between fields of one site, and between fields of different sites in one order."""
+    """Return the brackets of the lattice as two maps: between fields of one site, and between fields of different
+    sites.
+
+    The second map has each bracket in one order only. Raises `_NoLatticeError` if brackets differ from site to site.
+    """
     kinds: dict[tuple[str, str], dict[Site, Expression]] = {}
     for c, row in zip(spec.coordinates, poisson, strict=True):
         f, site = names.sites[c]
@@ -316,8 +335,11 @@ def _brackets(
 
 
 def _casimirs(spec: Spec, names: _SiteNames) -> tuple[dict[str, Expression], dict[str, str]]:
-    """Return the densities and the kinds of the Casimirs that belong to sites, or are sums or products; others are left
-    out."""
+    """Return the densities and the kinds of Casimirs of the lattice, by name.
+
+    A Casimir of the ordinary spec becomes a sum or a product over sites, or one of the Casimirs "sites" of all sites.
+    All other Casimirs are left out.
+    """
     densities, kinds = dict[str, Expression](), dict[str, str]()
     by_value: dict[float, list[tuple[str, Expression]]] = {}
     used_names = {*names.space.names, *(p.name for p in spec.parameters)}
@@ -367,7 +389,7 @@ def _invariants(spec: Spec, names: _SiteNames) -> dict[str, Expression]:
 
 
 def _prove(spec: Spec, poisson: Matrix, lattice_spec: Spec, names: _SiteNames) -> None:
-    """Raise `_NoLatticeError` unless the lattice is proved to expand to the ordinary spec."""
+    """Raise `_NoLatticeError` unless the expansion of the lattice is proved to be the ordinary spec."""
     by_site = {(f, site): n for n, (f, site) in names.sites.items()}
     expansion = Expansion(cell_from_spec(lattice_spec), names.sizes, (), by_site)
     entries = expansion.poisson()
@@ -395,6 +417,6 @@ def _run(spec: Spec, run: Run, names: _SiteNames) -> Run:
     site_arrays = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
     numbers = {n: v for n, v in run.parameters.items() if n not in names.sites}
     lattice = LatticeRunSettings(names.sizes, state, (), site_arrays)
-    # sections and stops of lattices refer to observables
+    # In specs of lattices, sections and stops name observables; those of an ordinary spec do not carry over.
     none: dict[str, Any] = {"exact": {}, "section": None, "stop": None}
     return replace(run, initial=(), parameters=numbers, lattice=lattice, **none)

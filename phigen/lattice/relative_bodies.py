@@ -1,17 +1,17 @@
 """Attracting bodies of a lattice in relative coordinates: H is a sum of Kepler motions A and a small remainder B.
 
-H is Σ m_i|v_i|²/2 − Σ γ m_i m_j/|q_i − q_j|, written in momenta m v or in velocities v. In the coordinates of
+H = Σ m_i|v_i|²/2 − Σ γ m_i m_j/|q_i − q_j|, in terms of momenta m_i v_i or velocities v_i. In the coordinates of
 `phigen.splitting.relative` each body but the first has a position Q_i and a velocity V_i = w_i P_i, and the first
-coordinate is the centre of mass. Divided by m_i, all equations have a limit at m_i = 0, where the body is attracted by
-others and attracts none:
+coordinate is the centre of mass. Divided by m_i, all equations of motion have a limit at m_i = 0: a body without mass
+is attracted by others, but attracts none. The flows of the parts are:
 
 - A moves Q_i and V_i along a conic section with the strength γ M_i, and the centre of mass uniformly;
 - B changes V_i by the attraction of the other bodies.
 
-With Jacobi coordinates M_i = m_0 + … + m_i. Let a_i be the acceleration of body i by all others. The acceleration of
-Q_i is a_i − (m_0 a_0 + … + m_{i−1} a_{i−1})/M_{i−1}. B has this acceleration without that of the Kepler motion, −γ M_i
-Q_i/|Q_i|³. With democratic heliocentric coordinates M_i = m_0; B has the attraction of all bodies but the first, and
-shifts all Q_i by Σ m_j V_j/m_0 times the duration.
+In Jacobi coordinates, M_i = m_0 + … + m_i. Let a_i be the acceleration of body i by all other bodies. The acceleration
+of Q_i is a_i − (m_0 a_0 + … + m_{i−1} a_{i−1})/M_{i−1}. B causes the difference of this acceleration and that of the
+Kepler motion, −γ M_i Q_i/|Q_i|³. In democratic heliocentric coordinates, M_i = m_0. Then B has the attraction by all
+bodies but the first, and moves all Q_i with the velocity Σ m_j V_j/m_0.
 """
 
 from __future__ import annotations
@@ -35,10 +35,11 @@ from phigen.symbolic.neighbours import ENDS
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: The central masses M_i of Kepler motions, an array over bodies that the solver computes from the masses.
+#: The array of central masses M_i of the Kepler motions. The solver computes it from the masses of the bodies.
 INNER_MASS = Symbol("inner", "mass")
 
-#: Key of specs for relative coordinates, and the name of Jacobi coordinates, in which B is a function of positions.
+#: Key of specs that selects relative coordinates, and the name of Jacobi coordinates, in which B depends on positions
+#: only.
 KEY, JACOBI = "coordinates_from", "jacobi"
 
 _FORM = (
@@ -48,15 +49,15 @@ _FORM = (
 
 
 class _OtherFormError(Exception):
-    """H is not that of attracting bodies; the text is the reason."""
+    """H is not the energy of attracting bodies; the text says why."""
 
 
 @dataclass(frozen=True)
 class LatticeBodies:
     """Attracting bodies at the sites of a cell, in the relative coordinates named ``change``.
 
-    ``axes`` pairs each position with its momentum if ``momenta`` is true, else with its velocity. ``mass`` is a
-    parameter at sites, ``gravity`` the factor γ of the attraction.
+    ``axes`` pairs each position with its momentum if ``momenta`` is true, else with its velocity. ``mass`` is the name
+    of the parameter at sites, and ``gravity`` is the constant γ in the energies −γ m_i m_j/|q_i − q_j|.
     """
 
     cell: Cell
@@ -73,18 +74,20 @@ class LatticeBodies:
 
     @cached_property
     def kepler(self) -> KeplerMotion:
-        """The motion of one body in A, in the symbols of a site."""
+        """The Kepler motion of one body, which is the flow of A at a site."""
         q, v = (tuple(symbol(n) for n in of) for of in zip(*self.axes, strict=True))
         return KeplerMotion(q, v, ONE, self.gravity * symbol(INNER_MASS))
 
     @property
     def shifts(self) -> tuple[Symbol, ...]:
-        """The symbols of Σ m_j V_j/m_0 along each axis, by which B shifts positions; none with Jacobi coordinates."""
+        """The symbols of the velocity Σ m_j V_j/m_0 with which B moves positions, one for each axis; () in Jacobi
+        coordinates.
+        """
         return () if self.jacobi else tuple(Symbol(GATHERED, "shift", q) for q, _ in self.axes)
 
     @property
     def pulls(self) -> BondSum:
-        """The attraction of a body a by a body b along each axis, per unit of mass, with the opposite sign."""
+        """The acceleration of body a by body b along each axis, with the opposite sign, as a sum over pairs."""
         slopes = gradient(self.cell.pair_hamiltonian, [self.cell.at(q, ("a",)) for q, _ in self.axes])
         inertia = {self.cell.at(self.mass, ("a",)): 1}
         names = [Symbol(GATHERED, q) for q, _ in self.axes]
@@ -95,7 +98,9 @@ class LatticeBodies:
         return CellSplitting((self._motions(), self._remainder()), Colouring(1, (0,) * len(self.cell.axes)))
 
     def sites(self, flows: Sequence[CellFlow]) -> RelativeSites:
-        """Return the description of the bodies for runtimes; ``flows`` are in the order of the parts of a step."""
+        """Return the data of the bodies that runtimes need; ``flows`` are the flows of A and B in the order of a
+        step.
+        """
         fields = self.cell.fields
         axes = tuple((fields.index(q), fields.index(v)) for q, v in self.axes)
         remainder = next(k for k, flow in enumerate(flows) if flow.motion is None)
@@ -110,7 +115,9 @@ class LatticeBodies:
         return CellFlow(motion.hamiltonian, tuple(increments.values()), motion.manner, (moved,), (), motion=motion)
 
     def _remainder(self) -> CellFlow:
-        """Return the flow of B. Its field ``hamiltonian`` holds the energy of a pair."""
+        """Return the flow of B. The attribute ``hamiltonian`` of the flow holds the terms of B that belong to a pair of
+        bodies.
+        """
         pulls, time = self.pulls, symbol(TIME)
         q = [symbol(name) for name, _ in self.axes]
         rates = {v: -symbol(n) for (_, v), n in zip(self.axes, pulls.values, strict=True)}
@@ -129,7 +136,10 @@ class LatticeBodies:
 
 
 def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
-    """Return the bodies of a spec with relative coordinates. Raises `SpecError`, located at the key."""
+    """Return the attracting bodies of a spec with relative coordinates.
+
+    Raises `SpecError` at the key ``coordinates_from`` if H is not the energy of attracting bodies.
+    """
     _expect_supported(cell, spec)
     try:
         positions = _positions(cell)
@@ -144,12 +154,15 @@ def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
 
 
 def of_bodies(parts: tuple[tuple[Sweep, ...], ...], bodies: LatticeBodies) -> tuple[tuple[Sweep, ...], ...]:
-    """Return the sweeps of both parts, restricted to all bodies but the first, with the sums that shift positions."""
+    """Return the sweeps of A and B, restricted to all bodies but the first.
+
+    Sweeps with sums over pairs get the additional sums with which B moves positions.
+    """
     return tuple(tuple(_of_bodies(sweep, bodies) for sweep in part) for part in parts)
 
 
 def of_massive(partners: Partners) -> Partners:
-    """Return the energies and forces of pairs as sums over the bodies with a mass: massless bodies contribute 0."""
+    """Return the energies and forces of pairs as sums over the bodies with mass: those without mass contribute 0."""
 
     def massive(gather: Gather) -> Gather:
         return replace(gather, ends=tuple(replace(e, massive=True) for e in gather.ends))
@@ -168,7 +181,7 @@ def _of_bodies(sweep: Sweep, bodies: LatticeBodies) -> Sweep:
 
 
 def _expect_supported(cell: Cell, spec: Spec) -> None:
-    """Raise `SpecError` for features that cannot be combined with relative coordinates."""
+    """Raise `SpecError` for options of the spec that cannot be combined with relative coordinates."""
     refused = {
         "lattice": (cell.relation != PAIRS, "all bodies attract one another, as with lattice: {pairs: all}"),
         "monitor": (spec.monitor is not None, "Kepler motions take equal steps of the time"),
@@ -187,7 +200,10 @@ def _expect_supported(cell: Cell, spec: Spec) -> None:
 
 
 def _positions(cell: Cell) -> list[str]:
-    """Return the fields that the attraction depends on, the positions."""
+    """Return the positions: the fields on which the energy of a pair depends.
+
+    Raises `_OtherFormError` unless there are 2 or 3 positions, and as many further fields.
+    """
     places = cell.places(cell.pair_hamiltonian).values()
     positions = [f for f in cell.fields if (f, ("a",)) in places]
     if len(positions) not in (2, 3) or len(cell.fields) != 2 * len(positions):
@@ -197,8 +213,10 @@ def _positions(cell: Cell) -> list[str]:
 
 
 def _attraction(cell: Cell, positions: Sequence[str]) -> tuple[str, Expression]:
-    """Return the name of the mass and the factor γ of the attraction; the energy of a pair is −γ m[a] m[b]/|q_a −
-    q_b|."""
+    """Return the name of the mass m, and the factor γ of the energy −γ m[a] m[b]/|q_a − q_b| of a pair.
+
+    Raises `_OtherFormError` if the energy of a pair has another form.
+    """
     at = [[cell.at(f, (end,)) for f in positions] for end in ENDS]
     apart: dict[str, Expression] = dict.fromkeys([*at[0], *at[1]], ZERO) | {at[0][0]: ONE}
     strength = -substitute([cell.pair_hamiltonian], apart)[0]
@@ -217,7 +235,10 @@ def _attraction(cell: Cell, positions: Sequence[str]) -> tuple[str, Expression]:
 
 
 def _axes(cell: Cell, positions: Sequence[str], mass: str) -> tuple[tuple[tuple[str, str], ...], bool]:
-    """Return the pairs (position, momentum or velocity) of each axis, and whether the second ones are momenta."""
+    """Return the pairs (position, momentum or velocity) of all axes, and whether the second members are momenta.
+
+    Raises `_OtherFormError` if the brackets or the kinetic energy have another form.
+    """
     partners: dict[str, list[tuple[str, Expression]]] = {f: [] for f in cell.fields}
     for (f, g), entry in cell.bracket.items():
         partners[f].append((g, entry))

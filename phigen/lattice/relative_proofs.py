@@ -1,6 +1,6 @@
 """Proofs on bodies in relative coordinates: the change of coordinates, the parts of H, and their flows.
 
-Statements that involve all bodies are decided for two and for three bodies, with symbols for masses.
+Statements that involve all bodies are proved for two and for three bodies, with symbols as masses.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ from phigen.symbolic.expression import ZERO, Expression, gradient, power, substi
 from phigen.symbolic.symbols import GATHERED, Symbol
 from phigen.symbolic.verdict import Statement, decide_zero
 
-#: Numbers of bodies for which statements are decided. Bodies after the third have the same place in all sums as the
-#: third.
+#: Numbers of bodies for which statements are proved. In all sums, further bodies have the same role as the third body.
 COUNTS = (2, 3)
 
 Vector = list[Expression]
 
 
 def check(bodies: LatticeBodies, flows: Sequence[CellFlow]) -> Iterator[Statement]:
-    """Yield the statements on the bodies; statements on single flows follow the order of the parts."""
+    """Yield the statements on relative coordinates: canonical change of coordinates, H as a sum of parts, flows of the
+    parts.
+    """
     few = [_FewBodies(bodies, count) for count in COUNTS]
     positive = [n for f in few for n in f.mass_names]
     detail = "for two and three bodies, with symbols for masses"
@@ -44,42 +45,51 @@ def check(bodies: LatticeBodies, flows: Sequence[CellFlow]) -> Iterator[Statemen
 
 @dataclass(frozen=True)
 class _FewBodies:
-    """A number of bodies, with symbols for relative positions and velocities; body 0 stands for the centre of mass."""
+    """The equations of a small number of bodies, with symbols for masses, relative positions and relative velocities.
+
+    In relative coordinates, body 0 stands for the centre of mass.
+    """
 
     bodies: LatticeBodies
     count: int
 
     @property
     def mass_names(self) -> list[Symbol]:
-        """The symbols of the masses."""
+        """The symbols of the masses m_i, by body."""
         return [Symbol("mass", i) for i in range(self.count)]
 
     @property
     def masses(self) -> Vector:
-        """The masses m_i of all bodies."""
+        """The masses m_i of all bodies as expressions."""
         return [symbol(n) for n in self.mass_names]
 
     @property
     def others(self) -> range:
-        """The symbols of the masses, by body."""
+        """The indices of all bodies but the first."""
         return range(1, self.count)
 
     def names(self, kind: str, body: int) -> list[Symbol]:
-        """Return the symbols of a relative position (``kind`` Q) or velocity (``kind`` V) of a body along each axis."""
+        """Return the symbols of the relative position (``kind`` Q) or velocity (``kind`` V) of a body along each
+        axis.
+        """
         return [Symbol(kind, body, axis) for axis, _ in enumerate(self.bodies.axes)]
 
     def inner(self, i: int) -> Expression:
-        """Return M_i: in Jacobi coordinates m_0 + … + m_i, else m_0."""
+        """Return the central mass M_i: m_0 + … + m_i in Jacobi coordinates, m_0 in democratic heliocentric
+        coordinates.
+        """
         return total(self.masses[: i + 1]) if self.bodies.jacobi else self.masses[0]
 
     def inertia(self, i: int) -> Expression:
-        """Return 1/w_i, the reduced mass that belongs to the relative momentum of body i."""
+        """Return the reduced mass 1/w_i of body i, which relates relative momentum and velocity: V_i = w_i P_i."""
         if not self.bodies.jacobi:
             return self.masses[i]
         return self.masses[i] * self.inner(i - 1) * power(self.inner(i), -1)
 
     def cartesian(self, kind: str) -> list[Vector]:
-        """Return the Cartesian positions or velocities of all bodies, in terms of the relative ones."""
+        """Return the Cartesian positions (``kind`` Q) or velocities (``kind`` V) of all bodies, in relative
+        coordinates.
+        """
         m, sum_of_masses = self.masses, total(self.masses)
         centre, *relative = ([symbol(n) for n in self.names(kind, i)] for i in range(self.count))
         if self.bodies.jacobi:
@@ -97,7 +107,10 @@ class _FewBodies:
         return [first, *([c + e for c, e in zip(first, of, strict=True)] for of in relative)]
 
     def product(self, positions: str, velocities: str) -> Expression:
-        """Return Σ m q·v in Cartesian coordinates minus M R·V + Σ Q·V/w in relative ones."""
+        """Return the difference of Σ m q·v in Cartesian coordinates and M R·V + Σ Q·V/w in relative coordinates.
+
+        R and V are position and velocity of the centre of mass; M is the total mass, and 1/w are reduced masses.
+        """
         pairs = zip(self.masses, self.cartesian(positions), self.cartesian(velocities), strict=True)
         weights = [total(self.masses), *(self.inertia(i) for i in self.others)]
         relative = (
@@ -108,12 +121,15 @@ class _FewBodies:
         return total(m * a * b for m, q, v in pairs for a, b in zip(q, v, strict=True)) - total(relative)
 
     def canonical(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residual of Σ m q·v = M R·V + Σ Q·V/w: the change of coordinates is canonical if this bilinear form
-        is kept."""
+        """Yield Σ m q·v − (M R·V + Σ Q·V/w) as a residual. If it is 0, the change to relative coordinates is
+        canonical.
+        """
         yield f"{self.count} bodies", self.product("Q", "V")
 
     def recoil(self) -> Expression:
-        """Return |Σ m_j V_j|²/2m_0, a part of B in democratic heliocentric coordinates."""
+        """Return |Σ m_j V_j|²/2m_0, the kinetic part of B in democratic heliocentric coordinates; 0 in Jacobi
+        coordinates.
+        """
         if self.bodies.jacobi:
             return ZERO
         axes = range(len(self.bodies.axes))
@@ -121,7 +137,9 @@ class _FewBodies:
         return square(moments) * power(self.masses[0], -1) / 2
 
     def sums(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals of two sums: the kinetic energy, and the attraction by the first body."""
+        """Yield residuals for H = A + B: of the kinetic energy, and of the positions of bodies relative to the first
+        body.
+        """
         yield f"kinetic energy of {self.count} bodies", self.product("V", "V") / 2 - self.recoil()
         q = self.cartesian("Q")
         for i in self.others if not self.bodies.jacobi else (1,):
@@ -129,7 +147,7 @@ class _FewBodies:
                 yield f"q_{i} - q_0", q[i][k] - q[0][k] - symbol(n)
 
     def remainder(self) -> Expression:
-        """Return B as a function of the relative coordinates."""
+        """Return the part B of H as a function of the relative coordinates."""
         gravity, m, q = self.bodies.gravity, self.masses, self.cartesian("Q")
         pairs = [(i, j) for i, j in combinations(range(self.count), 2) if self.bodies.jacobi or i > 0]
         energies = (
@@ -143,7 +161,9 @@ class _FewBodies:
         return total([*energies, *kepler]) + self.recoil()
 
     def pull(self, a: int, b: int, k: int) -> Expression:
-        """Return the attraction of body ``a`` by body ``b`` along axis ``k``, as the kernel of B computes it."""
+        """Return the acceleration of body ``a`` by body ``b`` along axis ``k``, with the opposite sign, as the kernel
+        of B has it.
+        """
         q, cell = self.cartesian("Q"), self.bodies.cell
         value = [*self.bodies.pulls.values.values()][k]
         places = {cell.at(self.bodies.mass, ("a",)): self.masses[a], cell.at(self.bodies.mass, ("b",)): self.masses[b]}
@@ -152,7 +172,7 @@ class _FewBodies:
         return substitute([value], places)[0]
 
     def gathered(self, i: int) -> dict[str, Expression]:
-        """Return the values of the sums that the kernel of B reads for a body, by symbol."""
+        """Return the sums over bodies that the kernel of B reads for body ``i``, by symbol."""
         axes, first = range(len(self.bodies.axes)), 0 if self.bodies.jacobi else 1
 
         def pulled(a: int, k: int) -> Expression:
@@ -168,7 +188,9 @@ class _FewBodies:
         return sums
 
     def shifts(self, flow: CellFlow) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals of the rates of relative coordinates under the flow of B."""
+        """Yield the differences between the rates in the flow of B and the rates that follow from B as a
+        Hamiltonian.
+        """
         (motion,), b = flow.motions, self.remainder()
         for i in self.others:
             values = {**self.gathered(i), INNER_MASS: self.inner(i)}

@@ -1,8 +1,8 @@
-"""Steps of a lattice by the series S_h = hH: a stage is the implicit step of order 2 of a bi-realisation; a step is a
-composition of stages.
+"""Steps of a lattice by the first term S_h = hH of the Hamilton–Jacobi series. A stage is the implicit step of order 2
+that a bi-realisation gives; a step is a composition of stages.
 
 A stage solves y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then x is updated by (β − α)(y, h∇H(y)). With the
-covectors written out, both are formulas of a site and its neighbourhood, for all H and π.
+covectors h∇H written out, y and the increment of x are formulas in the values at a site and around it, for all H and π.
 """
 
 from __future__ import annotations
@@ -38,11 +38,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class SeriesPlan:
-    """Plan of a step by the series: the bi-realisation, and the stages of order 2, each a fraction of the step in
-    ``fractions``.
+    """Plan of a step by the series: the bi-realisation, and the composition of stages of order 2.
 
-    ``middle`` is y at a site, as a formula of y in its neighbourhood and of x at the site (`initial`); ``increment`` is
-    the increment of x. Both have an entry for each field, with the step of the stage as `TIME`.
+    ``fractions`` are the durations of the stages in units of the step. A stage solves α(y, h∇H(y)) = x for y.
+    ``middle`` is y at a site, as a formula in y at neighbouring sites and x at the site (the symbols `initial`).
+    ``increment`` is the increment of x in the stage. ``middle`` and ``increment`` have an entry for each field, and the
+    symbol `TIME` for the duration of the stage.
     """
 
     realisation: CellRealisation
@@ -51,9 +52,9 @@ class SeriesPlan:
     fractions: tuple[float, ...]
     middle: Mapping[str, Expression]
     increment: Mapping[str, Expression]
-    since: str = field(default="", kw_only=True)  # reason for using the series although H splits
+    since: str = field(default="", kw_only=True)  # the reason why the series is used for an H that splits
 
-    #: The scheme, as in specs. A stage of this scheme solves an equation, and H is not split.
+    #: The scheme, as in specs. Since a stage solves an equation, a plan by the series has no parts of H with flows.
     scheme = "series"
     is_implicit, weak_order = True, 1
     flows: ClassVar[tuple[CellFlow, ...]] = ()
@@ -61,7 +62,7 @@ class SeriesPlan:
 
     @property
     def label(self) -> str:
-        """The kind of the method, for display."""
+        """The kind of the method as text for users."""
         return f"{self.kind}, on a lattice"
 
     @property
@@ -71,7 +72,7 @@ class SeriesPlan:
 
     @property
     def site_kind(self) -> str | None:
-        """The kind of the bi-realisation if it is one of a single site, else None."""
+        """The kind of the bi-realisation if it belongs to the system of a single site, else None."""
         return self.kind if self.realisation.site else None
 
     @property
@@ -81,12 +82,12 @@ class SeriesPlan:
 
     @property
     def by_colour(self) -> tuple[bool, ...]:
-        """Whether each flow belongs to one colour: empty, since there are no flows."""
+        """Whether each flow belongs to one colour of a graph: (), since a step by the series has no flows."""
         return ()
 
     @property
     def facts(self) -> list[str]:
-        """Lines about the method in the header of generated files."""
+        """The lines about the method in the header of generated files."""
         count = len(self.fractions)
         composed = [f"composition: {self.composition}, {count} stages of order 2"] if count > 1 else []
         step = "step: implicit, by sweeps over the sites until they change nothing"
@@ -100,7 +101,9 @@ class SeriesPlan:
         ]
 
     def acting(self, forces: SpecForces) -> str:
-        """Words about forces in the header of generated files: forces enter the covector, or are applied in halves."""
+        """Return the words about forces in the header of generated files: ζ is added to ∇H, and f acts in two
+        halves.
+        """
         return "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(forces.vector)
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
@@ -108,7 +111,7 @@ class SeriesPlan:
         yield from ()
 
     def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> Equation:
-        """Return the kernels of a stage and, if ``tangent``, those of its derivative."""
+        """Return the kernels of the implicit equation of a stage and, if ``tangent``, the kernels of its derivative."""
         size = len(self.middle)
         values = coefficients.hoist([*self.middle.values(), *self.increment.values()])
         relax = site_kernel(
@@ -131,18 +134,20 @@ class SeriesPlan:
         return Equation(relax, advance, slope, (side, follow))
 
     def either(self, splitting: Callable[[SplittingPlan], T], series: Callable[[SeriesPlan], T]) -> T:
-        """Return the result of ``series``, the function for this class of plans."""
+        """Return ``series(self)``. A caller passes one function for each class of plans, and the plan chooses between
+        them.
+        """
         return series(self)
 
     def schedule(self) -> Schedule:
-        """Return the stages of a step, as flows of one part."""
+        """Return the order of the stages in a step, with the stages as flows of a single part."""
         return Schedule(self.fractions, len(self.fractions) - 1, ((0, 0),))
 
 
 def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
-    """Return the plan for any H.
+    """Return the plan of a step by the series, which exists for any H.
 
-    Raises `SpecError` where no bi-realisation is known, and for orders that are not offered.
+    Raises `SpecError` if phigen knows no bi-realisation for π, and for orders and options that lattices lack.
     """
     stages = _stages(spec)
     if cell.noise and len(stages[-1]) > 1:
@@ -162,7 +167,10 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return α and β by field, with the covectors p = h(∇H + ζ) + Σ ΔW σ∇g inserted at all sites."""
+    """Return formulas by field, with covectors inserted for their symbols: p = h(∇H + ζ) + Σ ΔW σ∇g at each site.
+
+    ``maps`` has formulas in the symbols of covectors, such as those for y and for the increment of x.
+    """
     site_fields = SiteFields(cell, sums_by_field(cell))
     covectors: dict[str, Expression] = {}
     for name in symbols_of(*maps.values()):
@@ -175,8 +183,10 @@ def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expre
 
 
 def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
-    """Return y and the increment of x, with half of the impulse hf of the vector force before the motion and half after
-    it."""
+    """Return y and the increment of x by field, with the vector force f.
+
+    Half of the impulse hf acts before the stage, and half after it.
+    """
     site_fields, one_half = SiteFields(cell), number(Fraction(1, 2))
     impulse = {f: symbol(TIME) * site_fields.impulse(f) for f in cell.fields}
     start: dict[str, Expression] = {initial(f): symbol(initial(f)) + one_half * e for f, e in impulse.items()}
@@ -185,8 +195,10 @@ def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, E
 
 
 def _stages(spec: Spec) -> tuple[Order, str, tuple[float, ...]]:
-    """Return the order, the name and the stage fractions of the composition for the order of a spec; odd orders round
-    up."""
+    """Return the order of the composition, its name, and the durations of its stages in units of the step.
+
+    An odd order in the spec is rounded up. Raises `SpecError` if the composition does not exist at the order.
+    """
     order, composition = spec.wanted_order, spec.composition
     even_order = order + order % 2
     note = "" if even_order == order else f"order {order} was asked for; a symmetric method has even order"

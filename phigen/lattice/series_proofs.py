@@ -3,8 +3,8 @@
 The axioms of the bi-realisation are proved at one site where π is local, else on a periodic box. The box is so large
 that the sites of α at two neighbouring sites do not wrap around; by translation the proof holds for every larger box.
 
-The next statement is on the equation of a stage: its y at a site solves α(y, p) = x for any p. With p = h∇H the
-increment is hπ∇H up to O(h²), so a stage, being symmetric, has order 2.
+Then two statements on a stage follow. First, the formula for y at a site solves α(y, p) = x for any p. Second, with p =
+h∇H the increment is hπ∇H up to O(h²). A stage is symmetric, so it has order 2.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 
 def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
-    """Yield the statements on the bi-realisation, then those on a stage."""
+    """Yield the statements on the bi-realisation, then the statements on a stage."""
     system, realisation = plan.realisation.site or _on_a_box(cell, plan.realisation)
     domain_text = (
         "" if plan.realisation.site else f"on {system.dimension // len(cell.fields)} sites, as on all by translation"
@@ -39,7 +39,9 @@ def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
 
 
 def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
-    """Yield the statements on the equation of a stage and on its order."""
+    """Yield the statement that the formula for y solves the equation of a stage, and the statement on the order of a
+    stage.
+    """
     realisation, positive = plan.realisation, tuple(p.name for p in cell.parameters if p.positive)
     alpha: dict[str, Expression] = {initial(f): symbol(f) + e for f, e in realisation.displacement.items()}
     substituted = substitute([realisation.middle[f] for f in cell.fields], alpha)
@@ -56,7 +58,7 @@ def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
 
 
 def _on_a_box(cell: Cell, realisation: CellRealisation) -> tuple[System, BiRealisation]:
-    """Return the system of a small periodic lattice, and the bi-realisation on all its sites."""
+    """Return the system of all sites of a small periodic lattice, and the bi-realisation of this system."""
     periodic = replace(cell, boundary=(PERIODIC,) * len(cell.axes))
     box = expand(periodic, [4 * r + 1 for r in cell.poisson_reach])
     coordinates, places = box.coordinates, [(f, site) for f in cell.fields for site in box.sites]
@@ -71,7 +73,7 @@ def _on_a_box(cell: Cell, realisation: CellRealisation) -> tuple[System, BiReali
 
 
 def _at(box: Expansion, e: Expression, site: Site) -> Expression:
-    """Return an expression in fields and covectors relative to a site, in the symbols of the ``box`` of sites."""
+    """Return an expression relative to a site, in the symbols of the ``box``: fields and covectors of all its sites."""
     values: dict[str, Expression] = {}
     for name in symbols_of(e):
         covector = isinstance(name, Symbol) and name.kind == MOMENTUM

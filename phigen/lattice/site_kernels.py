@@ -23,8 +23,8 @@ def site_kernel(
 ) -> Kernel:
     """Return a kernel at a site.
 
-    Its inputs are coefficients or parameters, then the values that it reads at sites, then the weights. Powers of a
-    parameter that may be 0 are combined, so that m/m is 1.
+    The inputs are coefficients or parameters, then the values that the kernel reads at sites, then the weights of
+    terms, which are 0 beyond open ends. Powers of a parameter m that may be 0 are combined, so that m/m is 1.
     """
     if cell.vanishing:
         values = cancelled(values, [name for name, (base, _) in cell.places(*values).items() if base in cell.vanishing])

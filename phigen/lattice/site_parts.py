@@ -1,14 +1,16 @@
 """The Hamiltonian of a lattice as a sum of parts whose flows move each site independently.
 
-A part is a sum over sites of terms whose coordinates commute over the whole lattice. Its gradient is constant along its
-flow, so each site moves by ẋ = Σ {x, a} ∂V/∂a with the values of its neighbours as constants: an equation of one site.
-Where π couples neighbours, or a term mixes coordinates that do not commute, the sites are coloured, and the terms that
-begin at sites of one colour form a part. Terms of a single site are also parts if they have an elementary flow.
+A part V of H is a sum over sites of terms whose coordinates commute over the whole lattice. Its gradient is constant
+along its flow. So each site has its own equation of motion ẋ = Σ {x, a} ∂V/∂a, in which the values at neighbours are
+constants. If π couples neighbours, or if a term mixes coordinates that do not commute, the sites are coloured, and the
+terms that begin at sites of one colour form a part. Terms that are functions of a single site also form parts if they
+have an elementary flow.
 
-Some sizes are no multiples of the period of the colours, such as an odd ring with two colours. The colours are then
-counted from site 0 on, and the terms that begin at the last sites along an axis, the boundary *seam*, form additional
-parts. A seam is so wide that no other term reaches both its ends. Near a seam the motion of a site depends on where the
-terms around it begin, by the weights `BEGINS`.
+Some sizes are not multiples of the period of the colours, as for a ring with two colours and an odd number of sites.
+Then the colours are counted from site 0 on, and the terms that begin at the last sites along an axis, the boundary
+*seam*, form additional parts. A seam is so wide that no other term reaches both its ends. Which terms a site near a
+seam feels depends on its position: in its equation of motion, each term has a weight of the kind `BEGINS`, 1 if the
+term belongs to the part, else 0.
 """
 
 from __future__ import annotations
@@ -42,17 +44,20 @@ from phigen.symbolic.tower import Tower
 #: Largest number of colours. The search tries MAX_COLOURS^axes colourings, and each colour adds flows to a step.
 MAX_COLOURS = 4
 
-#: Kind of the symbols that stand for components of the gradient of a part.
+#: Kind of the symbols that stand for components of the gradient of a part, which are constant along its flow.
 FORCE = "force"
 
 Steps = tuple[int, ...]
-#: A field, and the colour of the sites at which it is taken.
+#: Coordinate of the lattice: a field, and the colour of its site.
 Coordinate = tuple[str, int]
 
 
 @dataclass(frozen=True)
 class Summand:
-    """A term of H: at sites, or of a bond or a pair (``bond``). ``low`` and ``high`` are its extreme offsets."""
+    """A term of H, at sites or, if ``bond`` is true, of a bond or a pair.
+
+    ``low`` and ``high`` are the smallest and the largest offset along each axis of the sites that the term reads.
+    """
 
     expression: Expression
     low: Steps = ()
@@ -62,9 +67,10 @@ class Summand:
 
 @dataclass(frozen=True)
 class Colouring:
-    """The colour of a site: Σ weights·position modulo ``count``.
+    """Colouring of the sites of a lattice: a site has the colour Σ weights·position modulo ``count``.
 
-    With ``seams``, one along each axis, every size is possible.
+    Without ``seams``, sizes must be multiples of the periods of the colours. With a boundary seam along each axis, all
+    sizes are possible.
     """
 
     count: int = 1
@@ -72,13 +78,15 @@ class Colouring:
     seams: tuple[Seam, ...] = ()
 
     def at(self, colour: int, offset: Offset) -> int:
-        """Return the colour of the site at an offset from a site of this colour."""
+        """Return the colour of the site at an ``offset`` from a site that has the given colour."""
         if self.count == 1:
             return 0
         return (colour + sum(w * o for w, o in zip(self.weights, steps(offset), strict=True))) % self.count
 
     def periods(self, boundary: Sequence[str]) -> Steps:
-        """Return the period of the colouring along each axis; without seams, sizes must be multiples of these."""
+        """Return the number along each axis of which sizes must be multiples; 1 if the colouring has seams, which allow
+        all sizes.
+        """
         if self.seams:
             return (1,) * len(boundary)
         return tuple(
@@ -88,13 +96,14 @@ class Colouring:
 
     @property
     def windows(self) -> tuple[int, ...]:
-        """Return all sets of seams that a site may lie on, as bit masks of the axes; 0 stands for no seam."""
+        """All sets of seams that a site may lie on, as bit masks over the axes; 0 stands for no seam."""
         axes = sum(1 << a for a, seam in enumerate(self.seams) if seam.period > 1)
         return tuple(w for w in range(axes + 1) if w & axes == w)
 
     def on_seams(self) -> set[int]:
-        """Return the colours that sites on a seam may have. A single seam of width 1 lacks the last colour of a
-        period."""
+        """The colours that sites on a seam may have. They are all colours, except if there is a single seam of width 1:
+        it lacks the last colour of a period.
+        """
         seam_weights = [(s, w) for s, w in zip(self.seams, self.weights, strict=True) if w]
         if len(seam_weights) > 1 or seam_weights[0][0].wide > 1:
             return set(range(self.count))
@@ -104,20 +113,21 @@ class Colouring:
     def with_seams(self, cell: Cell) -> Colouring:
         """Return the colouring with seams so wide that terms at the two ends of a seam commute.
 
-        The equations for coordinates at one end may read values at the other end; these are constant along the flow
-        too.
+        The equations of motion at one end of a seam may read values at the other end, if these are constant along the
+        flow.
         """
         return replace(self, seams=tuple(_seam(cell, a, p) for a, p in enumerate(self.periods(cell.boundary))))
 
 
 @dataclass(frozen=True)
 class BondSum:
-    """Sums over the bonds or pairs of a site: for each symbol an expression in ``x[a]`` and ``x[b]``.
+    """Sums over the bonds or pairs of a site: ``values`` maps a symbol for each sum to its summand in ``x[a]`` and
+    ``x[b]``.
 
-    x[a] is x at the site itself, x[b] at its partner. ``end`` is the end of the bond, in the order in which the user
-    lists bonds, at which the site lies: a, b, or "" for either. In a part of one colour, ``chosen`` says which of the
-    two sites has the colour: ``here`` the site itself, ``there`` its partner, "" neither. For the symbols in
-    ``extremes``, the maximum (``max``) or minimum (``min``) is taken instead of the sum.
+    x[a] is x at the site itself, and x[b] is x at its partner. ``end`` is the end of the bond at which the site lies,
+    in the order in which the user lists the ends: a, b, or "" for either. In a part of one colour, ``chosen`` says
+    which of the two sites has the colour: ``here`` the site itself, ``there`` its partner, "" neither. The symbols in
+    ``extremes`` stand for a maximum (``max``) or minimum (``min``) in place of a sum.
     """
 
     values: Mapping[str, Expression]
@@ -131,9 +141,9 @@ class SiteMotion:
     """The motion of the sites of one colour, or of all sites if ``colour`` is None.
 
     ``increments`` of the fields depend on the site, on neighbours that stand still, and on the sums over bonds or pairs
-    ``gathered``, as symbols `GATHERED`. ``solution`` has the increments with a symbol for each component of the
-    gradient; it solves ẋ = ``rates``. ``components`` has the values of these symbols where a force is not the gradient
-    of a part. ``manner`` describes the motion in words.
+    ``gathered``, as symbols `GATHERED`. ``solution`` has the increments with a symbol `FORCE` for each component of the
+    gradient of the part; it solves ẋ = ``rates``. For damping, whose force is not the gradient of a part,
+    ``components`` has the values of these symbols. ``manner`` describes the motion in words.
     """
 
     colour: int | None
@@ -146,10 +156,11 @@ class SiteMotion:
 
 
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
-    """Return the seam along an axis.
+    """Return the boundary seam along an axis.
 
-    A term reads sites up to ``reach`` apart, and moves sites up to ``separation`` from the site where it begins. The
-    equations of motion read no sites farther away, unless brackets depend on sites that they do not couple.
+    A term of H reads sites up to ``reach`` apart. Its flow moves sites up to ``separation`` away from the site where
+    the term begins. The equations of motion read no sites farther away, unless brackets depend on sites other than
+    those of their two arguments.
     """
     if period == 1:
         return Seam()
@@ -166,7 +177,9 @@ def _seam(cell: Cell, axis: int, period: int) -> Seam:
 
 
 def merged_colours(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotion, ...]:
-    """Return one motion for all colours where the motions of all colours are equal."""
+    """Return a single motion for all sites, if the motions of all ``count`` colours are equal; else return
+    ``motions``.
+    """
     equal = (
         count > 1 and len(motions) == count and all(replace(m, colour=motions[0].colour) == motions[0] for m in motions)
     )
@@ -175,12 +188,13 @@ def merged_colours(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotio
 
 @dataclass(frozen=True)
 class CellFlow(Flow):
-    """The flow of a part of H over the lattice. The ``motions`` may run in any order, each over the sites in any order.
+    """The flow of a part of H over the lattice. The order of the ``motions`` has no effect, nor has the order of the
+    sites.
 
-    ``summands`` are the terms of the part, with the colours of the sites where they begin. On graphs a part of one
-    colour, marked ``by_colour``, stands for the parts of all colours. If the colouring has boundary seams,
-    ``beside`` is the motion of sites near them, and sites on a seam have no other motion. ``window`` is the set of
-    seams on which the terms of ``beside`` begin, a bit mask over the axes (see `Colouring.windows`).
+    ``summands`` are the terms of the part, each with the colours of the sites where it begins. On graphs, a flow marked
+    ``by_colour`` is that of the terms at one colour, and stands for such flows of all colours. If the colouring has
+    boundary seams, ``beside`` is the motion of sites near the seams. ``window`` is a set of seams, as a bit mask over
+    the axes (see `Colouring.windows`): the terms of ``beside`` begin on exactly these seams.
     """
 
     motions: tuple[SiteMotion, ...] = ()
@@ -191,20 +205,20 @@ class CellFlow(Flow):
 
     @property
     def every_motion(self) -> tuple[SiteMotion, ...]:
-        """The motions, followed by the motion near seams."""
+        """The motions of sites away from seams, followed by the motion near seams if there is one."""
         return (*self.motions, *([self.beside] if self.beside else []))
 
 
 @dataclass(frozen=True)
 class CellSplitting:
-    """The flows of the parts of H, with their colouring."""
+    """The flows of the parts of H, and the colouring of the sites that they use."""
 
     flows: tuple[CellFlow, ...]
     colouring: Colouring
 
 
 class NoPartError(Exception):
-    """A term belongs to no part with a flow; the text is the reason."""
+    """A term of H cannot be in any part that has an elementary flow; the text is the reason."""
 
     def __init__(self, expression: Expression, reason: str) -> None:
         super().__init__(reason)
@@ -214,10 +228,10 @@ class NoPartError(Exception):
 def splittings(
     cell: Cell, place: Location | None = None, search: Callable[[Cell, Colouring], PartSearch] | None = None
 ) -> Iterator[CellSplitting]:
-    """Yield H as sums of parts with elementary flows, one sum for each colouring: fewest colours first, then fewest
-    parts.
+    """Yield ways to write H as a sum of parts with elementary flows, one for each colouring.
 
-    Raises `SpecError` at ``place`` if there is no such sum; the error names the term that has no flow.
+    Colourings with fewer colours come first, then those with fewer parts. Raises `SpecError` at ``place`` if there is
+    no such sum; the error names the term that has no flow.
     """
     search = search or PartSearch
     refused: NoPartError | None = None
@@ -239,7 +253,7 @@ def splittings(
 
 
 def colourings(cell: Cell) -> Iterator[Colouring]:
-    """Yield all colourings to try, those with the fewest colours first."""
+    """Yield all colourings to try, in the order of the number of colours."""
     yield Colouring(1, (0,) * len(cell.axes))
     if cell.relation != GRID:
         return
@@ -250,7 +264,7 @@ def colourings(cell: Cell) -> Iterator[Colouring]:
 
 
 def summands_of(cell: Cell) -> list[Summand]:
-    """Return the additive terms of H; if H = 0, the term 0, so that there is a flow."""
+    """Return the additive terms of H. If H = 0, return the term 0, so that the splitting has a flow."""
     if cell.relation == GRID:
         return [Summand(term, *cell.extent(term)) for term in cell.terms or (ZERO,)]
     bonds = cell.bond_hamiltonian + cell.pair_hamiltonian
@@ -263,7 +277,9 @@ def summands_of(cell: Cell) -> list[Summand]:
 
 @dataclass
 class PartSearch:
-    """The search for parts with one colouring."""
+    """Search for the parts of H with one colouring. A term in a part is a pair: the summand of H, and the colour where
+    it begins.
+    """
 
     cell: Cell
     colouring: Colouring
@@ -274,7 +290,7 @@ class PartSearch:
             self._couples.setdefault(f, []).append(self.cell.place(other))
 
     def splitting(self) -> CellSplitting:
-        """Return H as a sum of parts with this colouring. Raises `NoPartError` if some term fits none."""
+        """Return H as a sum of parts with this colouring. Raises `NoPartError` if a term of H cannot be in any part."""
         site_terms: list[Summand] = []
         classes: list[tuple[Summand, int]] = []
         for term in summands_of(self.cell):
@@ -310,11 +326,13 @@ class PartSearch:
         return not any(self._coupled(f, g) for f in self._support(a) for g in self._support(b))
 
     def _coupled(self, a: Coordinate, b: Coordinate) -> bool:
-        """Whether a site with the colour of ``a`` has, for some offset, a bracket of field ``a`` with field ``b``."""
+        """Whether a site with the colour of ``a`` has a bracket of field ``a`` with field ``b`` at a site with the
+        colour of ``b``.
+        """
         return any(g == b[0] and self.colouring.at(a[1], d) == b[1] for g, d in self._couples.get(a[0], ()))
 
     def _classes(self, term: Summand) -> list[tuple[Summand, int]]:
-        """Return the term with each colour, or nothing if its copies at sites of one colour do not commute."""
+        """Return the term with each colour in turn; [] if its copies at the sites of one colour do not commute."""
         classes = [(term, c) for c in range(self.colouring.count)]
         return classes if all(self._commute(c, c) for c in classes) else []
 
@@ -324,7 +342,11 @@ class PartSearch:
         return self.cell.is_local and not term.bond and all(o == self.cell.origin for _, o in places)
 
     def _summands(self, term: Summand) -> list[Summand]:
-        """Return the term; if it mixes coordinates of different sites that do not commute, return its monomials."""
+        """Return the term as a list of summands.
+
+        It has the term alone, except if the term mixes coordinates of different sites that do not commute. Then it has
+        the monomials of the term.
+        """
         if self._classes(term) or self._is_single_site(term):
             return [term]
         names = [n for n, (f, _) in self.cell.places(term.expression).items() if f in self.cell.fields]
@@ -336,13 +358,13 @@ class PartSearch:
     # --- flows
 
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
-        """Return the flow of a sum of commuting terms, and of the terms ``more`` multiplied by `KICK`."""
+        """Return the flow of a sum of commuting terms. The terms in ``more`` are multiplied by the symbol `KICK`."""
         motions = [m for m in self._motions(part, more) if m.increments]
         by_term: dict[int, tuple[Summand, list[int]]] = {}
         for summand, colour in (*part, *((replace(s, expression=symbol(KICK) * s.expression), c) for s, c in more)):
             by_term.setdefault(id(summand.expression), (summand, []))[1].append(colour)
         coloured_summands = tuple((s, tuple(c)) for s, c in by_term.values())
-        # the cost of the flow is that of the expression of one bond or pair
+        # The cost of a flow is estimated from the expression of a single bond or pair.
         bond_terms = {n: e for m in motions for gathered in m.gathered for n, e in gathered.values.items()}
         increments = tuple(substitute([e for m in motions for e in m.increments.values()], bond_terms))
         hamiltonian = total(s.expression for s, _ in coloured_summands)
@@ -355,9 +377,10 @@ class PartSearch:
     def _seam_motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
     ) -> SiteMotion | None:
-        """Return the motion of sites near seams.
+        """Return the motion of sites near boundary seams under the terms that begin on a given set of seams.
 
-        None if there are no seams, or if the part has the terms of sites of all colours.
+        Returns None if there are no seams, or if the part has the terms of all colours, so that seams make no
+        difference.
         """
         all_classes = {(id(s.expression), c) for s, _ in (*part, *more) for c in range(self.colouring.count)}
         if not self.colouring.seams or all_classes == {(id(s.expression), c) for s, c in (*part, *more)}:
@@ -378,10 +401,11 @@ class PartSearch:
         shift: Offset = (),
         factor: Expression = ONE,
     ) -> Expression:
-        """Return ∂V/∂field at the site ``shift`` away, of this colour, from terms at sites.
+        """Return ∂V/∂field at the site ``shift`` away, for the sum V of the terms ``part``; terms of bonds are left
+        out.
 
-        Each term has a weight that vanishes if the term reaches beyond an open end. Near a seam (no colour), the weight
-        depends on the site where the term begins.
+        ``colour`` is the colour of that site. Each term has a weight that is 0 if the term reaches beyond an open end.
+        If ``colour`` is None, the site is near a seam, and the weight also depends on the site where the term begins.
         """
         slopes = []
         for summand, begin in part:
@@ -403,7 +427,9 @@ class PartSearch:
     def _motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int | None
     ) -> SiteMotion:
-        """Return the motion of the sites of a colour, or of sites near seams if ``colour`` is None."""
+        """Return the motion of the sites of a colour under the terms of a part, or of sites near seams if ``colour`` is
+        None.
+        """
         cell = self.cell
         coordinates: set[tuple[str, int | None]] = {c for s in (*part, *more) for c in self._support(s)}
         if colour is None:
@@ -428,9 +454,7 @@ class PartSearch:
             forces[name] = force
             rates[f].append(entry * symbol(name))
         field = {f: total(r) for f, r in rates.items() if r}
-        if (
-            colour is not None
-        ):  # no term reaches both ends of a seam: neighbours that are at rest elsewhere are at rest near a seam too
+        if colour is not None:  # no term reaches both ends of a seam, so this check covers sites near seams too
             self._expect_still(field, colour, part)
         return self._solved_motion(field, forces, [BondSum(gathered)] if gathered else [], colour, part)
 
@@ -442,7 +466,9 @@ class PartSearch:
         colour: int | None,
         part: Sequence[tuple[Summand, int]],
     ) -> SiteMotion:
-        """Return the motion with these ``rates``, which contain symbols for the ``forces``."""
+        """Return the motion of a site with the equation ẋ = ``rates``, in which symbols stand for the values in
+        ``forces``.
+        """
         if not rates:
             return SiteMotion(colour, {})
         solved_rates = self._solved(rates, part)
@@ -460,7 +486,7 @@ class PartSearch:
         return solution
 
     def _expect_still(self, rates: Mapping[str, Expression], colour: int, part: Sequence[tuple[Summand, int]]) -> None:
-        """Raise `NoPartError` if the equation of a site depends on neighbours that move in the same part."""
+        """Raise `NoPartError` if the equation of motion of a site reads neighbours that move in the same part."""
         moving = {f for f, e in rates.items() if not e.is_zero}
         for f, o in self.cell.places(*rates.values()).values():
             if f in moving and any(o) and self._moves(f, self.colouring.at(colour, o), part):
@@ -473,7 +499,9 @@ class PartSearch:
         return any((g, self.colouring.at(colour, d)) in coordinates for g, d in self._couples.get(field, ()))
 
     def _site_flows(self, terms: Sequence[Summand]) -> list[CellFlow]:
-        """Return the flows of terms that are functions of one site."""
+        """Return the flows of the sum of ``terms``, which are functions of one site: one flow, or several if that is
+        needed.
+        """
         if not terms:
             return []
         cell = self.cell
@@ -508,9 +536,9 @@ class PartSearch:
 
 
 class SiteFields:
-    """Covector and vector fields at sites, with weights that vanish beyond open ends.
+    """Covector and vector fields at a site, with weights that are 0 where a term reaches beyond an open end.
 
-    ``gathered`` has, by field, the symbols of the sums over bonds or pairs in the slopes.
+    ``gathered`` maps a field f to the expression for the sums over bonds or pairs in ∂H/∂f.
     """
 
     def __init__(self, cell: Cell, gathered: Mapping[str, Expression] | None = None) -> None:
@@ -523,7 +551,7 @@ class SiteFields:
         return self._search.force(self._every, field, 0, shift) + self.gathered.get(field, ZERO)
 
     def push(self, field: str, shift: Offset = ()) -> Expression:
-        """Return the covector force ζ, including damping, for a field at the site ``shift`` away."""
+        """Return the component ``field`` of the covector force ζ at the site ``shift`` away, including damping."""
         cell_forces = self.cell.forces
         covector = self._shifted(cell_forces.covector.get(field, ZERO), shift)
         if cell_forces.damping is None:
@@ -535,12 +563,11 @@ class SiteFields:
         return self._shifted(self.cell.forces.damping or ZERO, shift)
 
     def impulse(self, field: str) -> Expression:
-        """Return the vector force f on a field."""
+        """Return the component ``field`` of the vector force f at the site."""
         return self._shifted(self.cell.forces.vector.get(field, ZERO))
 
     def noise(self, field: str, shift: Offset = ()) -> Expression:
-        """Return Σ ΔW σ ∂g/∂field over the noise sources at the site ``shift`` away, with the increments ΔW of that
-        site."""
+        """Return Σ ΔW σ ∂g/∂field over the sources of noise, at the site ``shift`` away with its increments ΔW."""
         slopes = [
             symbol(dw) * s.amplitude * gradient(s.hamiltonian, [field])[0]
             for dw, s in zip(self.cell.increments, self.cell.noise.values(), strict=True)
@@ -558,7 +585,7 @@ class SiteFields:
         return total(terms)
 
     def _shifted(self, e: Expression, shift: Offset = ()) -> Expression:
-        """Return an expression translated to the site ``shift`` away, without terms that reach beyond open ends."""
+        """Return an expression moved to the site ``shift`` away; each term has a weight that is 0 beyond open ends."""
         cell = self.cell
         if cell.relation != GRID or e.is_zero:
             return e
@@ -570,7 +597,7 @@ class SiteFields:
 def field_at_site(cell: Cell, gathered: Mapping[str, Expression]) -> tuple[Expression, ...]:
     """Return ẋ of all fields at a site, without noise, with weights at open ends.
 
-    ``gathered`` is as in `SiteFields`.
+    ``gathered`` maps a field f to the expression for the sums over bonds or pairs in ∂H/∂f.
     """
     site_fields = SiteFields(cell, gathered)
     if not cell.forces:
@@ -596,12 +623,14 @@ def present(cell: Cell, low: Sequence[int], high: Sequence[int], offset: Sequenc
 
 
 def _opposite(offset: Offset) -> tuple[int, ...]:
-    """Return the opposite of an offset of a grid; () if the lattice has no axes."""
+    """Return the offset −``offset`` on a grid; () if the lattice has no axes."""
     return tuple(-o for o in offset if isinstance(o, int))
 
 
 def bracketless_ring(coordinates: Sequence[str], expressions: Iterable[Expression]) -> Ring:
-    """Return the ring of these coordinates without brackets; all other symbols are constants."""
+    """Return the polynomial ring in ``coordinates`` without brackets; all other symbols in the expressions are
+    constants.
+    """
     roots = list(expressions)
     constants = [n for n in symbols_of(*roots) if n not in coordinates and n != TIME]
     tower = Tower([*coordinates, *constants, TIME], roots, coordinates)
@@ -609,7 +638,7 @@ def bracketless_ring(coordinates: Sequence[str], expressions: Iterable[Expressio
 
 
 def site_ring(cell: Cell, expressions: Sequence[Expression], symbols: Sequence[str] = ()) -> Ring:
-    """Return the ring of the fields of one site with their bracket. The other ``symbols`` are constants."""
+    """Return the polynomial ring in the fields of one site, with their brackets; all other symbols are constants."""
     n = cell.fields
     brackets = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in n) for f in n)
     roots = [*expressions, *(e for row in brackets for e in row)]

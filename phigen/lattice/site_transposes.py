@@ -1,8 +1,8 @@
 """The transpose of a step of a lattice: kernels at a site that propagate cotangents backwards.
 
 A sweep adds increments to some fields of a site; the increments depend on values around the site. The transposed kernel
-takes the cotangents of these fields and returns, for each value that was read, its contribution to the cotangent of
-that value. Targets add the contribution at the site that the value came from.
+takes the cotangents of the increments. For each value that the kernel of the sweep reads, it returns a contribution to
+the cotangent of this value. Targets add the contribution at the site of the value.
 
 In the series a stage is y = r(x, y), x' = x + a(y). Let λ be the cotangent of x'. Then μ = (∂r/∂y)ᵀμ + (∂a/∂y)ᵀλ is
 solved for μ, and x̄ = λ + (∂a/∂x)ᵀλ + (∂r/∂x)ᵀμ, by the transposed kernels of r and a.
@@ -18,7 +18,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.staging import TABLE, Coefficients
 from phigen.scheme.steps import BACK, Adjoint, Equation, Partners, Sweep
 
-#: Names of the input arrays of kernels at sites for which cotangents are computed.
+#: Names of the input arrays of kernels at sites with respect to which kernels are differentiated.
 _DIFFERENTIATED_INPUTS = ("site", "start", "gathered", "bonds", "params")
 
 
@@ -30,7 +30,9 @@ def transposed(
     coefficients: Coefficients,
     partners: Partners | None,
 ) -> Adjoint:
-    """Return the transposed kernels of a step; the transpose of a kernel has its name followed by `BACK`."""
+    """Return the transposes of all kernels of a step. The transpose of a kernel has the same name, followed by
+    `BACK`.
+    """
     kernels: list[Kernel] = []
     for sweep in (sweep for part in swept for sweep in part):
         kernels += [sweep.kernel, *(sweep.gather.kernels if sweep.gather else ())]

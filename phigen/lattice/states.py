@@ -1,4 +1,4 @@
-"""Runs of lattices as arrays: initial states, parameters at sites and bonds, and bonds."""
+"""Runs of lattices as arrays: the initial state, the parameters at sites and bonds, and the list of bonds."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ Bonds = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Start:
-    """The data of a run before its first step.
+    """The data of a run of a lattice before its first step.
 
-    ``sizes`` are the sizes of the axes or, for graphs and pairs, the number of sites. ``state`` has the shape (fields,
-    *sizes). ``parameters`` are numbers, and arrays over sites or bonds. ``bonds`` has the shape (bonds, 2); ``graph``
-    is true if the lattice is a graph.
+    ``sizes`` are the numbers of sites along the axes of a grid; for graphs and pairs, the only size is the number of
+    sites. ``state`` has the shape (fields, *sizes). ``parameters`` maps names to a number, or to an array over sites or
+    bonds. ``bonds`` has the shape (bonds, 2) and contains sites; ``graph`` is true if the lattice is a graph.
     """
 
     sizes: tuple[int, ...]
@@ -39,22 +39,24 @@ class Start:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """The parameters of a solver, with the bonds of a graph."""
+        """The parameters as a solver receives them: by name, and the bonds of a graph as ``bonds``."""
         return {**self.parameters, **({"bonds": self.bonds} if self.graph else {})}
 
 
 def start_of(spec: Spec, run: Run) -> Start:
     """Return the initial state, parameters and bonds of a run of a lattice.
 
-    Raises `SpecError` for files that cannot be read and arrays that do not fit, with the place in the spec.
+    Raises `SpecError`, with the place in the spec, for files that cannot be read and arrays that do not fit the sizes.
     """
     return _Reader(spec, run).start()
 
 
 def defaults_at(spec: Spec, names: Collection[str], sizes: tuple[int, ...], bonds: int) -> dict[str, Floats]:
-    """Return the default values of parameters that are formulas, lists, files or random, at the given sizes.
+    """Return arrays with the default values of the parameters ``names`` at all sites or bonds of a lattice.
 
-    ``bonds`` is the number of bonds of a graph. Raises `SpecError` at the parameter for an array of another length.
+    Parameters with one number as the default are left out; the defaults of all others are formulas, lists, files or
+    random. ``bonds`` is the number of bonds of a graph. Raises `SpecError` at a parameter whose array has another
+    length.
     """
     arrays = {}
     for p in spec.parameters:
@@ -99,11 +101,11 @@ class _Reader:
         if values.size and p.refuses(float(np.min(values))):
             raise self._out_of_bound(p, values, f"the parameter is {p.bound} by declaration")
         if self.spec.coordinates_from and p.at == "sites":
-            # the only parameter at sites is the mass: further terms of H are refused
+            # The mass is the only parameter at sites, since `relative_bodies` refuses all other Hamiltonians.
             self._expect_masses(p, values)
 
     def _expect_masses(self, p: Parameter, values: Floats) -> None:
-        """Raise `SpecError` if bodies cannot have these masses in relative coordinates."""
+        """Raise `SpecError` if masses are not allowed in relative coordinates, such as a first body without mass."""
         begin, form = f"with coordinates_from: {self.spec.coordinates_from}", self.spec.poisson
         if not values.flat[0] > 0:
             message = f"{begin} the first body needs a mass, which is {values.flat[0]:g}"
@@ -111,18 +113,20 @@ class _Reader:
         entries = [e for row in form.entries for e in row] if isinstance(form, MatrixForm) else []
         if (least := np.min(values)) < 0:
             raise self._out_of_bound(p, values, f"{begin} masses are nonnegative")
-        if least == 0 and p.name not in symbols_of(*entries):  # the bracket of velocities has the mass
+        if least == 0 and p.name not in symbols_of(*entries):  # brackets of velocities contain the mass
             raise self._out_of_bound(p, values, f"{begin} bodies with momenta have positive masses")
 
     def _out_of_bound(self, p: Parameter, values: Floats, rule: str) -> SpecError:
-        """Return the error for values that break a rule, with the least of them."""
+        """Return the error for values of a parameter that break the ``rule``; the message names the least value and its
+        place.
+        """
         worst = np.unravel_index(np.argmin(values), values.shape)
         place, noun = ", ".join(map(str, worst)), p.at.removesuffix("s")
         where = f"{float(values[worst]):g} at {noun} {place if len(worst) == 1 else f'({place})'}"
         return self.arrays.refused(p.name, f"{rule}, but {where}")
 
     def _expect_room(self, sizes: Sequence[int]) -> None:
-        """Raise `SpecError` if the arrays over sites do not fit into memory together."""
+        """Raise `SpecError` if all arrays over the sites together do not fit into memory."""
         arrays = len(self.lattice.indices) + len(self.spec.coordinates)
         arrays += sum(p.at == "sites" for p in self.spec.parameters)
         place = self.spec.diagnostic(("runs", self.run.name, "sizes"), "").location
@@ -132,8 +136,10 @@ class _Reader:
         return SpecError([self.spec.diagnostic(("runs", self.run.name, key), message, hint)])
 
     def _sites(self, bonds: Bonds) -> int:
-        """Return the number of sites of a run that does not state it, from the lengths of lists or the ends of
-        bonds."""
+        """Return the number of sites of a run that does not state ``sizes``.
+
+        It is the largest length of a list in the initial state, or the number of the last site that has a bond, plus 1.
+        """
         lengths = [len(v.listed) for v in self.lattice_run.state.values() if v.listed]
         if not lengths and not len(bonds):
             raise self._error("initial", "the number of sites is not known", "sizes: [N]")
@@ -163,9 +169,9 @@ class _Reader:
 
 
 class _Arrays:
-    """Reader of values of a spec as arrays over the sites or bonds of a lattice of these sizes.
+    """Reader of values of a spec as arrays over the sites or bonds of a lattice with the given ``sizes``.
 
-    ``run`` is the name of the run that the values belong to; ``hint`` is the hint of errors.
+    ``run`` is the name of the run whose values are read; ``hint`` is the hint of the errors.
     """
 
     def __init__(self, spec: Spec, sizes: Sequence[int], run: str = "", hint: str = "") -> None:
@@ -177,7 +183,9 @@ class _Arrays:
         self.folder = Path(spec.file).parent
 
     def read(self, values: Values, shape: tuple[int, ...], name: str) -> Floats:
-        """Return values as an array of that shape. Raises `SpecError` if they do not fit."""
+        """Return values of a spec as an array with the given shape. Raises `SpecError` if the values have another
+        shape.
+        """
         if values.file:
             try:
                 return values_in(self.folder / values.file, name, shape)
@@ -205,7 +213,10 @@ class _Arrays:
         return array
 
     def refused(self, name: str, message: str) -> SpecError:
-        """Return the error for values of a field, of a parameter, or of the whole state, at their place in the spec."""
+        """Return an error that points to the place of the values in the spec.
+
+        ``name`` is a field or a parameter, or "initial" for the whole state.
+        """
         run_path = ("runs", self.run)
         paths = [(*run_path, "parameters", name), ("parameters", name, "value"), (*run_path, "initial", name)]
         path = next((p for p in paths if p in self.spec.locations), (*run_path, "initial"))

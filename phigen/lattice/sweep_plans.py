@@ -1,7 +1,4 @@
-"""From a cell to a program: a step of a lattice is a schedule of sweeps over the sites.
-
-Each sweep has a kernel that is evaluated at every site.
-"""
+"""The step of a lattice as a program: a schedule of sweeps over the sites, built from the cell."""
 
 from __future__ import annotations
 
@@ -69,16 +66,18 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class SplittingPlan:
-    """Plan of a step by splitting: the parts of H, the method, and the flows of ``noise``."""
+    """Plan of a step by splitting: the parts of H, the composition method ``choice``, and the flows of the
+    ``noise``.
+    """
 
     parts: CellSplitting
     choice: ScheduledMethod
     noise: tuple[CellFlow, ...] = ()
-    since: str = ""  # reason for using more colours than the minimum
+    since: str = ""  # reason for boundary seams, or for more colours than the minimum
     negative: int | None = None  # with a monitor: index of the part B of K = log(A + e) − log(−B)
-    bodies: LatticeBodies | None = None  # in relative coordinates
+    bodies: LatticeBodies | None = None  # the bodies, if the spec asks for relative coordinates
 
-    #: The scheme, as in specs, and the name of the method for display. A step is a sequence of explicit flows.
+    #: The scheme, as in specs; it is also the name of the method for users. A step is a sequence of explicit flows.
     scheme = kind = "splitting"
     label = "splitting of a lattice"
     is_implicit, site_kind, weak_order = False, None, 2
@@ -96,17 +95,17 @@ class SplittingPlan:
 
     @property
     def colouring(self) -> Colouring:
-        """The colouring of the sites."""
+        """The colouring of the sites on which the parts are based."""
         return self.parts.colouring
 
     @property
     def flows(self) -> tuple[CellFlow, ...]:
-        """The flows in the order of a step."""
+        """The flows of the parts of H and of the forces, in the order of a step."""
         return tuple(flow for flow in self.choice.splitting.flows if isinstance(flow, CellFlow))
 
     @property
     def by_colour(self) -> tuple[bool, ...]:
-        """Whether each flow belongs to one colour of a graph; empty if none does."""
+        """Whether each flow updates the sites of one colour of a graph only; () if all flows update all sites."""
         return tuple(flow.by_colour for flow in self.flows) if any(flow.by_colour for flow in self.flows) else ()
 
     @property
@@ -137,39 +136,43 @@ class SplittingPlan:
         ]
 
     def acting(self, forces: SpecForces) -> str:
-        """The words about forces in the header of generated files; none if the forces have flows of their own."""
+        """Return "": in a splitting, forces have flows of their own, so that the header of generated files needs no
+        words on them.
+        """
         return ""
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
-        """All flows, those of the noise first, each with the name of its generator."""
+        """Yield all flows, the flows of noise first, each with the name of its generator."""
         for flow, name in zip(self.noise, cell.noise, strict=True):
             yield flow, f"the noise {name}"
         for k, flow in enumerate(self.flows, 1):
             yield flow, f"F_{k}, a force" if flow.force else f"H_{k} = sum of {flow.hamiltonian}"
 
     def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> None:
-        """Return None: a splitting solves no equation, since all flows are explicit."""
+        """Return None: all flows are explicit, so a splitting solves no implicit equation."""
 
     def either(self, splitting: Callable[[SplittingPlan], T], series: Callable[[SeriesPlan], T]) -> T:
-        """Return the result of ``splitting``, the function for this class of plans."""
+        """Return ``splitting(self)``. A caller passes one function for each class of plans, and the plan chooses
+        between them.
+        """
         return splitting(self)
 
     def schedule(self) -> Schedule:
-        """Return the flows of a step, part by part."""
+        """Return the schedule of a step: the order and the durations of the flows."""
         if self.by_colour:
             return _any_number(self.choice.method, dated=self.choice.carrier is not None)
         schedule = self.choice.schedule()
         return with_noise(schedule, len(self.noise)) if self.noise else schedule
 
 
-#: The plan of a step of a lattice; both have the same properties and methods.
+#: Plan of a step of a lattice. The two classes have the same properties and methods.
 LatticePlan = SplittingPlan | SeriesPlan
 
 
 def plan_sweeps(cell: Cell, spec: Spec) -> LatticePlan:
     """Return the plan of a step: a splitting, or the series if the spec asks for it or H does not split.
 
-    Raises `SpecError` if neither is possible, and for features that lattices do not have.
+    Raises `SpecError` if neither scheme is possible, and for options that lattices do not have.
     """
     _expect_supported(cell, spec)
     cell_monitor.expect_applicable(cell, spec)
@@ -203,14 +206,14 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     if coloured and noise:
         message = "scheme splitting: noise is not offered where parts are those of one colour of a graph"
         raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "scheme: series applies to it")])
-    if cell.time:  # the flows of the colours run in the order of the parts
+    if cell.time:  # on a coloured graph, the time advances in the last flow
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
     plan = SplittingPlan(parts, _with_seams(choice, parts.colouring), noise, since)
     return replace(plan, negative=cell_monitor.negative_part(cell, plan.flows, spec)) if monitored else plan
 
 
 def _plan_bodies(cell: Cell, spec: Spec) -> SplittingPlan:
-    """Return the plan of bodies in relative coordinates."""
+    """Return the plan for attracting bodies in relative coordinates (see `phigen.lattice.relative_bodies`)."""
     bodies = lattice_bodies(cell, spec)
     parts = bodies.flows()
     choice = planned(spec, SplitHamiltonian(parts.flows, small=1), spec.wanted_order, spec.composition, lambda: ())
@@ -222,9 +225,9 @@ def _plan_bodies(cell: Cell, spec: Spec) -> SplittingPlan:
 
 
 def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMethod:
-    """Return the choice with the flows of terms on boundary seams added.
+    """Return the method with additional flows, those of the terms of each part that begin on boundary seams.
 
-    These flows follow the flow of the other terms of their part; in the last part they precede it.
+    The flows on seams come after the flow of the remaining terms of their part, but before it in the last part.
     """
     flows = choice.splitting.flows
     last, all_flows = len(flows) - 1, list[Flow]()
@@ -236,7 +239,9 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
 
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
-    """Yield flows of the terms of a part that begin on seams, one flow for each set of seams."""
+    """Yield flows of those terms of a part that begin on seams, one flow for each set of seams on which a site may
+    lie.
+    """
     colours = {colour for _, summand_colours in flow.summands for colour in summand_colours}
     if colours and colours.isdisjoint(colouring.on_seams()):
         return
@@ -245,10 +250,11 @@ def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
 
 
 def _coloured(cell: Cell, search: type[PartSearch], spec: Spec) -> tuple[CellSplitting, tuple[CellFlow, ...], str]:
-    """Return the parts of H and of the forces for the fewest colours that fit the sizes of all runs.
+    """Return the parts of H and the flows of forces, with the fewest colours that the sizes of all runs allow.
 
-    Also returns the reason for not using fewer colours. If no number of colours fits, the scheme ``splitting`` takes
-    the fewest, and the runs are refused later; the scheme ``auto`` raises `MisfitError`.
+    The third result is the reason for boundary seams, or for not using fewer colours; "" if there is none. If no number
+    of colours fits, the scheme ``splitting`` takes the fewest colours, and a later check refuses the runs. The scheme
+    ``auto`` raises `MisfitError`.
     """
     best: tuple[CellSplitting, tuple[CellFlow, ...]] | None = None
     rejected: list[Misfit] = []
@@ -277,9 +283,10 @@ def _coloured(cell: Cell, search: type[PartSearch], spec: Spec) -> tuple[CellSpl
 def _seamed(
     cell: Cell, colouring: Colouring, search: type[PartSearch], spec: Spec
 ) -> tuple[CellSplitting, tuple[CellFlow, ...]] | None:
-    """Return the parts of H and of the forces with boundary seams, which allow every size.
+    """Return the parts of H and the flows of forces for a colouring with boundary seams, which fits runs of any size.
 
-    Returns None if some run is too small, ends are open, or sites near seams have no elementary flow.
+    Returns None if a run is too small for its seams, an axis has open ends, or sites near seams have no elementary
+    flow.
     """
     seamed = colouring.with_seams(cell)
     small = any(
@@ -296,9 +303,10 @@ def _seamed(
 
 
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
-    """Return the parts that can be the V of a Nyström method.
+    """Return the parts of H that can be the potential V of a Nyström method.
 
-    If H depends on the time, T + e takes the place of T: T must not depend on the time, and V must commute with ∂V/∂t.
+    If H depends on the time, T + e takes the place of T, where e is the momentum of the time. Then T must not depend on
+    the time, since V must commute with ∂V/∂t.
     """
     return [k for k in cell_kicks(cell, parts) if not (cell.time and is_dated(parts.flows[1 - k.part], cell.time))]
 
@@ -393,9 +401,9 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
 
 
 def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
-    """Return the schedule of a method for a number of colours that is known only at run time; see `Sweeps`.
+    """Return the schedule of a method on a graph, whose number of colours is known only at run time; see `Sweeps`.
 
-    ``dated`` says that H depends on the time. The advance of the time is then the last flow.
+    ``dated`` says that H depends on the time. Then the time advances in the last flow.
     """
     assert isinstance(method, Alternation)
     backwards = {(1, 2): (3, 2)}
@@ -444,7 +452,10 @@ def _sweep(
 
 
 def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coefficients, *, late: bool) -> Sweep:
-    """Return the tangent kernel of a sweep. If flows may be ``late``, their duration varies too."""
+    """Return the tangent kernel of a sweep, which computes variations of the increments.
+
+    If ``late``, the duration of the flow varies as well.
+    """
     increments = list(motion.increments.values())
     slopes = along(cell, increments)
     slopes = staged(cell_monitor.delayed(increments, slopes) if late else slopes, coefficients)
@@ -459,7 +470,10 @@ def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coeffici
 def _gather(
     cell: Cell, sums: Sequence[BondSum], name: str, purpose: str, coefficients: Coefficients | None = None
 ) -> Gather | None:
-    """Return the kernels of sums over bonds or pairs, or None without sums; all sums have the same symbols."""
+    """Return the kernels that compute sums over bonds or pairs, or None if ``sums`` is empty.
+
+    All members of ``sums`` have the same symbols, such as those of both ends of a bond.
+    """
     if not sums:
         return None
     ends = []
@@ -480,7 +494,10 @@ def _gather(
 
 
 def _partners(cell: Cell, *, varied: bool) -> Partners | None:
-    """Return the energies and forces of bonds or pairs; if ``varied``, also the derivatives of the forces."""
+    """Return the kernels of bonds or pairs for energies, forces and observables; None on a grid.
+
+    If ``varied``, kernels for the variations of the forces are included.
+    """
     if cell.relation == GRID:
         return None
     kind = "bond" if cell.relation == GRAPH else "pair"
@@ -520,7 +537,7 @@ def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites
 
 
 def _ends(cell: Cell, kernels: Sequence[Kernel]) -> dict[str, tuple[str, str]]:
-    """Return the field and the end of the pair for each symbol that kernels of pairs read."""
+    """Return (field, end of the pair) for each symbol that the kernels of bonds or pairs read."""
     places = [p for kernel in kernels for p in cell.places(*kernel.roots).items()]
     return {name: (f, str(offset[0])) for name, (f, offset) in places}
 
@@ -542,9 +559,9 @@ def _acting_facts(cell: Cell, plan: LatticePlan) -> Iterator[str]:
 
 
 def _operations(step: Sweeps) -> dict[str, int]:
-    """Return the numbers of operations of a step at one site, by operation."""
+    """Return the numbers of operations of a step per site, by the kind of operation."""
     times = Counter(part for part, _ in step.schedule.flows)
-    if step.by_colour:  # repeated for each colour except the first and the last
+    if step.by_colour:  # for each colour but the first and the last, a part runs twice in a stage
         times = Counter(dict.fromkeys(range(len(step.parts)), 2 * step.schedule.stages))
     totals: Counter[str] = Counter()
     for part, sweeps in enumerate(step.parts):

@@ -1,4 +1,7 @@
-"""Derivatives of kernels at a site along variations of the fields around it, for Newton's method and tangents."""
+"""Derivatives of kernels at a site with respect to the fields around it, along variations of the fields.
+
+Newton's method and tangent maps need them.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,10 @@ from phigen.symbolic.symbols import GATHERED, INITIAL, VARIATION, Symbol, kind_o
 
 
 def along(cell: Cell, values: Sequence[Expression]) -> list[Expression]:
-    """Return the directional derivatives of values, with symbols for the direction.
+    """Return the directional derivatives of values, as expressions in the symbols of the variations.
 
-    The symbols are `variation` of the fields that the values read, and `varied_sum` of the sums over bonds or pairs.
+    These symbols are `variation` for each field that the values read, and `varied_sum` for each sum over bonds or
+    pairs.
     """
     slots: dict[str, Symbol] = {n: variation(n) for n, (f, _) in cell.places(*values).items() if f in cell.fields}
     slots |= {n: varied_sum(n) for n in symbols_of(*values) if isinstance(n, Symbol) and n.kind == GATHERED}
@@ -33,7 +37,9 @@ def varied_sum(name: Symbol) -> Symbol:
 
 
 def with_variations(cell: Cell, values: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return the terms of a bond or a pair in sums, followed by the terms in the variations of these sums."""
+    """Return the summands of ``values``, followed by the summands for the variations of these sums over bonds or
+    pairs.
+    """
     names = [n for n in values if isinstance(n, Symbol) and kind_of(n) == GATHERED]
     assert len(names) == len(values)
     return {**values, **dict(zip(map(varied_sum, names), along(cell, list(values.values())), strict=True))}
