@@ -146,9 +146,10 @@ class CrossingFinder(Generic[C]):
                 raise failure
 
     def _interpolated_states(self, session: C) -> Floats:
-        """Return states (points, DIM) inside the last step.
+        """Return states (points, DIM) inside the last step, from the collocation polynomial of the method.
 
-        Returns an empty array if the method has no collocation polynomial, or the time must be read from the session.
+        Returns an empty array if the method has no collocation polynomial. It is also empty if g receives times and a
+        monitor (dt = g dτ) makes steps equal in τ, since the times inside the step are then not known.
         """
         interpolated = getattr(session, "interpolated", None)
         if interpolated is None or (self.timed and not math.isnan(self._clock(session, math.nan))):
@@ -157,9 +158,9 @@ class CrossingFinder(Generic[C]):
         return np.empty((0, 0)) if states is None else states
 
     def within(self, session: C, part: float) -> list[tuple[float, Floats]]:
-        """Return the crossings (t, x) in the first ``part`` of the next step of a session, which is not advanced.
+        """Return the crossings (t, x) in the first ``part`` (a fraction) of the next step; the session is not advanced.
 
-        The result is empty if the whole step fails.
+        The result is empty if the next step fails.
         """
         copy, end = session.branch(), session.steps + part * (1 + 1e-12)
         try:
@@ -173,7 +174,10 @@ class CrossingFinder(Generic[C]):
         ]
 
     def _time(self, j: Any, fraction: float = 0.0) -> Any:
-        """Return the time at a fraction of interval j between points; interval 0 begins at the first of ``values``."""
+        """Return the time at a fraction of interval j between two points where g is evaluated.
+
+        Interval 0 begins at the point of ``values[0]``.
+        """
         return self.t0 + (self.first + (j + fraction) / self.points) * self.h
 
     def _values(self, states: Floats, t: Floats) -> Floats:
@@ -187,7 +191,7 @@ class CrossingFinder(Generic[C]):
         )
 
     def _crossings(self, searched: int) -> Iterator[tuple[float, Floats]]:
-        """Yield the crossings of this block; its first ``searched`` intervals were searched before."""
+        """Yield the crossings in the latest block of steps; its first ``searched`` intervals were searched before."""
         self.places = []
         for sign in SIGNS[self.direction]:
             self._sign = sign
@@ -207,9 +211,10 @@ class CrossingFinder(Generic[C]):
                 yield self._crossing_between(i, 0.0, v[i], 1.0, v[i + 1])
 
     def _bracket_at_extremum(self, v: list[float], i: int) -> tuple[int, float, float, float, float] | None:
-        """Return a bracket (interval, low, g at low, high, g at high) of a zero next to an extremum of g near point i.
+        """Return an interval with a zero next to an extremum of g near point i; None if there is no such zero.
 
-        None if there is no extremum, or g does not change its sign there.
+        The result is (number of the interval, low, g at low, high, g at high); low and high are fractions of the
+        interval. The list v has the values of g.
         """
         a, b, c = v[i - 1 : i + 2]
         peak = a < b >= c and b < 0
@@ -218,8 +223,8 @@ class CrossingFinder(Generic[C]):
         curvature = a - 2 * b + c
         offset = (a - c) / (2 * curvature) if curvature else 0.0
         gain = abs((a - c) * offset / 4)
-        # The parabola through three values has an error of a fraction of its curvature; a tenth of the curvature is
-        # added for it.
+        # An extremum that is this close to 0 is examined: ``gain`` is its distance from b on the parabola through the
+        # three values, and a tenth of the curvature allows for the error of the parabola.
         if not abs(b) <= 2 * gain + 0.1 * abs(curvature):
             return None
         j = i - 1 if offset < 0 else i
@@ -230,9 +235,9 @@ class CrossingFinder(Generic[C]):
         return (j, 0.0, v[j], extremum, value) if peak else (j, extremum, value, 1.0, v[j + 1])
 
     def _extremum(self, v: list[float], j: int, sign: float) -> float:
-        """Return the fraction of interval j where sign·g is smallest, by golden-section search.
+        """Return the fraction of interval j at which sign·g is smallest, by golden-section search.
 
-        The search ends earlier at a fraction where g has the other sign.
+        If the search meets a fraction at which g and v[j] have different signs, it returns this fraction at once.
         """
         low, high = 0.0, 1.0
         left, right = 1 - _GOLDEN, _GOLDEN
@@ -252,26 +257,27 @@ class CrossingFinder(Generic[C]):
         return left if sign * at_left < sign * at_right else right
 
     def _value_at(self, j: int, fraction: float) -> float:
-        """Return g at a fraction of interval j, on the collocation polynomial if there is one."""
+        """Return the value of g at a fraction of interval j: on the collocation polynomial or, without one, by a
+        step."""
         step, part = divmod(j, self.points)
         if self.points > 1:
             return self._on_polynomial(step, [(part + fraction) / self.points])[0]
         return self._sign * self._value(self._session_at_fraction(step, fraction, SUBSTEPS), j, fraction)
 
     def _on_polynomial(self, step: int, fractions: Sequence[float]) -> list[float]:
-        """Return g at fractions of a step, on its collocation polynomial."""
+        """Return the values of g at fractions of a step, on the collocation polynomial of this step."""
         states = self._session_after(step).interpolated(fractions)
         times = self._time(self.points * (step + np.array(fractions)))
         return [self._sign * float(value) for value in self._values(states, times)]
 
     def _session_after(self, step: int) -> Any:
-        """Return the session after a step; it must not be advanced."""
+        """Return the session after a step of the latest block. The caller must not advance it."""
         return self.past[step + 1] if step + 1 < len(self.past) else self.latest
 
     def _session_at_fraction(self, step: int, fraction: float, substeps: Sequence[int]) -> C:
-        """Return a session after a fraction of a step.
+        """Return a copy of the session before a step, advanced by a fraction of this step.
 
-        ``substeps`` are numbers of equal steps; the first number with which no step fails is used.
+        ``substeps`` are numbers of equal smaller steps; the first number with which no step fails is used.
         """
         for count in substeps:
             session = self.past[step].branch()
@@ -302,7 +308,7 @@ class CrossingFinder(Generic[C]):
             return self._sign * self._value(moved_session, self.points * step, self.points * fraction)
 
         for count in SUBSTEPS:
-            # All fractions take the same number of substeps, so g is a smooth function of the fraction.
+            # The number of substeps is the same for all fractions, so that g is a smooth function of the fraction.
             try:
                 fraction = root(value, low, at_low, high, at_high)
                 crossing_session = self._session_at_fraction(step, fraction, (count,))

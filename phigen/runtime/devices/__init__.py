@@ -1,1 +1,1 @@
-"""Solvers on devices: OpenCL by pyopencl, CUDA by CuPy. Both packages are imported only when a device is opened."""
+"""Solvers on devices: OpenCL by pyopencl, CUDA by CuPy. These packages are imported only when a device is opened."""

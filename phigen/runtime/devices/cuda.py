@@ -14,10 +14,10 @@ from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
 
-#: No fused multiply-adds: results have the same bits as those of C.
+#: Compiler options: without fused multiply-adds, results have the same bits as those of C.
 _OPTIONS = ("--fmad=false",)
 
-#: Words in errors of drivers for arrays, or launches, that need too much memory or too many registers.
+#: Words in the messages of drivers if an array, or a launch, needs more memory or registers than the card has.
 _MEMORY = ("OUT_OF_MEMORY", "OUT_OF_RESOURCES", "MemoryAllocation")
 
 
@@ -49,7 +49,7 @@ class CUDADevice:
             return self._checked_call(compile_module)
         except self._cupy.cuda.compiler.CompileException as error:
             raise DeviceError(f"{self.name}: NVRTC refuses the generated code\n{error}") from error
-        except (RuntimeError, OSError) as error:  # of CuPy's search for the library of NVRTC
+        except (RuntimeError, OSError) as error:  # raised if CuPy does not find the library of NVRTC
             message = f"NVRTC, the compiler of CUDA, cannot be loaded: {error}\n  hint: pip install 'phigen[cuda]'"
             raise MissingPackageError(f"{self.name}: {message}") from error
 
@@ -63,7 +63,7 @@ class CUDADevice:
         return self._checked_call(lambda: self._cupy.empty(max(1, size), dtype=np.uint8))
 
     def constants(self, array: Any) -> Any:
-        """See `phigen.runtime.devices.device.Device`. CuPy passes the numbers as a struct by value, in constant
+        """Return the numbers as a kernel argument; CuPy passes it as a struct by value, which lies in constant
         memory."""
         return array.reshape(-1).view(np.dtype([("values", array.dtype, (array.size,))]))
 
@@ -76,14 +76,14 @@ class CUDADevice:
             self._checked_call(lambda: buffer[: array.nbytes].get(out=array.view(np.uint8).reshape(-1)))
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
-        group = self._checked_call(lambda: kernel.max_threads_per_block)  # at most the launch bound of the kernel
+        group = self._checked_call(lambda: kernel.max_threads_per_block)  # at most the launch bound in its source
         launch_arguments = tuple(
             np.uint64(0) if argument is None else argument for argument in arguments
-        )  # a null pointer
+        )  # 0 is a null pointer
         self._checked_call(lambda: kernel((-(-items // group),), (group,), launch_arguments))
 
     def _checked_call(self, call: Callable[[], Result]) -> Result:
-        """Return the result of a call of CUDA; its errors become those of the device protocol."""
+        """Return the result of a call of CUDA; errors of CUDA are raised as `OutOfMemoryError` or `DeviceError`."""
         cuda = self._cupy.cuda
         try:
             with cuda.Device(self._index):
@@ -100,9 +100,9 @@ _OPENED: Opened = {}
 
 
 def device(index: int | None = None) -> CUDADevice:
-    """Return a card for this process; the default card if ``index`` is None.
+    """Return the card with the number ``index``, opened in this process; the default card if ``index`` is None.
 
-    Raises `MissingPackageError` without CuPy, `DeviceError` without a driver.
+    Raises `MissingPackageError` without CuPy, `DeviceError` without a driver or a card.
     """
     key = os.getpid(), index
     if key not in _OPENED:
@@ -113,12 +113,16 @@ def device(index: int | None = None) -> CUDADevice:
 
 
 def count() -> int:
-    """Return the number of cards. Raises as `device`."""
+    """Return the number of cards. Raises `MissingPackageError` without CuPy, `DeviceError` without a driver or a
+    card."""
     return len(_cards()[1])
 
 
 def _cards() -> tuple[Any, list[str]]:
-    """Return the package CuPy, and the names of all cards. Raises as `device`."""
+    """Return the package CuPy, and the names of all cards.
+
+    Raises `MissingPackageError` without CuPy, `DeviceError` without a driver or a card.
+    """
     try:
         import cupy
     except ImportError as error:
@@ -137,7 +141,7 @@ _HINT = "install NVIDIA's driver, or use target opencl, which also runs on CPUs"
 
 
 def load(files: Mapping[str, str], interface: Interface, device: int | None = None) -> Any:
-    """Return the back end of generated files on a card, as `phigen.registry` requires."""
+    """Return the solver that runs generated code on a card; ``files`` maps file names to texts."""
     from phigen.runtime.devices.loading import backend
 
     return backend(files, interface, "cuda", device)

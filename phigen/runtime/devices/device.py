@@ -8,10 +8,10 @@ from typing import Any, Protocol
 
 from phigen.errors import DeviceError
 
-#: Environment variable that chooses a device, by its number or by a part of its name.
+#: Environment variable that selects a device, by its number or by a part of its name.
 CHOICE = "PHIGEN_DEVICE"
 
-#: First words of errors after which a device does nothing more in this process.
+#: Beginning of the message of errors after which a device cannot be used again in this process.
 LOST = "the device was lost, or its driver failed"
 
 
@@ -20,10 +20,10 @@ class OutOfMemoryError(Exception):
 
 
 class Device(Protocol):
-    """A device with its own memory. All methods except ``read`` may return before their work is done.
+    """Protocol of a device with its own memory: a graphics card, or a processor that an OpenCL driver serves.
 
-    Arguments of kernels are NumPy scalars, buffers, and None for absent arrays. Methods raise `OutOfMemoryError`, or
-    `DeviceError` if a driver fails.
+    All methods except ``read`` may return before their work is done. Arguments of kernels are NumPy scalars, buffers,
+    and None for absent arrays. Methods raise `OutOfMemoryError`, or `DeviceError` if a driver fails.
     """
 
     target: str
@@ -31,20 +31,20 @@ class Device(Protocol):
     memory: int  # bytes of device memory
     largest: int  # bytes of the largest possible array
     shared: int  # bytes of shared memory of a work group
-    group: int  # most work items in a group
+    group: int  # largest number of work items in a group
     units: int  # compute units, each of which runs many work items
     double: bool  # whether double precision is supported
-    is_card: bool  # whether it is a graphics card: values beyond its registers lie in slow memory
+    is_card: bool  # whether it is a graphics card, where values that do not fit into registers lie in slow memory
 
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
-        """Return the program of a source text, with ``defined`` macros.
+        """Return the program compiled from a source text; ``defined`` are preprocessor macros and their values.
 
         Raises `DeviceError` with the messages of the compiler.
         """
         ...
 
     def kernel(self, program: Any, name: str) -> Any:
-        """Return a kernel of a program."""
+        """Return the kernel of a compiled program that has this name."""
         ...
 
     def empty(self, size: int) -> Any:
@@ -52,12 +52,12 @@ class Device(Protocol):
         ...
 
     def local_bytes(self, kernel: Any) -> int:
-        """Return the number of bytes of device memory that each work item of a kernel uses for values beyond its
-        registers."""
+        """Return the bytes of device memory that each work item of a kernel uses for values that registers cannot
+        hold."""
         ...
 
     def constants(self, array: Any) -> Any:
-        """Return a kernel argument with numbers that all work items read and that do not change."""
+        """Return a kernel argument for an array of numbers that all work items read and that do not change."""
         ...
 
     def write(self, buffer: Any, array: Any) -> None:
@@ -69,18 +69,19 @@ class Device(Protocol):
         ...
 
     def launch(self, kernel: Any, items: int, arguments: Sequence[Any]) -> None:
-        """Run a kernel for at least the given number of work items, in groups of the size that it was compiled for."""
+        """Run a kernel for at least ``items`` work items, in groups of the size with which the kernel was compiled."""
         ...
 
 
-#: Open devices, by process number and device index (None for the default). Contexts do not survive a fork.
+#: Open devices, by process number and device index (None for the default). A process that was forked opens its own,
+#: since driver contexts do not survive a fork.
 Opened = dict[tuple[int, int | None], Any]
 
 
 def choose(names: Sequence[str], target: str, index: int | None) -> int:
-    """Return the index of a device: ``index``, or that of the device named in the variable `CHOICE`, or 0.
+    """Return the number of the device to use: ``index`` or, if None, the device that `CHOICE` names, by default 0.
 
-    Raises `DeviceError` if there is no such device.
+    ``names`` are the names of all devices. Raises `DeviceError` if there is no such device.
     """
     if index is not None and not hasattr(index, "__index__"):
         raise TypeError(f"device is {index!r}, but must be a number; the devices of {target} are {_listed(names)}")

@@ -1,4 +1,4 @@
-"""Arrays on a device with the operations of NumPy that implicit steps of lattices use."""
+"""Arrays on a device, with those operations of NumPy that implicit steps of lattices use."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from phigen.runtime.devices.launching import Launcher
 from phigen.runtime.interface import Floats
 
-#: Codes of operations in the kernel ``combine``.
+#: Numbers by which the kernel ``combine`` receives its operation, by the name of the operation in NumPy.
 _OPERATIONS = {"add": 0, "subtract": 1, "multiply": 2, "divide": 3, "absolute": 4, "isfinite": 5}
 
 
 class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
-    """Fields (coordinates, *sizes) on a device, immutable.
+    """Immutable array (coordinates, *sizes) on a device, which supports arithmetic like an array of NumPy.
 
     The second operand of an operation is an array of the same shape on the device, one number, or one number for each
-    field.
+    coordinate.
     """
 
     def __init__(self, launcher: Launcher, buffer: Any, shape: tuple[int, ...]) -> None:
@@ -59,11 +59,12 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
         return DeviceArray(self.launcher, result, self.shape)
 
     def max(self, axis: Any = None) -> Any:
-        """Return the largest entry, or that of each field if ``axis`` lists all axes but the first."""
+        """Return the largest entry or, if ``axis`` lists all axes but the first, the largest entry for each
+        coordinate."""
         return self._reduced("max", axis)
 
     def sum(self, axis: Any = None) -> Any:
-        """Return the sum of all entries, or that of each field if ``axis`` lists all axes but the first."""
+        """Return the sum of all entries or, if ``axis`` lists all axes but the first, the sum for each coordinate."""
         return self._reduced("sum", axis)
 
     def all(self) -> bool:
@@ -76,5 +77,5 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
         return float(values[0]) if axis is None else values
 
     def read(self) -> Floats:
-        """Return the entries as an array on the host."""
+        """Return a copy of the entries as a NumPy array."""
         return self.launcher.read(self.buffer, self.shape)

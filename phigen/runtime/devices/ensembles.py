@@ -1,5 +1,4 @@
-"""Solvers of ordinary systems on devices: ensembles run on the device, single trajectories and observables on the
-host."""
+"""Solvers of ordinary systems on devices: ensembles are integrated on the device, single trajectories on the host."""
 
 from __future__ import annotations
 
@@ -21,26 +20,28 @@ from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Interface, stat
 from phigen.runtime.members import Members
 from phigen.runtime.session import Session
 
-#: Share of the device memory for a batch of members; the rest is left for other programs and for register spills.
+#: Fraction of the device memory for a batch of members; the rest is left for other programs and for values that
+#: registers cannot hold.
 _SHARE = 0.5
 
-#: Number of steps of members in one launch for each compute unit: about a second. Between launches Python delivers
-#: keyboard interrupts. Systems that stop long kernels do not stop these.
+#: Largest number of steps, summed over members, in one launch for each compute unit: about a second. Python handles
+#: Ctrl-C only between launches. No time limit that systems set for kernels is reached.
 _STEPS_PER_UNIT = 1 << 24
 
-#: Smallest number of members in a launch for each compute unit: enough to hide the latency of memory.
+#: Smallest number of members in a launch for each compute unit, so that other members compute while one waits for
+#: memory.
 _MEMBERS_PER_UNIT = 2048
 
-#: Number of bytes of local memory of a member that stay in the cache of a card: 128 kB for the 256 members that run at
-#: once on a multiprocessor with 255 registers each.
+#: Bytes of a member's values beyond registers that still lie in the cache of a card: a multiprocessor has 128 kB of
+#: cache, and runs 256 members at once if each uses 255 registers.
 _LOCAL_BYTES = 512
 
 
 class DeviceSolver:
-    """Back end over a generated header for devices, and over another back end for computations on the host.
+    """Solver that integrates ensembles on a device, and leaves all other computations to the solver ``host``.
 
-    It implements `phigen.runtime.backend.Backend`. ``defined`` are macros of the generated
-    code: NAME_GROUP is the number of work items in a group, which does not affect results.
+    It is a `phigen.runtime.backend.Backend`. ``files`` contain the generated header for devices. ``defined`` are macros
+    for it: NAME_GROUP is the number of work items in a group, which does not affect results.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class DeviceSolver:
 
     @property
     def device(self) -> Device:
-        """The device in this process."""
+        """The device, opened in the present process on first use."""
         return device_of(self.target, self._index)
 
     @property
@@ -77,15 +78,16 @@ class DeviceSolver:
         return DeviceSolver(self._files, self.interface, self.target, host, np.ascontiguousarray(gauge), self._index)
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`. ``threads`` has no effect.
+        """Return the final states or frames of an ensemble, as `phigen.runtime.backend.Backend.ensemble`.
 
-        Members are integrated in batches that fit into the memory of the device. Raises `DeviceError` if the device
-        fails; the ``trajectory`` of the error contains the results so far, NaN for other members.
+        Members are integrated in batches that fit into the memory of the device. ``threads`` has no effect, and
+        ``attitudes`` raises `TypeError`. Raises `DeviceError` if the device fails; its ``trajectory`` contains the
+        results so far, and NaN for members without a result.
         """
         if attitudes is not None:
             raise TypeError(f"target {self.target} computes no attitudes of ensembles; compile for target c")
         if not len(members):
-            return self._host.ensemble(members, threads)  # checks the parameters
+            return self._host.ensemble(members, threads)  # raises an error if the parameters are not admissible
         frames, final = members.frames() if members.stride else None, np.full(members.x0.shape, np.nan)
         if frames is not None:
             frames[1:] = np.nan
@@ -120,7 +122,7 @@ class DeviceSolver:
         return failed
 
     def _batch(self, members: Members) -> int:
-        """Return the number of members in a launch."""
+        """Return the number of members in a launch: as many as fit into memory, but not more than a second of work."""
         device, rows = self.device, members.steps // members.stride if members.stride else 0
         size = np.dtype(self._real).itemsize
         of_member = size * (self.interface.dimension * (rows + 1) + len(members.parameters) + 3) + 1
@@ -142,7 +144,8 @@ class DeviceSolver:
     ) -> None:
         """Integrate the members of one launch, and store their results in ``final``, ``status`` and ``frames``.
 
-        ``coefficients`` has the common coefficients of all members as a kernel argument, or is empty.
+        ``part`` is the slice of these members in the ensemble. ``coefficients`` is a list with the common coefficients
+        of all members as a kernel argument, or is empty.
         """
         device, count, size = self.device, len(members), np.dtype(self._real).itemsize
         x = np.ascontiguousarray(members.x0.T, dtype=self._real)
@@ -170,7 +173,8 @@ class DeviceSolver:
             frames[1 : rows + 1, part] = stored_rows.transpose(0, 2, 1)
 
     def _kernels(self, *, common: bool) -> Kernels:
-        """Return the kernels for members with ``common`` coefficients, or for members with different coefficients."""
+        """Return the compiled kernels: for members that share their coefficients if ``common``, else for different
+        coefficients."""
         if common not in self._compiled:
             defined = {**self._group(), **self.defined, **({f"{self.interface.name}_COMMON": 1} if common else {})}
             self._compiled[common] = Kernels(self.device, self._header, self.interface.name, defined)
@@ -178,8 +182,10 @@ class DeviceSolver:
         return self._compiled[common]
 
     def _group(self) -> dict[str, int]:
-        """Return the macro for a smaller group of work items, if predictors need more shared memory than the device
-        has; else {}."""
+        """Return macros for a smaller group of work items; {} if the usual size is possible.
+
+        The groups must be smaller if their predictors need more shared memory than the device has.
+        """
         launch = self.interface.ensemble
         if not launch.predictors:
             return {}
@@ -188,23 +194,24 @@ class DeviceSolver:
         return smaller if fitting < launch.group else {}
 
     def _warn_of_local_memory(self, kernel: Any) -> None:
-        """Warn that steps are slow if the values of a member do not fit into the registers of the card."""
+        """Warn that steps are slow if the values of a member do not fit into the registers and the cache of the
+        card."""
         if self.device.is_card and (size := self.device.local_bytes(kernel)) > _LOCAL_BYTES:
             message = f"{self.interface.name}: besides registers, each member uses {size} bytes of {self.device.name}"
             hint = "members with the same parameters and step need less, as do a lower order and scheme: splitting"
             warnings.warn(f"{message}, which is slow; {hint}", PhigenWarning, stacklevel=2)
 
     def _has_common_coefficients(self, members: Members) -> bool:
-        """Whether one kernel argument can hold the coefficients of all members.
+        """Whether all members can share their coefficients, which are then one argument of the kernel.
 
-        They must have the same parameters, step and gauge.
+        This needs equal parameters, step sizes and gauges.
         """
         same = np.ndim(members.h) == 0 and not any(np.ndim(v) for v in members.parameters.values())
         has_chosen_gauge = self._holds_gauge and self._gauge is None
         return bool(same and not has_chosen_gauge and self.interface.ensemble.coefficients)
 
     def _coefficients(self, members: Members) -> Any:
-        """Return the common coefficients of all members as an argument of their kernel."""
+        """Compute the coefficients that all members share, and return them as an argument of their kernel."""
         coefficients = np.empty(self.interface.ensemble.coefficients, self._real)
         buffer = self.device.empty(coefficients.nbytes)
         parameters, h = (self._shared_or_each(v)[0] for v in (self._parameters(members), np.atleast_1d(members.h)))
@@ -214,7 +221,8 @@ class DeviceSolver:
         return self.device.constants(coefficients)
 
     def _gauge_argument(self) -> Any:
-        """Return a buffer with the fixed gauge; None if gauges are chosen from the initial states."""
+        """Return a buffer with the gauge that was set for all members; None if the kernel chooses it from each initial
+        state."""
         return None if self._gauge is None else self._written(np.array(self._gauge, self._real))
 
     @property
@@ -222,14 +230,16 @@ class DeviceSolver:
         return self.interface.ensemble.gauges > 0
 
     def _parameters(self, members: Members) -> Floats:
-        """Return the parameters, (members, parameters) or (1, parameters). A system without parameters has one
-        unused number."""
+        """Return the parameters as an array (members, parameters), or (1, parameters) if all members share them.
+
+        A system without parameters has one unused number.
+        """
         values = list(members.parameters.values()) or [np.zeros(())]
         count = len(members) if any(np.ndim(v) for v in values) else 1
         return np.stack([np.broadcast_to(v, (count,)) for v in values], axis=-1)
 
     def _shared_or_each(self, values: Floats) -> list[Any]:
-        """Return a buffer of values, and whether it has one value for each member (1) or one for all (0)."""
+        """Return a buffer of values, and a number: 1 if there is one value for each member, 0 if one holds for all."""
         return [self._written(np.ascontiguousarray(values, dtype=self._real)), np.int32(len(values) > 1)]
 
     def _written(self, array: NDArray[Any]) -> Any:
@@ -245,7 +255,7 @@ class DeviceSolver:
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> Session:
-        """See `phigen.runtime.backend.Backend`; single trajectories run on the host."""
+        """Return a session at x0, a trajectory that the host computes, since the device only integrates ensembles."""
         return self._host.start(x0, parameters, t0, first, draws)
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
@@ -256,7 +266,8 @@ class DeviceSolver:
         return self._host.has_pullback
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
-        """See `phigen.runtime.backend.Backend`; on the host."""
+        """Return the pullback of an ensemble, which the host computes; see
+        `phigen.runtime.backend.Backend.pullback`."""
         return self._host.pullback(members, bars, threads)
 
     def hamiltonian(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
@@ -281,6 +292,6 @@ class DeviceSolver:
 def _loaded_again(
     files: Mapping[str, str], interface: Interface, target: str, gauge: Floats | None, index: int | None
 ) -> DeviceSolver:
-    """Return a solver that was pickled, on the device of the present process."""
+    """Return a solver from its pickled data, on a device that is opened in the present process."""
     solver = cast(DeviceSolver, registry.find(target).load(files, interface, device=index))
     return solver if gauge is None else solver.with_gauge(gauge)

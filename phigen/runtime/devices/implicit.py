@@ -1,4 +1,4 @@
-"""Implicit steps of lattices on devices: the NumPy module makes the steps, with arrays that lie on the device."""
+"""Implicit steps of lattices on devices: a generated NumPy module makes the steps, but its arrays lie on the device."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from phigen.targets.c.real import THRESHOLD, threshold
 
 
 class ImplicitSession(DeviceLatticeSession):
-    """A session of a lattice with implicit stages."""
+    """A session of a lattice on a device, for steps with implicit equations."""
 
     def __init__(self, backend: Any, *arguments: Any, timed: bool) -> None:
         super().__init__(backend, *arguments, timed=timed)
@@ -43,7 +43,12 @@ class ImplicitSession(DeviceLatticeSession):
         self._tell_time()
 
     def evaluated(self, name: str, coefficients: Any, start: Any, x: Any, varied: Any = None) -> DeviceArray:
-        """Return the result of a kernel of a stage at the iterate ``x`` (fields)."""
+        """Evaluate the kernel ``name`` of an implicit stage on the device, for the iterate ``x``, and return its
+        result.
+
+        ``coefficients`` are those of the stage, ``start`` is the state before it. ``varied`` is a direction, for the
+        kernel that computes a derivative.
+        """
         if self._written is not coefficients:
             self._write_coefficients([coefficients])
             self._written = coefficients
@@ -58,9 +63,10 @@ class ImplicitSession(DeviceLatticeSession):
 
 
 def stepping_module(text: str, name: str, *, single: bool) -> Any:
-    """Return the NumPy module of a lattice with its kernels of stages replaced by those on a device.
+    """Return the NumPy module of a lattice, with the functions that evaluate its equation replaced by kernels on a
+    device.
 
-    In ``single`` precision, thresholds are those of the C.
+    In ``single`` precision, thresholds of the iteration are those of the C in single precision.
     """
     module: Any = load_module(text, name)
     module._relax = lambda coef, start, x, sites: sites.on_device.evaluated("relax", coef, start, x)

@@ -1,5 +1,4 @@
-"""Sessions of lattices on devices: the fields stay on the device; energies and observables are transferred as
-numbers."""
+"""Sessions of lattices on devices: the state stays on the device, and energies and observables are read as numbers."""
 
 from __future__ import annotations
 
@@ -15,14 +14,15 @@ from phigen.runtime.devices.launching import Launcher
 from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.numpy_lattice import NumpyLatticeSession
 
-#: Number of steps between checks that all fields are finite. After a failed check, these steps are repeated one by one.
+#: Number of steps between two checks that all values are finite. If a check fails, these steps are repeated one by one
+#: to find the first that fails.
 _STEPS_PER_LOOK = 64
 
 
 class DeviceLatticeSession(NumpyLatticeSession):
-    """A session whose state is on a device, and is copied to the host when it is read.
+    """A session of a lattice whose state lies on a device, and is copied to the host when it is read.
 
-    The generated module is that of the host.
+    The functions of the generated NumPy module, which compute coefficients, run on the host.
     """
 
     def __init__(self, backend: Any, *arguments: Any, timed: bool) -> None:
@@ -35,18 +35,18 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._launcher: Launcher = backend.launcher(self._sites, self._shape[1:])
         stored_count = self._size * (
             2 if self._interface.compensated else 1
-        )  # the fields, and their compensation terms
+        )  # the state and its compensation terms
         self._fields, self._before = (self._launcher.empty(stored_count) for _ in range(2))
         self._stored = stored_count
         self._flag = self._device.empty(4)
         self._increments = self._launcher.empty(self._launcher.tables.count * max(1, len(self._interface.noise)))
-        self._parameters: list[float] = []  # the values that the device has
+        self._parameters: list[float] = []  # values in the buffer on the device
         self._coefficients: Any = None
         self._row = 0
 
     @property
     def _x(self) -> Floats:
-        """The state as an array on the host."""
+        """The state as an array on the host; it is copied from the device if necessary."""
         if self._host is None:
             self._host = self._launcher.read(self._fields, self._shape)
         return self._host
@@ -56,7 +56,8 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._host, self._on_device = np.ascontiguousarray(value), False
 
     def _upload(self, compensation: Floats | None = None) -> None:
-        """Copy the state from the host to the device, with its compensation terms, 0 by default."""
+        """Copy the state and its compensation terms (0 by default) from the host to the device, unless they are
+        there."""
         if self._on_device:
             return
         state = self._x.ravel()
@@ -76,8 +77,8 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._upload(arrays.get("compensation"))
 
     def advance(self, h: float, steps: int) -> None:
-        """See `phigen.runtime.lattice.LatticeSession`. Raises `DeviceError` if the device fails; the state is then
-        unchanged."""
+        """Make ``steps`` steps of size ``h``. Raises `BackendError` if a step fails, and `DeviceError` if the device
+        fails."""
         self.prepare(h)
         left = steps
         while left:
@@ -98,7 +99,8 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._host = None
 
     def _make_until_failure(self) -> None:
-        """Make steps one by one until a step fails. Raises `BackendError`, which has the state before that step."""
+        """Make steps until one fails, with a check after each. Raises `BackendError`, with the state before the failing
+        step."""
         while True:
             self._launcher.copy(self._fields, self._before, self._stored)
             self._make(1)
@@ -109,7 +111,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
                 raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
 
     def _make(self, steps: int) -> None:
-        """Make steps without checking that the results are finite."""
+        """Make steps without a check that the results are finite."""
         self._host = None
         module, rows = self._module, self._rows
         constant = not (hasattr(module, "_renewed") or hasattr(module, "_draw"))
@@ -132,7 +134,8 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._tell_time()
 
     def _flows(self) -> list[tuple[int, int, int]]:
-        """Return the flows of a step: part of H, colour of the sites of a graph, row of coefficients."""
+        """Return the flows of a step in order: part of H, colour of the sites (for graphs, else 0), row of
+        coefficients."""
         if hasattr(self._module, "BY_COLOUR"):
             return [(part, colour, row) for (part, colour), row in self._sites.schedule]
         return [(part, 0, row) for part, row in self._module.SCHEDULE]
@@ -156,7 +159,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
     # --- functions of the state
 
     def _evaluated(self, name: str) -> tuple[Any, int]:
-        """Return a buffer with the outputs of a kernel at all sites, and the number of outputs."""
+        """Evaluate a kernel at all sites, and return a buffer with its outputs and the number of outputs per site."""
         launch = self._interface.launches.others.get(name)
         if launch is None:
             return None, 0
@@ -167,7 +170,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         return result, launch.outputs
 
     def _write_parameters(self) -> None:
-        """Copy the scalar parameters and the time to the device, if they have changed."""
+        """Copy the parameters that are numbers, and the time, to the device, if they have changed."""
         values = [float(self._sites.parameters[name]) for name in self._interface.launches.numbers]
         values.append(float(self._sites.t) if self._timed else 0.0)
         if values != self._parameters:
@@ -175,14 +178,17 @@ class DeviceLatticeSession(NumpyLatticeSession):
             self._parameters = values
 
     def _fields_of(self, name: str) -> Floats:
-        """Return the outputs of a kernel (outputs, *sizes)."""
+        """Evaluate a kernel at all sites, and return its outputs (outputs, *sizes)."""
         with resumable(self.steps):
             result, outputs = self._evaluated(name)
             sizes = self._shape[1:]
             return self._launcher.read(result, (outputs, *sizes)) if outputs else np.empty((0, *sizes))
 
     def _numbers_of(self, name: str, kinds: Sequence[str]) -> Floats:
-        """Return the outputs of a kernel, each reduced over the sites by its kind, such as ``sum``."""
+        """Evaluate a kernel at all sites, and reduce each output over the sites to one number.
+
+        ``kinds`` has a reduction for each output, such as ``sum``.
+        """
         with resumable(self.steps):
             result, _ = self._evaluated(name)
             return self._launcher.reduced(result, kinds, self._launcher.tables.count)
@@ -196,7 +202,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         return self._fields_of("energy").reshape(self._shape[1:])
 
     def casimirs(self) -> Any:
-        """Return the Casimirs: densities for Casimirs of sites, numbers for sums and products."""
+        """Return a value for each Casimir: an array of densities (*sizes) for a Casimir of each site, else a number."""
         kinds = self._interface.casimir_kinds
         if "sites" in kinds:
             fields = self._fields_of("casimirs")
@@ -226,7 +232,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
 
 @contextmanager
 def resumable(steps: int) -> Iterator[None]:
-    """Return a context in which errors of a device become `DeviceError`, with the step number and a hint at
+    """Return a context that raises errors of a device as `DeviceError`, with the number of steps and a hint at
     checkpoints."""
     try:
         yield

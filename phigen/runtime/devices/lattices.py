@@ -1,4 +1,4 @@
-"""Back end of lattices on devices: compiled kernels, and sessions of each kind of step."""
+"""Solver of lattices on devices: it compiles the kernels, and starts sessions for each kind of step."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from phigen.runtime.numpy_lattice import NumpyLattice, NumpyLatticeSession
 
 
 class DeviceLattice(NumpyLattice):
-    """Back end over a generated header for devices, and over a NumPy module for computations on the host.
+    """Solver of a lattice on a device, with a generated NumPy module for computations on the host.
 
-    It implements `phigen.runtime.lattice.LatticeBackend`. ``defined`` are macros of the generated
-    code, see `phigen.runtime.devices.ensembles.DeviceSolver`.
+    It is a `phigen.runtime.lattice.LatticeBackend`. ``files`` contain the generated header for devices, and ``defined``
+    are macros for it, such as NAME_GROUP, the number of work items in a group.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class DeviceLattice(NumpyLattice):
 
     @property
     def device(self) -> Device:
-        """The device in this process."""
+        """The device, opened in the present process on first use."""
         return device_of(self.target, self._index)
 
     @property
@@ -57,16 +57,18 @@ class DeviceLattice(NumpyLattice):
 
     @cached_property
     def stepping(self) -> Any:
-        """The module that makes implicit steps."""
+        """The generated NumPy module that makes implicit steps, with arrays on the device."""
         return stepping_module(self._text, self.interface.name, single=self.interface.single)
 
     @cached_property
     def monitoring(self) -> Any:
-        """The module that computes the durations of flows, for steps that are equal in τ."""
+        """The generated NumPy module that computes the durations of flows, if a monitor (dt = g dτ) makes steps equal
+        in τ."""
         return monitoring_module(self._text, self.interface.name)
 
     def launcher(self, sites: Any, sizes: tuple[int, ...]) -> Launcher:
-        """Return the launcher for a lattice of these sizes. Raises `DeviceError` if the lattice is too large."""
+        """Return the object that launches kernels for a lattice of these sizes. Raises `DeviceError` for too many
+        sites."""
         launches, interface = self.interface.launches, self.interface
         rows = [len(launches.neighbours), interface.dimension * (2 if interface.compensated else 1)]
         rows += [launch.outputs for launch in launches.others.values()]
@@ -83,7 +85,10 @@ class DeviceLattice(NumpyLattice):
     def start(
         self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
     ) -> NumpyLatticeSession:
-        """Return a session at x0 (coordinates, *sizes), at the time t0. Raises `DeviceError`."""
+        """Return a session at x0 (coordinates, *sizes), at the time t0.
+
+        Raises `DeviceError` if the device fails or has too little memory.
+        """
         implicit, monitored = hasattr(self._module, "_relax"), hasattr(self._module, "_rate")
         session = ImplicitSession if implicit else MonitoredSession if monitored else DeviceLatticeSession
         timed = bool(self.interface.time)

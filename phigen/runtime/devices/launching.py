@@ -12,19 +12,23 @@ from phigen.runtime.devices.device import Device
 from phigen.runtime.devices.site_tables import SiteTables
 from phigen.runtime.interface import Floats
 
-#: Number of values that a work item reduces in one pass. The order of sums depends on this number only.
+#: Number of values that a work item adds, or reduces otherwise, in one pass. It alone decides the order of sums.
 _REDUCED = 64
 
-#: Codes of reductions in kernels; a mean is a sum that is divided afterwards.
+#: Numbers by which kernels receive a reduction. A mean is a sum that is divided afterwards.
 _KINDS = {"sum": 0, "mean": 0, "product": 1, "max": 2, "min": 3}
 
 
-#: Size of a work group in generated code, in CUDA the largest size of a block, unless NAME_GROUP is defined as another.
+#: Size of a work group in generated code unless the macro NAME_GROUP defines another; with CUDA, the largest size of a
+#: block.
 _GROUP = 128
 
 
 class Kernels:
-    """The kernels of a compiled program by name, in groups that the device can run; each is created on first use."""
+    """The kernels of a compiled program by name; each is created on first use.
+
+    The program is compiled for groups of work items that the device can run.
+    """
 
     def __init__(self, device: Device, text: str, name: str, defined: Mapping[str, int]) -> None:
         self._device, self._name = device, name
@@ -41,12 +45,12 @@ class Kernels:
 
 
 class Launcher:
-    """Launches of kernels for one lattice, in the precision of its tables."""
+    """Launches kernels for one lattice, with arrays in the precision of its tables of sites."""
 
     def __init__(self, kernels: Kernels, tables: SiteTables) -> None:
         self.device, self.kernels, self.tables, self.real = tables.device, kernels, tables, tables.real
         self._names = tables.interface.launches.arrays
-        self.parameters = self.empty(len(tables.interface.launches.numbers) + 1)  # numbers, then the time
+        self.parameters = self.empty(len(tables.interface.launches.numbers) + 1)  # scalar parameters, then the time
         self._sums: Any = None
 
     def empty(self, numbers: int) -> Any:
@@ -54,18 +58,21 @@ class Launcher:
         return self.device.empty(max(1, numbers) * np.dtype(self.real).itemsize)
 
     def write(self, buffer: Any, values: Any) -> None:
-        """Copy numbers into a buffer."""
+        """Copy numbers into a buffer, in the precision of the lattice."""
         self.device.write(buffer, np.ascontiguousarray(values, dtype=self.real))
 
     def read(self, buffer: Any, shape: tuple[int, ...]) -> Floats:
-        """Return the numbers of a buffer."""
+        """Return the numbers of a buffer as a float64 array of the given shape."""
         values = np.empty(shape, self.real)
         self.device.read(buffer, values)
         return values.astype(np.float64, copy=False)
 
     def run(self, launch: SiteLaunch, coefficients: Any, first: int = 0, colour: int = 0, **buffers: Any) -> None:
-        """Compute the sums that a kernel reads, then launch the kernel; ``buffers`` are its arrays besides the
-        tables."""
+        """Compute the sums over bonds or pairs that a kernel reads, then launch the kernel.
+
+        ``coefficients`` is a buffer that the kernel reads from the index ``first`` on, ``colour`` selects sites of a
+        graph, and ``buffers`` are the arrays of the kernel other than the tables of sites.
+        """
         for k, sums in enumerate(launch.sums):
             source = (self.parameters, 0) if sums.of_parameters else (coefficients, first)
             self._launch(sums, (None, self.tables.count), *source, colour, adds=np.int32(k > 0), **buffers)
@@ -89,7 +96,7 @@ class Launcher:
         self.device.launch(self.kernels[launch.kernel], items, [*numbers, *table_arguments])
 
     def _summed(self, launch: SiteLaunch | SumLaunch) -> Any:
-        """Return the buffer of sums over bonds or pairs, which all kernels share."""
+        """Return the buffer for sums over bonds or pairs. All kernels share it; it is made large enough for each."""
         if self._sums is None and "sums" in self._names:
             launches = self.tables.interface.launches
             all_launches = [*launches.others.values(), *(sweep for part in launches.parts for sweep in part)]
@@ -98,13 +105,14 @@ class Launcher:
         return self._sums
 
     def copy(self, source: Any, target: Any, numbers: int) -> None:
-        """Copy the numbers of a buffer into another."""
+        """Copy ``numbers`` numbers from the buffer ``source`` to the buffer ``target``."""
         self.device.launch(self.kernels["copy"], numbers, [np.int32(numbers), source, target])
 
     def reduced(self, buffer: Any, kinds: Sequence[str], length: int) -> Floats:
-        """Reduce each row of ``length`` numbers in a buffer to one number, by the kind of the row; NaN propagates.
+        """Reduce each row of ``length`` numbers in a buffer to one number, by the kind of the row, such as ``sum``.
 
-        The order of the operations depends on the length only, so results have the same bits in every run.
+        The order of the operations depends on the length only, so results have the same bits in every run. NaN in a row
+        gives NaN.
         """
         rows = len(kinds)
         if not rows or not length:

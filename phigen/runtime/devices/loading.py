@@ -1,4 +1,4 @@
-"""Construction of back ends on devices, each of which contains a back end for the host."""
+"""Construction of solvers on devices, each of which contains a solver for the host."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from phigen.runtime.interface import Interface, LatticeInterface
 
 
 def backend(files: Mapping[str, str], interface: Interface, target: str, index: int | None = None) -> Any:
-    """Return the back end of generated files on a device; code of another target among the files is used on the
-    host."""
+    """Return the solver that runs generated code on a device.
+
+    The files also contain code for the host (C or NumPy), which does the computations that do not run on the device.
+    """
     from phigen.runtime.devices.ensembles import DeviceSolver
     from phigen.runtime.devices.lattices import DeviceLattice
 

@@ -1,5 +1,7 @@
-"""Lattices on devices with a monitor: the duration of each flow follows from the energy of a part of H, which the
-device sums up."""
+"""Lattices on devices with a monitor (dt = g dτ).
+
+The duration of each flow follows from the energy of a part of H, which the device sums over the sites.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,10 @@ from phigen.runtime.modules import load_module
 
 
 class MonitoredSession(DeviceLatticeSession):
-    """A session of a lattice with steps that are equal in τ. Each flow waits for one number from the device."""
+    """A session of a lattice with a monitor, whose steps are equal in τ, not in time t.
+
+    The device sends one number for each flow, on which the duration of the flow depends.
+    """
 
     def __init__(self, backend: Any, *arguments: Any, timed: bool) -> None:
         self._monitoring = backend.monitoring
@@ -23,7 +28,7 @@ class MonitoredSession(DeviceLatticeSession):
         self._hold_level()
 
     def _begin(self) -> None:
-        """Do nothing: the energy level is computed on the device, which is not open yet."""
+        """Do nothing. The energy level is computed at the end of ``__init__``, when the arrays on the device exist."""
 
     def _hold_level(self) -> None:
         """Set the energy level to −H of the state."""
@@ -34,7 +39,7 @@ class MonitoredSession(DeviceLatticeSession):
                 raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy()) from None
 
     def part_energy(self, part: int) -> float:
-        """Return the energy of a part of H."""
+        """Return the energy of a part of H, summed over the sites on the device."""
         return float(self._numbers_of(f"part{part + 1}", ["sum"])[0])
 
     def place(self, x: Floats) -> None:
@@ -55,7 +60,7 @@ class MonitoredSession(DeviceLatticeSession):
             self.steps += 1
 
     def _advance_once(self) -> None:
-        """Make one step. Raises `BackendError`, with the state before it, if it fails."""
+        """Make one step. If it fails, raises `BackendError`, and the state before the step is restored."""
         self._upload()
         self._launcher.copy(self._fields, self._before, self._stored)
         start_clock = self._sites.clock
@@ -70,7 +75,7 @@ class MonitoredSession(DeviceLatticeSession):
             raise BackendError("NOT_FINITE", self.steps, self._x[None].copy())
 
     def _make(self, steps: int) -> None:
-        """Make steps without checking that the results are finite."""
+        """Make steps without a check that the results are finite."""
         self._host = None
         module, sites = self._monitoring, self._sites
         correction_times = [[0.0]] if hasattr(module, "_late") else []
@@ -84,7 +89,8 @@ class MonitoredSession(DeviceLatticeSession):
 
 
 def monitoring_module(text: str, name: str) -> Any:
-    """Return the NumPy module of a lattice with the energies of parts of H replaced by those that a device computes."""
+    """Return the NumPy module of a lattice, with its function for the energy of a part of H replaced by one on a
+    device."""
     module: Any = load_module(text, name)
     module._part_energy = lambda sites, part, x: sites.on_device.part_energy(part)
     return module

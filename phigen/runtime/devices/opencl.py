@@ -1,4 +1,4 @@
-"""Devices of OpenCL, by pyopencl."""
+"""OpenCL devices, used through pyopencl."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from phigen.runtime.interface import Interface
 
 Result = TypeVar("Result")
 
-#: Options of the compiler. Relaxed arithmetic is off, so results have the same bits as those of the C. -w suppresses
-#: warnings of drivers about unrolled loops.
+#: Options of the compiler. None of them allows inexact arithmetic, so results have the same bits as those of the C. -w
+#: suppresses warnings of drivers about unrolled loops.
 _OPTIONS = ["-w"]
 
 _MEMORY = ("MEM_OBJECT_ALLOCATION_FAILURE", "OUT_OF_RESOURCES", "OUT_OF_HOST_MEMORY", "INVALID_BUFFER_SIZE")
 
 
 class OpenCLDevice:
-    """A device of OpenCL, with a queue: a `phigen.runtime.devices.device.Device`."""
+    """A device of OpenCL with a command queue: a `phigen.runtime.devices.device.Device`."""
 
     target = "opencl"
 
@@ -41,7 +41,7 @@ class OpenCLDevice:
     def compiled(self, text: str, defined: Mapping[str, int]) -> Any:
         options = [*_OPTIONS, *(f"-D{name}={value}" for name, value in defined.items())]
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # logs of successful compilations
+            warnings.simplefilter("ignore")  # pyopencl warns if the compiler writes a log, even of a success
             try:
                 return self._cl.Program(self._context, text).build(options=options)
             except self._cl.Error as error:
@@ -54,11 +54,12 @@ class OpenCLDevice:
         return self._checked_call(lambda: self._cl.Buffer(self._context, self._cl.mem_flags.READ_WRITE, max(1, size)))
 
     def local_bytes(self, kernel: Any) -> int:
-        """See `phigen.runtime.devices.device.Device`; 0 if the driver does not report it."""
+        """Return the bytes that each work item of a kernel uses beyond registers; 0 if the driver does not report
+        them."""
         return int(kernel.get_work_group_info(self._cl.kernel_work_group_info.PRIVATE_MEM_SIZE, self._device))
 
     def constants(self, array: Any) -> Any:
-        """See `phigen.runtime.devices.device.Device`. The argument is a buffer in the constant address space."""
+        """Return the numbers as a kernel argument: a buffer that the kernel reads in the constant address space."""
         buffer = self.empty(array.nbytes)
         self.write(buffer, array)
         return buffer
@@ -80,7 +81,7 @@ class OpenCLDevice:
         return self._context.devices[0]
 
     def _checked_call(self, call: Callable[[], Result]) -> Result:
-        """Return the result of a call of OpenCL; its errors become those of the device protocol."""
+        """Return the result of a call of OpenCL; errors of OpenCL are raised as `OutOfMemoryError` or `DeviceError`."""
         try:
             return call()
         except self._cl.Error as error:
@@ -93,9 +94,9 @@ _OPENED: Opened = {}
 
 
 def device(index: int | None = None) -> OpenCLDevice:
-    """Return a device for this process; the default device if ``index`` is None.
+    """Return the device with the number ``index``, opened in this process; the default device if ``index`` is None.
 
-    Raises `MissingPackageError` without pyopencl, `DeviceError` without a driver.
+    Raises `MissingPackageError` without pyopencl, `DeviceError` without a driver or a device.
     """
     key = os.getpid(), index
     if key not in _OPENED:
@@ -107,14 +108,16 @@ def device(index: int | None = None) -> OpenCLDevice:
 
 
 def count() -> int:
-    """Return the number of devices of the same kind as the first, among which workers are distributed. Raises as
-    `device`."""
+    """Return the number of devices of the type (card, processor, …) of the first; sweeps divide their work among these.
+
+    Raises `MissingPackageError` without pyopencl, `DeviceError` without a driver or a device.
+    """
     kinds = [d.type for d in _listed(_library())]
     return kinds.count(kinds[0])
 
 
 def _library() -> Any:
-    """Return the package pyopencl. Raises `MissingPackageError`."""
+    """Return the package pyopencl. Raises `MissingPackageError` if it is not installed."""
     try:
         import pyopencl as cl
     except ImportError as error:
@@ -136,7 +139,7 @@ def _listed(cl: Any) -> list[Any]:
 
 
 def load(files: Mapping[str, str], interface: Interface, device: int | None = None) -> Any:
-    """Return the back end of generated files on a device, as `phigen.registry` requires."""
+    """Return the solver that runs generated code on an OpenCL device; ``files`` maps file names to texts."""
     from phigen.runtime.devices.loading import backend
 
     return backend(files, interface, "opencl", device)

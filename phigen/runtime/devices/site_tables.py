@@ -1,5 +1,4 @@
-"""Arrays of a lattice on a device other than its fields: neighbours, bonds, parameters at sites, selections of
-sites."""
+"""Arrays of a lattice on a device other than its state: neighbours, bonds, parameters at sites, selections of sites."""
 
 from __future__ import annotations
 
@@ -18,10 +17,11 @@ from phigen.runtime.interface import LatticeInterface
 
 @dataclass
 class SiteTables:
-    """The tables of one lattice. ``sites`` is the site object of its NumPy module, ``real`` the type of numbers.
+    """The arrays on a device, called tables, that the kernels of one lattice read besides the state.
 
-    A table is written when a kernel first reads it. ``of_sizes`` has the tables that depend on the sizes alone, which
-    lattices of equal sizes share.
+    ``sites`` is the object that describes the sites in the lattice's NumPy module, ``real`` the type of numbers. A
+    table is copied to the device when a kernel first reads it. ``of_sizes`` has the tables that depend on the sizes
+    alone; lattices of equal sizes share them.
     """
 
     device: Device
@@ -38,7 +38,8 @@ class SiteTables:
         return int(np.prod(self.sizes))
 
     def selected(self, launch: SiteLaunch) -> tuple[Any, int]:
-        """Return the numbers of the sites of a launch (None: all sites), and the number of these sites."""
+        """Return a buffer with the numbers of the sites on which a launch works (None: all sites), and how many they
+        are."""
         if launch.colour is None and not launch.inside and launch.window is None:
             return None, self.count
         key = "sites", launch.colour, launch.inside, launch.window is not None
@@ -59,7 +60,7 @@ class SiteTables:
         return buffer, count
 
     def arrays(self, launch: SiteLaunch | SumLaunch, colour: int) -> Mapping[str, Any]:
-        """Return the tables that a kernel reads, by the names of its arguments; the other arguments are None."""
+        """Return the tables that a kernel reads, by the names of its arguments; other arguments are None."""
         starts, other_sites, at_bonds = None, None, None
         if isinstance(launch, SumLaunch) and self.interface.graph:
             starts, other_sites, at_bonds = self._bonds(launch, colour)
@@ -76,11 +77,11 @@ class SiteTables:
         }
 
     def kinds(self, numbers: tuple[int, ...]) -> Any:
-        """Return the buffer of kinds of reductions."""
+        """Return a buffer with the numbers that name the kinds of some reductions."""
         return self._of_sizes(("kinds", numbers), np.int32, lambda: [np.array(numbers)])
 
     def written(self, values: Any, kind: Any) -> Any:
-        """Return a buffer that contains the values; its size is never 0."""
+        """Return a new buffer with the given values; one zero is appended, since buffers must not be empty."""
         array = np.ascontiguousarray(np.append(np.ravel(values), 0), dtype=kind)
         buffer = self.device.empty(array.nbytes)
         self.device.write(buffer, array)
@@ -104,7 +105,10 @@ class SiteTables:
         return [np.broadcast_to(self.sites.parameters[name], self.sizes) for name in self.interface.at_sites]
 
     def _on_seams(self, window: int | None) -> Any:
-        """Return the conditions on boundary seams in a selection of sites; None without seams."""
+        """Return a buffer with factors 1 or 0 that say which sites of a selection lie on which boundary seam.
+
+        None if the selection has no sites at boundary seams.
+        """
         if window is None:
             return None
         seams = self.interface.launches.seams
@@ -117,8 +121,11 @@ class SiteTables:
         )
 
     def _bonds(self, launch: SumLaunch, colour: int) -> tuple[Any, Any, Any]:
-        """Return the bonds of each site as three buffers: first index in the list of bonds, partner sites, and
-        parameters."""
+        """Return the bonds of a graph, sorted by site, as three buffers.
+
+        They contain the index of the first bond of each site, the partner site of each bond, and the parameters of each
+        bond.
+        """
         key = "bonds", launch.end, launch.chosen, colour if launch.chosen else 0
         if key not in self._stored:
             self.sites.colour = colour
