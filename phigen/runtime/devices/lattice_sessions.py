@@ -33,9 +33,7 @@ class DeviceLatticeSession(NumpyLatticeSession):
         self._on_device = False
         super().__init__(*arguments, timed=timed)
         self._launcher: Launcher = backend.launcher(self._sites, self._shape[1:])
-        stored_count = self._size * (
-            2 if self._interface.compensated else 1
-        )  # the state and its compensation terms
+        stored_count = self._size * (2 if self._interface.compensated else 1)  # the state and its compensation terms
         self._fields, self._before = (self._launcher.empty(stored_count) for _ in range(2))
         self._stored = stored_count
         self._flag = self._device.empty(4)
