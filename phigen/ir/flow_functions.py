@@ -1,7 +1,7 @@
-"""Builders of the functions of a splitting: flows, the sequence of flows in a step, and the transposes of both.
+"""Builders of the functions of a splitting: flows, the sequence of flows in a step, and their transposes.
 
-The functions of a flow call a kernel that computes an increment, and add it to the state. Variants for SIMD batches act
-on a group of members of an ensemble, which consists of packs, one member in each lane.
+The function of a flow calls a kernel that computes an increment, and adds the increment to the state. Versions for SIMD
+act on a group of members of an ensemble. A group consists of SIMD batches, called packs, with one member in each lane.
 """
 
 from __future__ import annotations
@@ -27,9 +27,8 @@ _LANES = ir.Pointer(constant=False, lanes=True)
 class FlowFunctions:
     """The functions of the flows of a splitting, for a single trajectory.
 
-    A flow updates ``along`` values: the ``dimension`` coordinates, and with a monitor two more. With ``turns``, it also
-    updates a group element, the attitude. With ``stores``, the solver has a tape, on which the state is stored before
-    each flow.
+    A flow updates ``along`` values: the ``dimension`` coordinates, and two more if there is a monitor. With ``turns``,
+    it also updates the attitude, a group element. With ``stores``, the state is stored on a tape before each flow.
     """
 
     dimension: int
@@ -39,11 +38,11 @@ class FlowFunctions:
 
     @property
     def arguments(self) -> tuple[ir.Value, ...]:
-        """The arguments of a flow that follow its coefficients."""
+        """The arguments of the function of a flow, after its coefficients."""
         return (X, DISPLACEMENT, START, *[ELEMENT] * self.turns)
 
     def function(self, name: str, doc: str, parameters: Sequence[str], body: ir.Block) -> ir.Function:
-        """Return a function of these parameters, whose types are those of the functions of flows."""
+        """Return a function whose parameters have the types that all functions of flows use."""
         state, length = ir.Vector(ir.Constant(self.along)), ir.Constant(self.dimension)
         types: dict[str, ir.ParameterType] = {
             "x": state,
@@ -73,7 +72,7 @@ class FlowFunctions:
         return self.function(f"flow{number}", doc, parameters, tuple(body))
 
     def schedule(self, schedule: Schedule) -> ir.Function:
-        """Return the function that applies all flows of a step, each with its row of coefficients."""
+        """Return the function that applies all flows of a step. Each flow reads its own row of coefficients."""
         parameters = ("coef", "x", "displacement", "start", *["element"] * self.turns, *["tape"] * self.stores)
         body = _in_order(schedule, COEF, ROW_SIZE, self._flow)
         return self.function("flows", "The flows of one step, one after the other", parameters, tuple(body))
@@ -85,8 +84,9 @@ class FlowFunctions:
         yield ir.Call(f"flow{part + 1}", (coefficients, *self.arguments))
 
     def corrector(self, schedule: Schedule) -> ir.Function:
-        """Return the function of the corrector: alternating flows of two parts, before the first step or after the last
-        one."""
+        """Return the function of the corrector: alternating flows of two parts, before the first step of a run and
+        after the last.
+        """
         (outer, first), *others = schedule.begin
         (_, last), *_ = schedule.end
         begin = ir.Select(ir.fixed("after"), ir.Constant(last), ir.Constant(first))
@@ -100,8 +100,10 @@ class FlowFunctions:
         return self.function("corrector", doc, parameters, tuple(body))
 
     def tangent(self, count: int) -> ir.Function:
-        """Return the function that computes the derivative of the increment of one of ``count`` flows, then applies
-        this flow."""
+        """Return the function that computes the derivative of the increment of flow ``part``, then applies this flow.
+
+        ``count`` is the number of flows.
+        """
         cases = tuple(
             (
                 ir.Call(f"tangent{k}", (COEF, X, ir.fixed("slope"))),
@@ -118,7 +120,7 @@ class FlowFunctions:
 
 
 def _row(number: ir.Value) -> ir.Value:
-    """Return the address of row ``number`` of coefficients."""
+    """Return the address of row ``number`` of the matrix of coefficients."""
     return ir.Binary("+", COEF, ir.Binary("*", number, ROW_SIZE))
 
 
@@ -127,8 +129,9 @@ def _in_order(
 ) -> Iterator[ir.Statement]:
     """Yield the flows of a step: the first flow, then a loop over a repeated pattern of flows.
 
-    ``flow`` yields the statements for a part and its row of coefficients. ``rows`` is the row of the next flow: the
-    address of the row if ``size`` is the size of a row, or its number if ``size`` is None.
+    ``flow`` yields the statements for a part and its row of coefficients. The variable ``rows`` stands for the row of
+    the next flow: it is the number of the row if ``size`` is None, else its address, with rows of ``size``
+    coefficients.
     """
 
     def further(count: int) -> ir.Value:
@@ -152,7 +155,8 @@ def _in_order(
 def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
     """Return the function that adds the increments of a flow to the values ``updated`` of all members of a group.
 
-    ``form`` is the suffix of its version for small or all arguments, see `phigen.ir.passes.forms`.
+    ``form`` is the suffix of the version of elementary functions, for small or for all arguments
+    (`phigen.ir.passes.forms`).
     """
     count = ir.Constant(max(1, len(updated)))
     x, start, compensation = (ir.Member(PACK, name) for name in ("x", "start", "carry"))
@@ -171,7 +175,11 @@ def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
 
 
 def group_schedule(schedule: Schedule, form: str) -> ir.Function:
-    """Return the function that applies all flows of a step to all members of a group."""
+    """Return the function that applies all flows of a step to all members of a group.
+
+    ``form`` is the suffix of the version of elementary functions, for small or for all arguments
+    (`phigen.ir.passes.forms`).
+    """
 
     def flow(part: int, row: ir.Value) -> Iterator[ir.Statement]:
         yield ir.Call(f"flow{part + 1}{form}_lanes", (row, DISTINCT_COEF, GROUP))
@@ -184,7 +192,7 @@ def _over_packs(body: ir.Block) -> ir.Loop:
     return ir.Loop("packs", body, "k", ir.Constant(0), PACKS)
 
 
-#: Types of the parameters of functions for groups.
+#: Types of the parameters of functions that act on a group of members.
 _TYPES: Mapping[str, ir.ParameterType] = {"row": ir.Type.FLAG, "distinct_coef": ir.Type.FLAG, "group": _GROUP}
 
 
@@ -193,12 +201,12 @@ _TYPES: Mapping[str, ir.ParameterType] = {"row": ir.Type.FLAG, "distinct_coef": 
 
 @dataclass(frozen=True)
 class Transposed:
-    """The transpose of one flow, by the indices of the values that it computes, without those that are always 0.
+    """Description of the transposed kernel of one flow: the indices of the values that it computes and reads.
 
-    ``state`` and ``row`` are the indices of the cotangents of coordinates and of coefficients. ``before`` are the
-    coordinates before the flow that the transpose recomputes. ``reads`` are the ranges of coordinates that it reads, as
-    pairs (first index, length). ``far`` and ``far_back`` say whether the flow and its transpose have a version with
-    full-range functions.
+    It computes the cotangents of the coordinates ``state`` and of the coefficients ``row``; all other contributions are
+    always 0. It recomputes the coordinates ``before`` the flow. It reads ranges of coordinates, with pairs (first
+    index, length) in ``reads``. ``far`` and ``far_back`` say whether the flow and its transpose have a version for all
+    arguments of elementary functions.
     """
 
     state: Sequence[int]
@@ -211,7 +219,8 @@ class Transposed:
 
 @dataclass(frozen=True)
 class FlowTransposes:
-    """The functions that pull cotangents back through the flows of a splitting with ``dimension`` coordinates.
+    """Builder of the functions that pull cotangents back through the flows of a splitting with ``dimension``
+    coordinates.
 
     ``row`` is the number of coefficients in a row. ``recomputes`` says whether the transposes also recompute the states
     before the flows, so that no tape is needed.
@@ -223,7 +232,7 @@ class FlowTransposes:
     recomputes: bool
 
     def _switch(self, case: Callable[[int, Transposed], Iterator[ir.Statement]]) -> ir.Switch:
-        """Return the switch over the parts of H, with the statements that ``case`` yields for each part."""
+        """Return the switch over the parts of H; ``case`` yields the statements for a part."""
         cases = tuple(tuple(case(k, flow)) for k, flow in enumerate(self.flows, 1))
         return ir.Switch(PART, tuple(range(1, len(cases) + 1)), cases)
 
@@ -254,12 +263,14 @@ class FlowTransposes:
 
     @property
     def _stored(self) -> Mapping[str, ir.ParameterType]:
-        """Types of the parameters; the tape has the coordinates of all packs of a group."""
+        """Types of the parameters of functions with a tape; the tape holds the coordinates of all packs of a group."""
         return {**_TYPES, "tape": ir.Vector(ir.Constant(self.dimension), rows=ir.fixed("BACK_PACKS"), lanes=True)}
 
     def group_flows(self) -> ir.Function:
-        """Return the function that applies a flow to all members of a group, after storing the coordinates its
-        transpose reads."""
+        """Return the function that applies a flow to all members of a group.
+
+        Before, it stores the coordinates that the transpose of the flow reads.
+        """
 
         def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:
             pack = ir.Member(ir.Entry(ir.Member(GROUP, "pack"), K), "x")
@@ -307,7 +318,10 @@ class FlowTransposes:
 
 
 def _in_form(name: str, has_far: bool, arguments: tuple[ir.Value, ...]) -> ir.Statement:
-    """Return the call of a function for lanes; for groups marked ``far``, of its version with full-range functions."""
+    """Return the call of a function for SIMD lanes.
+
+    If the function has a version for all arguments of elementary functions, groups marked ``far`` call this version.
+    """
     near = ir.Call(f"{name}_lanes", arguments)
     if not has_far:
         return near

@@ -1,7 +1,7 @@
 """Builder of the functions of kernels: straight-line code that reads entries of arrays, and stores results to arrays.
 
-The functions are on the level of memory. The passes `phigen.ir.passes.zeros`, `output_order`, `cutting` and
-`simd_lanes` apply to them.
+The functions are on the level of memory. The passes `zeros`, `output_order`, `cutting` and `simd_lanes` of
+`phigen.ir.passes` change these functions before they are printed.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ def kernel_function(
     """Return the function of a kernel: declarations of the values that it reads, temporaries, then stores.
 
     ``members`` maps parameters of the system to their names in the record of parameters; ``arrays`` renames arguments.
-    Symbols that are internal to phigen get no variable: their array entries are read where they are used. With
-    ``named``, parameters of the system get variables; otherwise they are read in place too.
+    Symbols that are not in the spec get no variable; their array entries are read where they are used. With ``named``,
+    parameters of the system get variables, otherwise they are also read where they are used.
     """
     arguments = [*kernel.inputs, *(o.name for o in kernel.outputs)]
     names = {argument: ir.fixed((arrays or {}).get(argument, argument)) for argument in arguments}
@@ -43,7 +43,7 @@ def kernel_function(
 def _reads(
     kernel: Kernel, used: set[str], members: Mapping[str, str], names: Mapping[str, ir.Name], *, named: bool
 ) -> Iterator[ir.Statement]:
-    """Yield the declarations of the input symbols in ``used``."""
+    """Yield the declarations of those inputs of a kernel whose symbols are in ``used``."""
     for argument, symbols in kernel.inputs.items():
         for i, s in enumerate(symbols):
             if s not in used:

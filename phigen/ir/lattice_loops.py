@@ -1,7 +1,8 @@
 """Builder of the loops of a lattice: functions that evaluate kernels of a site in loops over sites, bonds or pairs.
 
-This module defines for all targets which value each symbol of a kernel stands for. The functions are on the level of
-sites. Their stores contain whole expression graphs, which `phigen.ir.passes.temporaries` converts to statements.
+`LatticeLoops.meaning` defines, for all targets, which value each symbol of a kernel stands for. The functions are on
+the level of sites. Their stores contain whole expression graphs, which the pass `phigen.ir.passes.temporaries` converts
+to statements.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from phigen.symbolic import symbols
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: Half of the energy of a bond or pair belongs to each of its two sites.
+#: Share of the energy of a bond or pair that is assigned to each of its two sites.
 _HALF = number(Fraction(1, 2))
 
 
@@ -33,8 +34,9 @@ class LatticeLoops:
     step: Sweeps
 
     def sweep(self, sweep: Sweep) -> ir.Function:
-        """Return the function that adds the increments of a sweep to the fields; of a tangent sweep, to the variations
-        of fields."""
+        """Return the function of a sweep: it adds increments to the fields or, for a tangent sweep, to the variations
+        of fields.
+        """
         storage = ir.Storage.VARIATION if sweep.is_tangent else ir.Storage.STATE
         arrays = (ir.Array(storage, k, self.program.coordinates[k]) for k in sweep.moved)
         stores = [ir.Store(array, e) for array, e in zip(arrays, sweep.kernel.roots, strict=True)]
@@ -48,8 +50,9 @@ class LatticeLoops:
         return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window, sweep.first)
 
     def stage(self, kernel: Kernel) -> ir.Function:
-        """Return the function of a kernel of the stage equation; the fields that it reads are those of the unknown
-        y."""
+        """Return the function of a kernel of the implicit equation of a stage, whose unknown is y. The fields that it
+        reads are y.
+        """
         gather = self.step.others.varied if kernel.reads_variations else self.step.others.field
         read = gather if kernel.inputs["gathered"] else None
         starts, varied = ["start"] * kernel.reads_start, ["varied"] * kernel.reads_variations
@@ -57,8 +60,10 @@ class LatticeLoops:
         return self._over_sites(kernel, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read)
 
     def observable(self, kernel: Kernel) -> ir.Function:
-        """Return the function of a density, an energy or the vector field; half of each bond energy is added at each
-        end."""
+        """Return the function of a density, an energy or the vector field.
+
+        An energy at a site includes half of the energy of each bond or pair of the site.
+        """
         others = self.step.others
         gather = others.sums_of(kernel)
         body: list[ir.Statement] = [*self._outputs(ir.Storage.OBSERVABLE, kernel.roots)]
@@ -70,7 +75,9 @@ class LatticeLoops:
         return self._over_sites(kernel, parameters, body, gather if gather.names else None)
 
     def sums(self, ends: Ends) -> ir.Function:
-        """Return the function that computes sums at each site, over its bonds of one kind or over all other sites."""
+        """Return the function that computes sums at each site, over the bonds that begin or end there, or over all
+        other sites.
+        """
         kernel = ends.kernel
         source = "params" if "params" in kernel.inputs else "coef"
         varied = "varied" in kernel.inputs or ends in self.step.others.varied.ends
@@ -84,15 +91,18 @@ class LatticeLoops:
     def transposed(
         self, kernel: Kernel, gather: Gather | None, sweep: Sweep | None = None, fields: Sequence[str] = ()
     ) -> ir.Function:
-        """Return the transpose of a kernel of the stage equation, or of a ``sweep``.
+        """Return the function of a transposed kernel: of the implicit equation of a stage, or of a ``sweep``.
 
-        ``gather`` are the sums that the kernel reads. ``fields`` are recomputed before the sweep by the inverse flow.
+        ``gather`` are the sums that the kernel reads. The kernel recomputes ``fields`` as they were before the sweep,
+        by the inverse flow.
         """
         stores = self._cotangents(kernel, gather.names if gather else (), fields)
         return self._over_sites(kernel, ("coef",), stores, gather, self._selection(sweep))
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
-        """Return the transpose of the function for sums over bonds or pairs; ``kernel`` is the transposed kernel."""
+        """Return the transpose of the function that `sums` returns for ``ends``; ``kernel`` is the transposed
+        kernel.
+        """
         source = "params" if "params" in kernel.inputs else "coef"
         return self._over_ends(ends, kernel, (source,), self._cotangents(kernel))
 
@@ -106,7 +116,10 @@ class LatticeLoops:
         return _function(kernel, parameters, loop)
 
     def _cotangents(self, kernel: Kernel, sums: Sequence[str] = (), fields: Sequence[str] = ()) -> Iterator[ir.Update]:
-        """Yield the stores of a transposed kernel, without those of 0; ``fields`` are the fields that it recomputes."""
+        """Yield the stores of the outputs of a transposed kernel, without outputs that are 0.
+
+        ``sums`` are the names of the sums that the kernel reads, and ``fields`` the fields that it recomputes.
+        """
         for output in kernel.outputs:
             array = output.name.removesuffix("_bar")
             names = fields if array == STATE_BEFORE else kernel.inputs.get(array, [""] * len(output.values))
@@ -199,13 +212,17 @@ class LatticeLoops:
 
     @cached_property
     def arrays(self) -> tuple[str, ...]:
-        """The arrays of the state by name: fields, parameters at sites, increments of noise, derived arrays."""
+        """The names of the arrays of the state, in order: fields, parameters at sites, increments of noise, derived
+        values.
+        """
         sites = self.step.sites
         return (*self.program.coordinates, *sites.parameters, *sites.increments, *sites.derived)
 
     @cached_property
     def derived(self) -> dict[str, str]:
-        """The members that store values which solvers compute for each site, by the names of their arrays."""
+        """The names of the arrays of derived values, which solvers compute for each site, and the members that store
+        them.
+        """
         return {symbol: symbol.kind for symbol in self.step.sites.derived}
 
     @cached_property
@@ -237,13 +254,16 @@ def _function(kernel: Kernel, parameters: tuple[str, ...], *body: ir.Statement) 
 
 
 def _present(kernels: Iterable[Kernel], kind: str) -> tuple[Symbol, ...]:
-    """Return the symbols of a kind in the inputs ``present``, which are 1 at some sites and 0 at others, in order of
-    use."""
+    """Return the weights of one ``kind`` that kernels read, in the order of their first use; weights are 1 at some
+    sites, else 0.
+    """
     read = (s for kernel in kernels for s in kernel.inputs["present"])
     return tuple(dict.fromkeys(s for s in read if isinstance(s, Symbol) and kind_of(s) == kind))
 
 
 def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:
-    """Return the least and the largest offset of a term along each axis, from the key of the symbol of its weight."""
+    """Return the least and the largest offset of a term along each axis, which the symbol of its weight has as its
+    ``key``.
+    """
     ends = [int(k) for k in key]
     return list(zip(ends[::2], ends[1::2], strict=True))

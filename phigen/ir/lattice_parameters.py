@@ -1,7 +1,7 @@
 """Builders of functions on the parameters of a lattice: checks, copies into rows, and sums of derivatives.
 
-A parameter has one value, or a value at each site or bond. ``members`` maps parameters to their names in the record of
-parameters.
+A parameter of a lattice has one value for all sites, or a value at each site or bond. ``members`` maps parameters to
+their names in the record of parameters.
 """
 
 from __future__ import annotations
@@ -52,8 +52,9 @@ def are_allowed(parameters: Sequence[Parameter], members: Mapping[str, str], *, 
 def copies(
     parameters: Sequence[Parameter], members: Mapping[str, str], arrays: Sequence[str], at_bonds: Sequence[str]
 ) -> Iterator[ir.Function]:
-    """Yield the functions that copy parameters at sites into rows of the ``arrays``, and parameters at bonds into
-    ``at_bonds``."""
+    """Yield the functions that copy parameters of the caller: at sites into rows of ``arrays``, at bonds into
+    ``at_bonds``.
+    """
     sites, bonds = ([p for p in parameters if p.at == at] for at in ("sites", "bonds"))
     types = {**_TYPES, "s": ir.RecordType("solver", mutable=True)}
     if sites:
@@ -78,7 +79,7 @@ def copies(
 
 
 def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.Assign:
-    """Return the statement that sets the pointers to the caller's arrays to null, once they are copied."""
+    """Return the statement that sets pointers to arrays of the caller to null, after the arrays have been copied."""
     first, *others = (_of(ir.Member(S, "params"), p, members) for p in parameters)
     return ir.Assign(first, NULL, too=tuple(others))
 
@@ -86,10 +87,10 @@ def _copied(parameters: Sequence[Parameter], members: Mapping[str, str]) -> ir.A
 def sums_of_derivatives(
     parameters: Sequence[Parameter], members: Mapping[str, str], bars: Mapping[str, int]
 ) -> Iterator[ir.Function]:
-    """Yield the functions that add derivatives with respect to parameters to the results of the caller.
+    """Yield the functions that add derivatives with respect to parameters to the arrays in which the caller wants them.
 
     ``bars`` maps the parameters at sites and bonds to the numbers of their cotangent arrays. Parameters with one value
-    have one derivative each.
+    for all sites have one derivative each.
     """
     numbers = [p for p in parameters if p.at == "all"]
     if numbers:

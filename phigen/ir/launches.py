@@ -1,4 +1,6 @@
-"""Descriptions of the kernels of a solver on a device, as plain data from which the runtime launches them."""
+"""Descriptions of the kernels of a solver on a device, such as a graphics card: plain data with which the runtime
+launches them.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +10,12 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class EnsembleLaunch:
-    """The kernel of an ensemble, with the default number of work items in a ``group`` and the sizes of its data.
+    """Data for launching the kernel of an ensemble on a device.
 
-    ``predictors`` is the number of values of a member in shared memory, or 0. ``coefficients`` is the number of values
-    that members with the same parameters, step and gauge can share, or 0. ``gauges`` is the number of factors of a
-    gauge.
+    ``group`` is the default number of work items in a work group. ``predictors`` is the number of values that a member
+    has in shared memory for its predictor. ``coefficients`` is the number of coefficients that members with the same
+    parameters, step and gauge can share. ``gauges`` is the number of factors of a gauge. A number is 0 if there are no
+    such values.
     """
 
     group: int = 0
@@ -23,11 +26,10 @@ class EnsembleLaunch:
 
 @dataclass(frozen=True)
 class SumLaunch:
-    """The kernel of sums over the bonds of each site, or over pairs; ``end`` and ``chosen`` are as in
-    `phigen.scheme.steps.Ends`.
+    """Data for launching a kernel that computes sums over the bonds of each site, or over all other sites.
 
-    ``values`` is the number of sums at a site. ``of_parameters`` says that the kernel reads parameters, not
-    coefficients.
+    ``values`` is the number of sums at a site. ``of_parameters`` says that the kernel reads parameters in place of
+    coefficients. ``end`` and ``chosen`` are as in `phigen.scheme.steps.Ends`.
     """
 
     kernel: str
@@ -39,10 +41,10 @@ class SumLaunch:
 
 @dataclass(frozen=True)
 class SiteLaunch:
-    """A kernel over sites, launched after the kernels of the ``sums`` that it reads; ``outputs`` is its number of
-    outputs per site.
+    """Data for launching a kernel over the sites of a lattice, after the kernels of the ``sums`` that it reads.
 
-    ``colour``, ``inside`` and ``window`` select sites as in `phigen.ir.nodes.Selection`.
+    ``outputs`` is the number of its outputs per site. ``colour``, ``inside`` and ``window`` select sites as in
+    `phigen.ir.nodes.Selection`.
     """
 
     kernel: str
@@ -55,19 +57,20 @@ class SiteLaunch:
 
 @dataclass(frozen=True)
 class LatticeLaunches:
-    """All kernels of a lattice: the sweeps of each of the ``parts`` of H, and other kernels by name.
+    """Data for launching the kernels of a lattice: the sweeps of each of the ``parts`` of H, and ``others`` by name.
 
-    ``arrays`` are the arguments of all kernels after the first five, in order. ``seams`` are the conditions on boundary
-    seams, each a colour and an offset. ``numbers`` are the parameters with one value, in the order of kernels.
+    ``arrays`` are the names of the array arguments, which follow the first five arguments of all kernels. ``seams`` has
+    a pair (colour, offset) for each weight of terms near boundary seams. ``numbers`` are the parameters with one value
+    for all sites, in the order in which kernels receive them.
     """
 
     parts: tuple[tuple[SiteLaunch, ...], ...] = ()
     others: Mapping[str, SiteLaunch] = field(default_factory=dict)
     arrays: tuple[str, ...] = ()
     neighbours: tuple[tuple[int, ...], ...] = ()  # offsets of the sites whose fields kernels read
-    # for each weight at open ends, the least and largest offset of its term along each axis
+    # for each weight of a term at open ends: the least and the largest offset of the term along each axis
     bounds: tuple[tuple[tuple[int, int], ...], ...] = ()
     seams: tuple[tuple[int, tuple[int, ...]], ...] = ()
     numbers: tuple[str, ...] = ()
-    # for each observable, its reduction, and whether it is over sites, bonds or pairs
+    # for each observable: its reduction, such as "sum" or "max", and "sites", "bonds" or "pairs", over which it runs
     reductions: tuple[tuple[str, str], ...] = ()

@@ -1,9 +1,9 @@
-"""Nodes of the loop IR: statements, loops and values. Real arithmetic is an `Expression` over symbols that statements
-declare.
+"""Nodes of the loop IR, the intermediate representation of generated code: statements, loops and values. Real
+arithmetic is an `Expression` in symbols that statements declare.
 
 There are two levels. On the level of *sites*, `Load` and `Store` name an array and the offset of a site, and loops run
 over sites, bonds or pairs. On the level of *memory*, `Entry`, `Member` and plain loops name elements of arrays. Each
-target has one lowering pass from the level of sites to the level of memory; printers only accept the latter.
+target has one lowering pass from the level of sites to the level of memory, the only level that printers accept.
 
 A dialect of C, such as that of a device, applies the lowering by rows (`phigen.ir.passes.by_rows`) or by tables
 (`phigen.ir.passes.by_tables`), and prints the result by a `phigen.targets.spelling.Dialect`. It maps ``independent``
@@ -21,8 +21,9 @@ from phigen.scheme.kernel import Role
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
-#: Kinds of symbols of variables that are not in the spec. FIXED ones are printed unchanged, since the generated
-#: function reserves their names. LABEL ones are printed unchanged too, but renamed if the spec uses the same name.
+#: Kinds of symbols for variables that are not in the spec. Variables of both kinds are printed with the names that the
+#: builder gives. A name of the kind FIXED is reserved, so that the spec cannot use it. A variable of the kind LABEL is
+#: renamed if the spec uses its name.
 FIXED, LABEL = "fixed", "label"
 
 
@@ -42,7 +43,7 @@ class Type(Enum):
 class Pointer:
     """Pointer to reals, or to SIMD vectors of reals if ``lanes``.
 
-    Through a ``constant`` pointer, the function only reads. The elements of a ``restricted`` pointer are not written
+    The function only reads through a ``constant`` pointer. The elements of a ``restricted`` pointer are not written
     through any other pointer.
     """
 
@@ -53,10 +54,10 @@ class Pointer:
 
 @dataclass(frozen=True)
 class Vector:
-    """Array of reals, or of SIMD vectors of reals if ``lanes``; a matrix if it has several ``rows``.
+    """Array of reals, or of SIMD vectors of reals if ``lanes``; a matrix if it has ``rows``.
 
-    A parameter of this type is an address, and its ``length`` may be unknown (None). ``constant`` and ``restricted``
-    are as in `Pointer`.
+    A parameter of this type is an address, and its ``length`` may be unknown (None). As for a `Pointer`, ``constant``
+    means that the function only reads the array, and ``restricted`` that nothing else writes its elements.
     """
 
     length: Value | None
@@ -68,17 +69,19 @@ class Vector:
 
 @dataclass(frozen=True)
 class Tape:
-    """Pointer to the next free vector of a tape, or null if no states are stored."""
+    """Pointer to the next free vector of a tape, to which states are appended for the reverse pass; null if no states
+    are stored.
+    """
 
     length: Value
 
 
 @dataclass(frozen=True)
 class RecordType:
-    """Record of the runtime by its name, such as the solver or a row segment.
+    """A record of the runtime, such as the solver or a row segment, by its name.
 
-    Parameters of this type are addresses; local variables are addresses if ``address`` is set. A function only changes
-    records that are ``mutable``.
+    A parameter of this type is an address; a local variable is an address if ``address`` is set. A function changes
+    only records that are ``mutable``.
     """
 
     name: str
@@ -90,7 +93,7 @@ ParameterType = Type | Pointer | Vector | Tape | RecordType
 
 
 class Storage(Enum):
-    """Kinds of arrays over the sites; the value is their name in kernels."""
+    """Kinds of arrays over the sites; the value of each kind is the name of these arrays in kernels."""
 
     STATE = "x"  # fields, then parameters at sites, then increments of noise, then derived arrays
     VARIATION = "varied"
@@ -98,7 +101,7 @@ class Storage(Enum):
     OUTPUT = "out"
     OBSERVABLE = "observable"  # results for callers, in arrays without padding between rows
     SUM = "gathered"  # sums over bonds or pairs
-    COTANGENT = "bar"  # cotangents of the state, then of parameters at bonds
+    COTANGENT = "bar"  # cotangents of the state, followed by those of parameters at bonds
     START_COTANGENT = "start_bar"
     SUM_COTANGENT = "gathered_bar"
     SEED = "seed"  # cotangents of the outputs of a kernel
@@ -118,13 +121,13 @@ class Array:
 
 @dataclass(frozen=True)
 class Name:
-    """Variable of the function, by its symbol."""
+    """Variable of the function, given by its symbol."""
 
     symbol: str
 
     @property
     def text(self) -> str:
-        """The text of a name of the kind FIXED or LABEL; "" for others."""
+        """The name itself for symbols of the kinds FIXED and LABEL; "" for others."""
         return str(self.symbol.key[0]) if isinstance(self.symbol, Symbol) else ""
 
 
@@ -137,11 +140,11 @@ class Constant:
 
 @dataclass(frozen=True)
 class Load:
-    """Element of an array over the sites: at an ``offset`` from the site of the loop, or at the ``end`` of a bond or
+    """Element of an array over the sites, at an ``offset`` from the site of the loop, or at the ``end`` of a bond or
     pair.
 
-    ``end`` is "a" or "b". In transposed functions it may be "bond", the bond itself, for the cotangents of parameters
-    at bonds.
+    ``end`` is "a" or "b". In transposed functions it may be "bond": then the element belongs to the bond itself, as the
+    cotangents of parameters at bonds do.
     """
 
     array: Array
@@ -151,7 +154,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Coefficient:
-    """Coefficient by number: a value that does not depend on the state and is computed by ``prepare``."""
+    """Coefficient by its number. Coefficients do not depend on the state; the kernel ``prepare`` computes them."""
 
     number: int
 
@@ -165,7 +168,9 @@ class SystemParameter:
 
 @dataclass(frozen=True)
 class BondParameter:
-    """Parameter at the bond of the loop; if ``oriented``, it has the opposite sign when seen from the end b."""
+    """Parameter of the bond of the loop. If ``oriented``, it has the opposite sign for the site at the end b of the
+    bond.
+    """
 
     number: int
     name: str
@@ -179,7 +184,7 @@ class Time:
 
 @dataclass(frozen=True)
 class Inside:
-    """Weight of a term at open ends: 1 at sites where all offsets of the term are inside the lattice, else 0.
+    """Weight of a term at open ends: 1 at sites where all sites that the term reads are on the lattice, else 0.
 
     ``bounds`` has the least and the largest offset of the term along each axis.
     """
@@ -190,12 +195,17 @@ class Inside:
 
 @dataclass(frozen=True)
 class HasColour:
-    """1 at sites of the colour of the sweep, else 0."""
+    """Weight that is 1 at sites of the colour which the sweep updates, else 0."""
 
 
 @dataclass(frozen=True)
 class OnSeam:
-    """1 if the site at ``offset`` has the colour ``colour`` and lies on the seams of the sweep's window, else 0."""
+    """Weight of a term near boundary seams. It is 1 if the term begins at a site of the part that the sweep belongs to,
+    else 0.
+
+    The term begins at the site ``offset`` away. This site must have the colour ``colour``, and must lie on exactly the
+    seams of the sweep's window.
+    """
 
     number: int
     colour: int
@@ -229,7 +239,7 @@ class Binary:
 
 @dataclass(frozen=True)
 class Accumulated:
-    """Sum of a value and the terms of another value, added one by one from the left."""
+    """Sum of ``start`` and the summands of the expression ``terms``, added one by one from the left."""
 
     start: Value
     terms: Value
@@ -276,7 +286,7 @@ class Listed:
 
 @dataclass(frozen=True)
 class Several:
-    """Several values, separated by commas."""
+    """Several values, separated by commas, such as the results of a function."""
 
     values: tuple[Value, ...]
 
@@ -301,9 +311,9 @@ Value = (
 
 @dataclass(frozen=True)
 class Declare:
-    """Declaration of variables of one type, constants unless ``mutable``.
+    """Declaration of variables of one type, which are constant unless ``mutable``.
 
-    If it is ``in_place``, there is no variable: the value is printed wherever the name is used.
+    If it is ``in_place``, no variable is printed: each use of the name is replaced by the value.
     """
 
     type: Type | Pointer | Vector | RecordType
@@ -315,7 +325,7 @@ class Declare:
 
 @dataclass(frozen=True)
 class Unpack:
-    """Declaration of constants for the members, or the items, of one value."""
+    """Declaration of constants for the members, or the items, of one value, such as a tuple."""
 
     names: tuple[str, ...]
     value: Value
@@ -323,11 +333,11 @@ class Unpack:
 
 @dataclass(frozen=True)
 class Store:
-    """Assignment of a value to the element of an array at the site of the loop; if it ``adds``, addition to the
+    """Assignment of a value to an element of an array at the site of the loop or, if it ``adds``, addition to this
     element.
 
-    An ``extreme``, "max" or "min", only replaces the element by larger or smaller values. ``offset`` and ``end`` select
-    other elements, as in `Load`.
+    With ``extreme`` "max" or "min", the value replaces the element only if it is larger or smaller. ``offset`` and
+    ``end`` select an element at another site, as in `Load`.
     """
 
     array: Array
@@ -340,7 +350,9 @@ class Store:
 
 @dataclass(frozen=True)
 class Reduce:
-    """Addition of a value, at each site, to the cotangent of a coefficient or of a parameter with one value."""
+    """Addition of a value, at each site, to the cotangent of a coefficient, or of a parameter with one value for all
+    sites.
+    """
 
     source: str  # "coef" or "params"
     number: int
@@ -348,13 +360,14 @@ class Reduce:
     value: Value
 
 
-#: Statements whose values are expression graphs before the pass `phigen.ir.passes.temporaries`.
+#: Statements that store results; their values are whole expression graphs before the pass
+#: `phigen.ir.passes.temporaries`.
 Update = Store | Reduce
 
 
 @dataclass(frozen=True)
 class GatherSums:
-    """Computation of ``count`` sums over bonds or pairs at all sites, by the functions with these names."""
+    """Computation of ``count`` sums over bonds or pairs at all sites, by calls of ``functions``."""
 
     functions: tuple[str, ...]
     count: int
@@ -362,7 +375,7 @@ class GatherSums:
 
 @dataclass(frozen=True)
 class Assign:
-    """Assignment of a value to a place in memory, and to the places ``too``; if it ``adds``, addition."""
+    """Assignment of a value to a place in memory, and to the places ``too``. If it ``adds``, the value is added."""
 
     target: Value
     value: Value
@@ -372,14 +385,16 @@ class Assign:
 
 @dataclass(frozen=True)
 class Together:
-    """Assignments that are printed as one statement."""
+    """Assignments that are printed as a single statement, for languages that assign several values at once."""
 
     assignments: tuple[Assign, ...]
 
 
 @dataclass(frozen=True)
 class Clear:
-    """Assignment of 0 to ``count`` elements of an array from index ``first`` on; to all elements without a count."""
+    """Assignment of 0 to ``count`` elements of an array, from index ``first`` on; to all elements if ``count`` is
+    None.
+    """
 
     array: Value
     first: Value | None
@@ -405,12 +420,12 @@ class Append:
 
 @dataclass(frozen=True)
 class Selection:
-    """Sites over which a loop runs.
+    """The sites over which a loop runs.
 
-    They have one ``colour``, if it is not None. ``inside`` excludes the sites near boundary seams. With a ``window``,
-    a bit mask of axes, the loop runs over the sites near seams that terms on the seams of these axes reach.
-    Sites with numbers below ``first`` are excluded; in loops over pairs, this applies to the other site. ``massive``
-    ends a loop with the last site that has a mass.
+    With a ``colour``, they are the sites of this colour. ``inside`` excludes the sites near boundary seams. With a
+    ``window``, a bit mask of axes, the loop runs over the sites near seams that are reached by terms on the seams of
+    these axes. Sites with numbers below ``first`` are excluded. ``massive`` excludes the sites after the last site that
+    has a mass. In loops over pairs, ``first`` and ``massive`` apply to the second site of a pair.
     """
 
     colour: int | None = None
@@ -425,12 +440,12 @@ ALL_SITES = Selection()
 
 @dataclass(frozen=True)
 class Loop:
-    """Loop over sites, bonds or pairs; on the level of memory, over a ``variable`` from ``low`` to below ``high``.
+    """Loop over sites, bonds or pairs. On the level of memory, the ``variable`` runs from ``low`` to ``high`` − 1.
 
     ``end`` and ``chosen`` say over which bonds a loop runs, as in `phigen.scheme.steps.Ends`. A loop of the kind
     "segments" runs over row segments; if ``threads`` is not 0, it uses several threads for lattices of more than
-    ``threads`` sites. Loops of the kinds "line" and "search" have one statement; in a "search" this may end the
-    function.
+    ``threads`` sites. Loops of the kinds "line" and "search" have one statement in their body; in a "search", this
+    statement may end the function.
     """
 
     kind: str
@@ -460,14 +475,16 @@ class Loop:
 
 @dataclass(frozen=True)
 class Discard:
-    """Mark a parameter as unused, to avoid a warning of the compiler."""
+    """Statement that marks a parameter as unused, so that the compiler gives no warning."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class If:
-    """Statements that run if a condition is true, and others that run if it is false."""
+    """Statements that are executed if a condition is true, and ``otherwise`` statements that are executed if it is
+    false.
+    """
 
     condition: Value
     then: Block
@@ -476,7 +493,7 @@ class If:
 
 @dataclass(frozen=True)
 class Switch:
-    """Statements of the case whose label equals a value; the last case applies to all other values too."""
+    """Statements of the case whose label equals a value. The last case is also used if no label equals the value."""
 
     value: Value
     labels: tuple[int, ...]
@@ -549,7 +566,7 @@ PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "
 _NUMBERED = dict.fromkeys(("first", "end", "unit"), Type.SIZE)
 _ARRAYS = dict.fromkeys(("x", "y", "v", "to", "bar", "handed", "received", "at_bonds"), Type.ARRAYS)
 _SUMMED = dict.fromkeys(("sums", "numbers"), Pointer(constant=False))
-#: Types of the parameters of functions by rows, by name.
+#: Types of the parameters of functions that the lowering by rows makes, by name.
 TYPES: dict[str, ParameterType] = {
     "s": RecordType("solver"),
     "row": RecordType("row"),
@@ -566,7 +583,7 @@ TYPES: dict[str, ParameterType] = {
 
 @dataclass(frozen=True)
 class ConstantTable:
-    """Named array of integers, the constants of a model."""
+    """Named array of integers, a table of constants of a model."""
 
     name: str
     values: tuple[int, ...]
@@ -577,9 +594,9 @@ class ConstantTable:
 class Function:
     """Function of the generated code.
 
-    ``doc`` becomes its comment. ``role`` is the purpose of its kernel, and ``returns`` the type of its result. On the
-    level of sites, its parameters are some of `PARAMETERS`. On the level of memory, the types of parameters are in
-    ``types`` or else in `TYPES`.
+    ``doc`` is printed as the comment of the function. ``role`` is the role of its kernel in a step, and ``returns`` is
+    the type of its result. On the level of sites, its parameters are some of `PARAMETERS`. On the level of memory, the
+    types of parameters are in ``types`` or else in `TYPES`.
     """
 
     name: str

@@ -1,8 +1,8 @@
-"""Builders of the functions of paths ṁ = π(m)p, by recurrences for the Taylor coefficients of the nodes of π(m)p.
+"""Builders of the functions for paths, the solutions m(s) of ṁ = π(m)p, by recurrences for their Taylor coefficients.
 
-Each node of the expression graph has a series, an array over the orders. The recurrences are the same in all languages;
-a `PathLayout` says where values are. For SIMD lanes (`lane_functions`), sums over orders are loops, and derivatives of
-the path are computed too.
+Each node of the expression graph of π(m)p has a Taylor series, an array of coefficients by order. The recurrences are
+the same in all languages; a `PathLayout` says in which arrays the values are. The functions for SIMD lanes
+(`lane_functions`) have loops for the sums over orders, and also compute derivatives of the path.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from phigen.scheme.steps import PathAdjoint
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, coefficient, cotangent, momentum, variation
 
-#: Largest number of Taylor terms of a path. A path that needs more is divided into several parts.
+#: Largest number of Taylor terms of a path. If more terms are needed, the path is divided into several parts.
 TERMS = 30
 
 #: Largest number of statements in a loop over lanes, since compile time is quadratic in this number.
@@ -35,7 +35,7 @@ ZERO, ONE = ir.Constant(0), ir.Constant(1.0)
 
 
 class PathLayout:
-    """Places of the values of a path in arrays; the array of a series has one entry for each order."""
+    """The arrays in which the values of a path are; the array of a Taylor series has one entry for each order."""
 
     def coefficient(self, i: int) -> ir.Value:
         """Return coefficient i, a function of parameters and step."""
@@ -46,7 +46,7 @@ class PathLayout:
         return ir.entry(P, i)
 
     def fixed(self, i: int) -> ir.Value:
-        """Return value number i among those that are constant along a path."""
+        """Return value number ``i`` among the values that are constant along a path."""
         return ir.entry(F, i)
 
     def series(self, i: int) -> ir.Value:
@@ -58,13 +58,13 @@ class PathLayout:
         return ir.Entry(self.series(i), k)
 
     def following(self, i: int, k: ir.Value, value: ir.Value) -> ir.Statement:
-        """Return the statement that sets the Taylor coefficient of order k of series i."""
+        """Return the statement that assigns ``value`` to the Taylor coefficient of order k of series i."""
         return ir.Assign(self.order(i, k), value)
 
 
 @dataclass(frozen=True)
 class PathFunctions:
-    """Builder of the recurrences for the path of a program; ``layout`` gives the places of values."""
+    """Builder of the recurrences for a path; ``layout`` says in which arrays the values are."""
 
     program: Program
     path: Recurrences
@@ -72,32 +72,36 @@ class PathFunctions:
 
     @property
     def derived(self) -> list[tuple[int, NodeSeries]]:
-        """The series of nodes other than coordinates, with their numbers."""
+        """The series of all nodes except the coordinates, each with its number."""
         return [*enumerate(self.path.series)][self.program.dimension :]
 
     def blocks(self) -> dict[str, ir.Function]:
-        """Return the functions of the path by name; they have no parameters."""
+        """Return the blocks of statements of the path as functions without parameters, by name."""
         parts = (self.fixed, self.first, self.rules, self.slopes, self.nodes, self.field)
         return {part.__name__: ir.Function(part.__name__, "", Role.OTHER, (), part()) for part in parts}
 
     def fixed(self) -> ir.Block:
-        """Return the statements for the values that are constant along the path."""
+        """Return the statements that compute the values which are constant along the path."""
         reads = self.reads(self.path.fixed)
         return (*reads, *(ir.Assign(self.layout.fixed(i), _expanded(e)) for i, e in enumerate(self.path.fixed)))
 
     def first(self) -> ir.Block:
-        """Return the statements for the Taylor coefficients of order 0."""
+        """Return the statements that compute the Taylor coefficients of order 0 of all nodes except the coordinates."""
         layout, derived = self.layout, self.derived
         reads = self.reads(q.first for _, q in derived)
         return (*reads, *(layout.following(i, ZERO, _expanded(q.first)) for i, q in derived))
 
     def rules(self) -> ir.Block:
-        """Return the statements for the Taylor coefficients of order k ≥ 1."""
+        """Return the statements that compute the Taylor coefficients of order k ≥ 1 of all nodes except the
+        coordinates.
+        """
         reads = self.reads(factor for _, q in self.derived for _, factor in q.linear)
         return (*reads, *(self.layout.following(i, K, self._rule(q)) for i, q in self.derived))
 
     def slopes(self) -> ir.Block:
-        """Return the statements for the Taylor coefficients of order k + 1 of the coordinates."""
+        """Return the statements that compute the Taylor coefficients of order k + 1 of the coordinates from those
+        of ṁ.
+        """
         after, layout = ir.plus(K, 1), self.layout
         values = (
             ir.Binary("/", layout.order(derivative_index, K), ir.Cast(after, "real"))
@@ -106,17 +110,20 @@ class PathFunctions:
         return tuple(layout.following(i, after, value) for i, value in enumerate(values))
 
     def nodes(self) -> ir.Block:
-        """Return the statements that compute the values e of all nodes at one point."""
+        """Return the statements that compute the values of all nodes at one point m, in the array e."""
         reads = self.reads((q.first for _, q in self.derived), at_point=True)
         return (*reads, *(ir.Assign(ir.entry(E, i), _expanded(q.first)) for i, q in self.derived))
 
     def field(self) -> ir.Block:
-        """Return the statements that compute ṁ from the values e of the nodes."""
+        """Return the statements that compute ṁ at a point from the values of the nodes in the array e."""
         derivatives = (ir.entry(E, index) for index in self.path.slopes)
         return tuple(ir.Assign(ir.entry(FIELD, i), value) for i, value in enumerate(derivatives))
 
     def reads(self, expressions: Iterable[Expression], *, at_point: bool = False) -> list[ir.Statement]:
-        """Return the declarations of the symbols in expressions; series are read at one point, or at order 0."""
+        """Return the declarations of the symbols in expressions.
+
+        The value of a series is its coefficient of order 0 or, with ``at_point``, the value of its node in the array e.
+        """
         used = {*symbols_of(*expressions)}
         listed = {momentum(c): self.layout.covector(i) for i, c in enumerate(self.program.coordinates)}
         listed |= {coefficient(i): self.layout.coefficient(i) for i in range(self.program.step.coefficients)}
@@ -126,7 +133,9 @@ class PathFunctions:
         return [ir.in_place(s, place) for s, place in listed.items() if s in used]
 
     def linear(self, q: NodeSeries) -> ir.Value | None:
-        """Return the sum of the terms that are multiples of other series; None if there are none."""
+        """Return the sum of those terms of a recurrence that are multiples of another series; None if there are
+        none.
+        """
         total: ir.Value | None = None
         for index, factor in q.linear:
             term = self.layout.order(index, K)
@@ -143,14 +152,19 @@ class PathFunctions:
         return ir.Binary("/", ir.Grouped(total), self.layout.order(q.divisor, ZERO)) if q.divisor is not None else total
 
     def _sum(self, t: ConvolutionTerm) -> ir.Value:
-        """Return a convolution over orders, as a call of a function of the runtime."""
+        """Return a convolution, the sum over orders in a product of two series, as a call of a function of the
+        runtime.
+        """
         exponent = (_exponent(t),) if t.kind == "power" else ()
         return ir.Called(f"taylor_{t.kind}", (self.layout.series(t.a), self.layout.series(t.b), *exponent, K))
 
 
 def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Function]:
-    """Return three functions of a path: coefficients of order 0, coefficients of order k, and the field ṁ at a point
-    m."""
+    """Return three functions of a path: Taylor coefficients of order 0, those of order k, and the derivative ṁ at a
+    point m.
+
+    ``kind`` begins their names, and describes the path in comments.
+    """
     build, n = PathFunctions(program, path, PathLayout()), ir.Constant(program.dimension)
     series, orders = ir.Constant(len(path.series)), ir.Binary("+", ir.fixed("TERMS"), ir.Constant(1))
     values = ir.Vector(ir.Constant(max(1, len(path.fixed))))
@@ -181,12 +195,12 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
 
 
 def tangent_program(program: Program) -> Program:
-    """Return the program whose coordinates are those of the tangent path: the state and its variation."""
+    """Return the program with the coordinates of a tangent path: the state and its variation."""
     return replace(program, coordinates=(*program.coordinates, *map(variation, program.coordinates)))
 
 
 def adjoint_program(program: Program, path: PathAdjoint) -> Program:
-    """Return the program whose coordinates are those of the path in the reverse pass: the state and all cotangents."""
+    """Return the program with the coordinates of the path in the reverse pass: the state and all cotangents."""
     names = program.coordinates
     bars = [
         *map(cotangent, names),
@@ -200,8 +214,10 @@ def adjoint_program(program: Program, path: PathAdjoint) -> Program:
 
 
 class _LaneLayout(PathLayout):
-    """Places of the values of a path in a record e, in one lane; the series of its derivatives follow those of the
-    path."""
+    """The places of the values of a path in one lane of the record e.
+
+    The series that derivatives of the path need have the numbers after the series of the path.
+    """
 
     def __init__(self, path: Recurrences) -> None:
         self._series, self._fixed = len(path.series), len(path.fixed)
@@ -226,8 +242,10 @@ class _LaneLayout(PathLayout):
 
 
 def lane_functions(program: Program, path: Recurrences, slopes: PathSlopes, used: Sequence[int]) -> list[ir.Function]:
-    """Return the functions of a path and its derivatives in SIMD lanes; ``used`` are the coefficients to differentiate
-    by."""
+    """Return the functions of a path and of its derivatives in SIMD lanes.
+
+    ``used`` are the numbers of the coefficients with respect to which the path is differentiated.
+    """
     whole = Recurrences((*path.series, *slopes.series), path.slopes, (*path.fixed, *slopes.fixed))
     build = _LaneFunctions(PathFunctions(program, whole, _LaneLayout(path)))
     base, n = len(path.series), program.dimension
@@ -258,8 +276,8 @@ class _LaneFunctions:
     def follow(self, name: str, purpose: str, numbers: range) -> ir.Function:
         """Return the function for the Taylor coefficient of order k ≥ 1 of the series with these numbers.
 
-        It first adds the products of coefficients of orders j and k − j for 0 < j < k, then the other terms, which may
-        contain coefficients of order k.
+        It first adds the products of coefficients of orders j and k − j for 0 < j < k, then the remaining terms, which
+        may contain coefficients of order k.
         """
         layout, between, ends = self.path.layout, list[ir.Statement](), list[ir.Statement]()
         series = [(i, self.path.path.series[i]) for i in numbers]
@@ -282,10 +300,11 @@ class _LaneFunctions:
         return typed_function(name, f"{doc} terms", ("coef", "e", "k"), (*share, *body), _TYPES)
 
     def variation(self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, whose: str) -> ir.Function:
-        """Return the function that adds the product of ∂(π p)/∂m at order j and derivatives of the path at order k − j.
+        """Return the function that adds a product to derivatives of the path: ∂(π p)/∂m at order j, times these at
+        order k − j.
 
-        The derivatives are rows of ``width`` entries in the member ``array`` of e; ``whose`` describes them in the
-        comment.
+        The derivatives are matrices with ``width`` columns in the member ``array`` of e; ``whose`` describes them in
+        the comment.
         """
         statements = list[ir.Statement]()
         for e in jacobian:
@@ -307,7 +326,8 @@ class _LaneFunctions:
     ) -> ir.Function:
         """Return the function that adds ``entries``, at order k, to derivatives of the path.
 
-        Each is a triple: the index of the derivative, a factor, and an entry of ∂(π p)/∂m, π or ∂(π p)/∂c.
+        An entry is a triple: the index of the derivative, a factor, and an entry of ∂(π p)/∂m, π or ∂(π p)/∂c, where c
+        is a coefficient.
         """
         statements = [
             ir.Assign(_in_lane(ir.entry(TO, i)), ir.Binary("*", factor, self.path.layout.order(e.series, K)), adds=True)
@@ -325,7 +345,9 @@ def _of_order(
     statements: Sequence[ir.Statement],
     places: dict[ir.Name, ir.Value],
 ) -> ir.Function:
-    """Return the function whose ``statements`` add to order k + 1 of derivatives of the path, in a loop over lanes."""
+    """Return a function whose ``statements`` add to the order k + 1 of derivatives of the path, in a loop over
+    lanes.
+    """
     pointers = {**places, TO: ir.Entry(ir.Member(E, array), ir.plus(K, 1))}
     body = (
         ir.Declare(ir.Pointer(constant=False, lanes=True), tuple((n.symbol, place) for n, place in pointers.items())),
@@ -349,15 +371,16 @@ def _lanes(statements: Iterable[ir.Statement]) -> ir.Loop:
 
 
 def _over_lanes(statements: Sequence[ir.Statement]) -> Iterator[ir.Loop]:
-    """Yield loops over all lanes, each with at most `LONGEST_LOOP` of the statements."""
+    """Yield loops over all lanes that together have all ``statements``, each with at most `LONGEST_LOOP` of them."""
     for start in range(0, len(statements), LONGEST_LOOP):
         yield _lanes(statements[start : start + LONGEST_LOOP])
 
 
 def _orders(layout: PathLayout, t: ConvolutionTerm) -> tuple[ir.Value, list[ir.Value]]:
-    """Return a convolution (see `ConvolutionTerm`) in two parts: the summand of order j, and the terms with order 0.
+    """Return a convolution at order k (see `ConvolutionTerm`) as two parts: the summand of order j, and the end terms.
 
-    The summand contains a_j b_{k−j}; for some kinds, the caller multiplies the sum by 1/k.
+    The summand contains a_j b_{k−j} for 0 < j < k; for some kinds of convolutions, the caller multiplies the sum by
+    1/k. The end terms contain coefficients of order 0 and k.
     """
     a, b, real = layout.order(t.a, J), layout.order(t.b, ir.Binary("-", K, J)), ir.Cast(J, "real")
     last = (layout.order(t.a, K), layout.order(t.b, ZERO))

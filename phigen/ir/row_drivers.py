@@ -1,7 +1,8 @@
-"""Row drivers: functions that call the loops over sites for each row segment of a lattice.
+"""Row drivers: functions of the generated C that call the loops over sites for each row segment of a lattice.
 
-They are on the level of memory, for the lowering by rows. On a device that distributes row segments, the loop of the
-kind "segments" is mapped to threads.
+A row segment is a part of a row of sites; threads share the work by segments. The functions are on the level of memory,
+for the lowering by rows (`phigen.ir.passes.by_rows`). On a device that distributes row segments, loops of the kind
+"segments" are mapped to threads.
 """
 
 from __future__ import annotations
@@ -21,13 +22,14 @@ BEGIN, SECOND, THIRD, STOP, LOW, HIGH = (ir.fixed(name) for name in ("begin", "s
 SEGMENT = ir.Prefix("&", ROW)
 LENGTH, STATE = ir.Member(S, "length"), ir.Member(S, "x")
 
-#: Part of a row segment: its first site, and the site after its last; None for the whole segment.
+#: Sites of a row segment: the first site, and the site after the last one. None stands for all sites of the segment.
 Sites = tuple[ir.Value, ir.Value] | None
-#: Parts of a row segment: the sites away from open ends and boundary seams, and the sites near them, before and after.
+#: The sites of a row segment that are away from open ends and boundary seams; the sites near its begin; those near its
+#: end.
 AWAY, FIRST_SITES, LAST_SITES = (SECOND, THIRD), (BEGIN, SECOND), (THIRD, STOP)
 
-#: Number of sites of a SIMD vector. Loops that add in vectors begin at multiples of this number, and rows have room for
-#: whole vectors.
+#: Number of sites in a SIMD vector. Loops that add whole vectors begin at multiples of this number, and rows are padded
+#: to whole vectors.
 VECTOR = 8
 
 
@@ -38,10 +40,11 @@ def whole_vectors(count: ir.Value) -> ir.Value:
 
 @dataclass(frozen=True)
 class RowSegment:
-    """Statements for one row segment: a ``setup`` of its record, and ``calls`` of loops over its sites.
+    """Statements for one row segment: ``setup`` sets members of its record, and ``calls`` call the loops over its
+    sites.
 
-    ``orders`` are declarations that all segments share. ``updated`` are the numbers of the fields in ``arrays`` that
-    the calls change; the copies of the ends of their rows in the halo are updated afterwards.
+    ``orders`` are declarations that all segments share. The calls change the fields with the numbers ``updated`` among
+    the ``arrays``. After the calls, the ends of the rows of these fields are copied to the halo again.
     """
 
     calls: ir.Block
@@ -52,7 +55,7 @@ class RowSegment:
 
     @property
     def near_ends(self) -> bool:
-        """Whether the calls distinguish sites near open ends and seams from the other sites."""
+        """Whether the calls treat sites near open ends and seams in another way than all other sites."""
         return divides(self.calls)
 
 
@@ -60,9 +63,9 @@ class RowSegment:
 class RowDrivers:
     """Builder of the row drivers of a lattice.
 
-    ``halo`` is the number of sites in the halo on each side of a row. With ``may_be_empty``, segments may have no
-    sites. With ``one_loop``, one loop over row segments has a switch over the parts of H; otherwise each part has its
-    own loop.
+    ``halo`` is the number of sites in the halo on each side of a row. With ``may_be_empty``, there may be segments
+    without sites. With ``one_loop``, a driver has one loop over row segments, with a switch over the parts of H inside.
+    Otherwise the switch is outside, and each part has its own loop.
     """
 
     layout: RowLayout
@@ -82,12 +85,12 @@ class RowDrivers:
         alone: bool = False,
         vectors: bool = False,
     ) -> ir.Function:
-        """Return a function that processes row segments, by one of several cases.
+        """Return a function ``name`` that processes row segments by one of several ``cases``.
 
         The cases have the numbers 1, 2, …, or ``labels``; each is a `RowSegment` or a block of statements. By default,
-        the function processes the segments ``first`` … ``end`` − 1. With ``threads``, it processes all segments, by
-        several threads for lattices of more than ``threads`` sites. If ``alone``, it processes one segment, without a
-        loop. With ``vectors``, the parts near ends consist of whole SIMD vectors.
+        the function processes the segments ``first`` … ``end`` − 1. With ``threads``, it processes all segments, and
+        uses several threads for lattices of more than ``threads`` sites. If ``alone``, it processes a single segment,
+        without a loop. With ``vectors``, the sites near open ends are rounded up to whole SIMD vectors.
         """
         several = not alone and not threads
         range_names = ("first", "end") if several else ("unit",) * alone
@@ -107,8 +110,10 @@ class RowDrivers:
         return discard_unread(function)
 
     def _part_of_flow(self, *, switched: bool) -> Iterator[ir.Statement]:
-        """Yield the statement that determines the part of H of a flow; it also sets ``flow`` to the colour that the
-        flow updates."""
+        """Yield the statement that determines the part of H to which a flow of the schedule belongs.
+
+        The statement also replaces the variable ``flow`` by the colour that the flow updates.
+        """
         arguments = (S, ir.Prefix("&", FLOW))
         if switched:
             yield ir.Declare(ir.Type.FLAG, ((PART.symbol, ir.Called("part_of_flow", arguments)),))
@@ -121,8 +126,10 @@ class RowDrivers:
         return self.layout.row(ir.Entry(arrays, index))
 
     def copied_ends(self, arrays: ir.Value, number: int | ir.Value, *, near_ends: bool = False) -> ir.Call:
-        """Return the statement that copies the ends of a row to its halo. In lattices of several rows, a segment is a
-        whole row."""
+        """Return the statement that copies the ends of the row of a field to the halo of this row.
+
+        ``number`` is the number of the field in ``arrays``. In lattices of several rows, the segment is a whole row.
+        """
         begin, stop = (BEGIN, STOP) if near_ends else (FROM, TO)
         swept = (begin, stop) if self.layout.single_row else (ir.Constant(0), LENGTH)
         return ir.Call("ends", (self.first_of_row(arrays, number), LENGTH, *swept))
@@ -152,7 +159,7 @@ class RowDrivers:
 
 @dataclass(frozen=True)
 class _Driver:
-    """Builder of one driver, with the options of `RowDrivers.driver`."""
+    """Builder of one row driver; the fields are options of `RowDrivers.driver`."""
 
     drivers: RowDrivers
     threads: int
@@ -160,10 +167,10 @@ class _Driver:
     vectors: bool
 
     def over_segments(self, cases: Sequence[RowSegment | ir.Block], labels: Sequence[int]) -> ir.Block:
-        """Return the loop over row segments, or a switch over several such loops.
+        """Return the loop over row segments, or a switch over several loops of this kind.
 
-        If one loop serves all parts of H and the lattice is one open row, the ends are copied for all fields, since
-        only the segments at the ends read these copies.
+        If one loop serves all parts of H and the lattice is a single row with open ends, the ends of all fields are
+        copied to the halo after each case, since only the first and the last segment read these copies.
         """
         drivers, segments = self.drivers, [case for case in cases if isinstance(case, RowSegment)]
         copies = [[*self._copied_ends(case)] for case in segments]
@@ -186,7 +193,7 @@ class _Driver:
             yield self.drivers.copied_ends(case.arrays, field, near_ends=case.near_ends)
 
     def _segment(self, case: RowSegment) -> ir.Block:
-        """Return the loop over row segments with the statements of one case; () if the case has no calls."""
+        """Return the loop over row segments that executes the statements of one case; () if the case has no calls."""
         if not case.calls:
             return ()
         piece = ((ROW.symbol, ir.Called("piece_of", (S, UNIT))),)
@@ -203,29 +210,32 @@ class _Driver:
 
 
 def at(sites: Sites) -> ir.Value:
-    """Return the argument for a row segment, or for a part of it."""
+    """Return the argument by which a call receives a row segment, or the given sites of this segment."""
     return ir.Called("between", (SEGMENT, *sites)) if sites else SEGMENT
 
 
 def divides(calls: ir.Block) -> bool:
-    """Whether calls are for parts of a segment, such as the sites near open ends or seams."""
+    """Whether calls are for parts of a segment only, such as its sites near open ends or seams."""
     return not {SECOND.symbol, STOP.symbol}.isdisjoint(names_in(calls))
 
 
 def in_forms(blocks: dict[str, ir.Block]) -> ir.Block:
-    """Return a block that selects between the forms of functions by the flag ``far``; see `phigen.ir.passes.forms`."""
+    """Return a block that selects between functions for small and for all arguments by the flag ``far``.
+
+    ``blocks`` has a block for each suffix of `phigen.ir.passes.forms`; a single block is returned as it is.
+    """
     if len(blocks) == 1:
         return next(iter(blocks.values()))
     return (ir.If(FAR, blocks["_far"], blocks["_near"]),)
 
 
 def member(name: str, value: ir.Value) -> ir.Assign:
-    """Return the assignment to a member of the record of a segment."""
+    """Return the assignment of a value to the member ``name`` of the record of a row segment."""
     return ir.Assign(ir.Member(ROW, name), value)
 
 
 def _is_changed(body: ir.Block) -> bool:
-    """Whether statements change the record of a segment; calls for parts of the segment do."""
+    """Whether statements change the record of a row segment. Calls for parts of the segment also change it."""
     assigned = (a.target for s in statements(body) for a in (s.assignments if isinstance(s, ir.Together) else [s])
                 if isinstance(a, ir.Assign))  # fmt: skip
     between = any(isinstance(v, ir.Called) and v.name == "between" for v in values(body))

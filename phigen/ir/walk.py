@@ -12,7 +12,7 @@ from phigen.symbolic.expression import Expression, symbols_of
 
 
 def statements(body: ir.Block) -> Iterator[ir.Statement]:
-    """Yield all statements, each before the statements in its blocks."""
+    """Yield all statements of a block. Each statement comes before the statements inside it."""
     for s in body:
         yield s
         for inner in blocks(s):
@@ -32,7 +32,7 @@ def blocks(s: ir.Statement) -> tuple[ir.Block, ...]:
 
 
 def map_blocks(function: ir.Function, change: Callable[[ir.Block], Iterable[ir.Statement]]) -> ir.Function:
-    """Return the function with ``change`` applied to each block, to inner blocks first."""
+    """Return the function with ``change`` applied to each of its blocks; inner blocks are changed first."""
 
     def visit(body: ir.Block) -> ir.Block:
         return tuple(change(tuple(_with_body(s, visit) for s in body)))
@@ -57,7 +57,7 @@ def _fields(kind: type) -> tuple[str, ...]:
 
 
 def values(node: Any) -> Iterator[Any]:
-    """Yield a node and all statements and values inside it; expressions are not divided."""
+    """Yield a node, and all statements and values inside it. Expressions are yielded as a whole."""
     rest = [node]
     while rest:
         one = rest.pop()
@@ -71,7 +71,7 @@ def values(node: Any) -> Iterator[Any]:
 
 
 def names_in(node: Any) -> set[str]:
-    """Return all names and symbols that are read in a node."""
+    """Return all names of variables and all symbols of expressions that a node reads."""
     parts = [*values(node)]
     symbols = symbols_of(*(v for v in parts if isinstance(v, Expression)))
     return {*symbols, *(v.symbol for v in parts if isinstance(v, ir.Name))}

@@ -1,9 +1,9 @@
 """The parts of a program that are computed in SIMD lanes.
 
-A lane is one of `LANES` points at which kernels are evaluated together. For implicit steps, an integration solves a
-block of `LANES` steps together, and an ensemble solves a group of members. Members with explicit steps form batches
-(packs) of `LANES` members. This stage decides whether lanes are possible and fit on the stack, and which kernels they
-need; targets print these kernels.
+A lane is one of `LANES` points at which kernels are evaluated together. If steps are implicit, `LANES` consecutive
+steps of an integration are solved together as a *block*, and members of an ensemble as a *group*. If steps are
+explicit, `LANES` members of an ensemble form a batch, called a *pack*. This module decides whether lanes are possible
+and fit on the stack, and which kernels they need. Targets print these kernels.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ from phigen.scheme.steps import Explicit, Factorisation, Gauss, Newton, Path, Pa
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import SPECIAL
 
-#: Number of points at which a kernel in lanes is evaluated: the doubles in one vector of AVX-512.
+#: Number of lanes: the number of doubles in one vector of AVX-512.
 LANES = 8
 
-#: Largest size of the working arrays of a block or a group of members, half of the 512 KiB that macOS gives threads as
-#: stack.
+#: Largest size of the working arrays of a block or a group of members. It is half of the 512 KiB that a thread has as
+#: stack on macOS.
 MAX_STACK_BYTES = 256 * 1024
 
-#: Largest number of packs in a group, the same as in the runtime.
+#: Largest number of packs in a group, which must equal that of the runtime.
 PACKS_PER_GROUP = 4
 
-#: Number of arrays over stages and unknowns for a batch of members of a Gauss step: the unknowns, and increments of
-#: three steps.
+#: Number of arrays (stages × unknowns) that a batch of members needs for a Gauss step: the unknowns, and the increments
+#: of three steps.
 MEMBER_BATCHES = 4
 
-#: Largest number of stages for which members are integrated in batches. The second limit applies if kernels call
-#: functions and sweeps of a single trajectory iterate the momenta only, since sweeps of a batch iterate all unknowns.
-#: Time in batches relative to single members: Kowalevski top 1.13 with eight stages, 0.85 with six; two pendulums 1.15
-#: with four stages, 0.6 with two.
+#: Largest number of stages for which members of an ensemble are integrated in batches. The second limit applies if
+#: kernels call functions and a single trajectory iterates only over its momenta, since a batch iterates over all
+#: unknowns. Measured time in batches, relative to members one by one: Kowalevski top 1.13 with eight stages, 0.85 with
+#: six; two pendulums 1.15 with four stages, 0.6 with two.
 MAX_BATCHED_STAGES, MAX_BATCHED_STAGES_WITH_FUNCTIONS = 6, 3
 
 _DOUBLE = 8
@@ -56,10 +56,10 @@ _DOUBLE = 8
 
 @dataclass(frozen=True)
 class LaneKernel:
-    """Kernel in lanes; inputs that are ``shared`` have one value for all lanes.
+    """Kernel that is evaluated in all lanes; inputs that are ``shared`` have one value for all lanes.
 
-    A ``single`` kernel is evaluated at one lane, and its outputs are numbers. A ``sparse`` kernel does not store
-    entries that are always zero.
+    A ``single`` kernel is evaluated for one lane only, and its outputs are numbers. A ``sparse`` kernel does not store
+    outputs that are always zero.
     """
 
     kernel: Kernel
@@ -70,12 +70,12 @@ class LaneKernel:
 
 @dataclass(frozen=True)
 class Blocks:
-    """Implicit steps that are solved together, in blocks of steps or groups of members.
+    """Implicit steps that are solved together: consecutive steps of a trajectory, or a group of members.
 
-    ``calls`` are the functions that the kernels call. The loops are ``vectorised`` if none of these is a library
-    function. ``factors`` are the factors of a sparse Newton matrix, which replace its inverse. ``path`` has the
-    derivatives of paths, with at most ``slope_terms`` terms. ``room`` is the number of values in each lane that a group
-    of members needs, without the values of predictors.
+    ``calls`` are the functions that the kernels call. The loops are ``vectorised`` if the kernels call no library
+    function. ``factors`` are the factors of a sparse Newton matrix, which take the place of its inverse. ``path`` has
+    the derivatives of paths, whose Taylor series have at most ``slope_terms`` terms. ``room`` is the number of values
+    in each lane that a group of members needs, without the values of predictors.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -87,18 +87,21 @@ class Blocks:
     slope_terms: int = 0
 
     def grouped(self, stored: int) -> bool:
-        """Whether members are integrated in groups, if the predictor of each member has ``stored`` values."""
+        """Whether members are integrated in groups, that is, whether a group fits on the stack.
+
+        ``stored`` is the number of values of the predictor of each member.
+        """
         return _DOUBLE * LANES * (self.room + stored) <= MAX_STACK_BYTES
 
 
 @dataclass(frozen=True)
 class Packs:
-    """Members of an ensemble with explicit steps, one in each lane.
+    """Members of an ensemble with explicit steps, in batches with one member in each lane.
 
-    ``kernels`` are those of a step, or of the flows of a splitting. ``small_argument`` are the functions with a form
-    for small arguments, a polynomial, beyond whose range the full-range form is called. ``transposes`` are the
-    transposed kernels if cotangents are pulled back in lanes too; then the reverse pass takes ``reverse_packs`` batches
-    of members together. If states are ``recomputed``, a transpose computes the state before a flow by the inverse flow.
+    ``kernels`` are the kernels of a step, or of the flows of a splitting. ``small_argument`` are the functions that
+    have a polynomial for small arguments; beyond its range, a version for all arguments is called. ``transposes`` are
+    the transposed kernels if cotangents are pulled back in lanes too. Then the reverse pass takes ``reverse_packs``
+    batches of members together. If ``recomputed``, a transpose computes the state before a flow by the inverse flow.
     """
 
     kernels: tuple[Kernel, ...]
@@ -111,10 +114,11 @@ class Packs:
 
 @dataclass(frozen=True)
 class Rows:
-    """Sites of a lattice, which are consecutive in rows; ``small_argument`` is as in `Packs`.
+    """Sites of a row of a lattice as lanes. ``calls`` are the functions that loops over sites call.
 
-    ``limited`` are functions in flows and stages that have no value at very large arguments: those with a form for
-    small arguments, and those with a vector version.
+    ``small_argument`` are the functions that have a polynomial for small arguments. ``limited`` are the functions in
+    flows and stages whose fast versions fail at very large arguments: those with a polynomial, and those with a vector
+    version.
     """
 
     calls: frozenset[str]
@@ -128,9 +132,11 @@ class Rows:
 
 @dataclass(frozen=True)
 class Traces:
-    """Paths in lanes for the reverse pass of an integration step by step; the other fields are as in `Blocks`.
+    """Paths in lanes, for the reverse pass of an integration that takes one step at a time.
 
-    ``narrow`` says that half the number of lanes is used, since all lanes would need too much stack.
+    ``narrow`` says that half the number of lanes is used, since all lanes would need too much stack. ``calls`` are the
+    functions that the kernels call, and ``path`` has the derivatives of paths with at most ``slope_terms`` Taylor
+    terms.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -142,10 +148,11 @@ class Traces:
 
 @dataclass(frozen=True)
 class Stages:
-    """The stages of a Gauss method, one in each lane; ``narrow`` says that half the number of lanes suffices.
+    """The stages of a Gauss method, one in each lane. ``narrow`` says that half the number of lanes is enough for the
+    stages.
 
-    ``batched`` are the kernels for batches of members of an ensemble, one member in each lane; () if members are
-    integrated one by one.
+    ``batched`` are the kernels for batches of members of an ensemble, with one member in each lane. It is () if members
+    are integrated one by one.
     """
 
     kernels: tuple[LaneKernel, ...]
@@ -172,30 +179,31 @@ def in_lanes(program: Program) -> Lanes | None:
 
 
 def _is_lowered(program: Program) -> bool:
-    """Whether several steps or members may be computed together in lanes.
+    """Whether several steps of a trajectory, or several members, may be computed together in lanes.
 
-    With noise, the coefficients differ from step to step, so that predictors from earlier steps fail. If H depends on
-    the time, coefficients differ too, and the members of a pack could not share them.
+    With noise, coefficients differ from step to step, so that predictors from earlier steps fail. If H depends on the
+    time, coefficients differ as well, and the members of a batch could not share them.
     """
     dated = program.time and (program.monitor or not program.step.kind.implicit)
     return program.lanes and program.offers("lanes") and not program.noise and not dated
 
 
 def _of_newton(program: Program, step: Newton) -> Blocks | None:
-    # Predictors of blocks are recurrences.
+    # The predictors of blocks of steps are recurrences, so the target must have these.
     return _newton(program, step) if _is_lowered(program) and program.offers("recurrences") else None
 
 
 def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
-    """Return blocks of steps if several steps can share lanes.
+    """Return blocks of steps if several steps can be solved together.
 
-    Otherwise return the paths in the reverse pass, in double precision only; None if these are not in lanes either.
+    Otherwise return the paths for the reverse pass, which are in lanes in double precision only; None if they are not
+    in lanes.
     """
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
         blocks = _paths(program, step, step.lanes)
     if blocks or program.single or not program.lanes:
-        return blocks  # lanes hold numbers of 64 bits
+        return blocks  # each number in a lane has 64 bits
     return _traces(program, step)
 
 
@@ -212,7 +220,7 @@ def _of_splitting(program: Program, step: Splitting) -> Packs | None:
     packs = _packs(program, step.flows)
     if packs is None:
         return None
-    segment_bytes = 2 * _DOUBLE * LANES**2 * program.dimension  # the stored states of one pack
+    segment_bytes = 2 * _DOUBLE * LANES**2 * program.dimension  # the stored states of one batch of members
     if inverse_transposes := recomputing_transposes(program, step):
         packs = _with_transposes(program, replace(packs, recomputed=True), inverse_transposes, 0)
     else:
@@ -228,8 +236,8 @@ def _of_gauss(program: Program, step: Gauss) -> Stages | None:
 def _rows(program: Program, step: Sweeps) -> Rows:
     """Return the lanes of a lattice.
 
-    Most vector versions and small-argument forms are used in the profile fast only. Observables are evaluated rarely
-    and call libm, whose functions accept any argument.
+    Polynomials for small arguments, and most vector versions of functions, are used only in the profile ``fast``.
+    Observables are evaluated rarely, so they call libm, whose functions accept any argument.
     """
     swept = [sweep.kernel for part in step.parts for sweep in part]
     swept += step.equation.kernels if step.equation else ()
@@ -238,7 +246,7 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     reverse_coefficients = (step.adjoint.prepare, step.adjoint.refresh) if step.adjoint else ()
     of_coefficients = {
         id(kernel) for kernel in (step.prepare, step.refresh, *reverse_coefficients)
-    }  # The loops of these kernels run over coefficients, not over sites.
+    }  # The loops of these kernels are over coefficients, not over sites.
     looped = [
         kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
     ]
@@ -249,7 +257,7 @@ def _rows(program: Program, step: Sweeps) -> Rows:
         return Rows(with_formulas(operations(looped) & set(FULL_RANGE_FUNCTIONS)), (), frozenset())
     called_with_forms = _called_in_forms(step)
     called = operations(swept) & called_with_forms
-    # Transposes call the derivatives of these functions at the same small arguments.
+    # Transposes call the derivatives of these functions at the same small arguments. Their names end with 1.
     called |= {f for f in SMALL_ARGUMENT_FUNCTIONS if f in called_with_forms and f.removesuffix("1") in called}
     small_argument = tuple(f for f in (*SMALL_ARGUMENT_FUNCTIONS, *SPECIAL) if f in called) if program.lanes else ()
     limited = frozenset({*small_argument, *LANE_FUNCTIONS, *LANE_FORMULAS} & called)
@@ -257,7 +265,8 @@ def _rows(program: Program, step: Sweeps) -> Rows:
 
 
 def _called_in_forms(step: Sweeps) -> set[str]:
-    """Return the functions that are called by kernels with loops in two forms: for small arguments, and full-range.
+    """Return the functions that are called by kernels whose loops have two forms: for small arguments, and for all
+    arguments.
 
     Derivatives of a stage along variations, and transposes of sums over bonds or pairs, have one form only.
     """
@@ -268,9 +277,9 @@ def _called_in_forms(step: Sweeps) -> set[str]:
 
 
 def _stages(program: Program, step: Gauss) -> Stages:
-    """Return the kernels of the vector field of a Gauss method at all stages, in lanes, with their transposes.
+    """Return the kernels of the vector field of a Gauss method, with one stage in each lane, and their transposes.
 
-    All lanes share the values at the start of the step.
+    All lanes share the state at the start of the step.
     """
     kernels = [LaneKernel(step.slope, ("coef", "x"))]
     kernels += [LaneKernel(step.frame, ("coef", "x", "z"))] if step.frame else []
@@ -283,9 +292,9 @@ def _stages(program: Program, step: Gauss) -> Stages:
 
 
 def _batched_stages(program: Program, step: Gauss) -> tuple[LaneKernel, ...]:
-    """Return the kernels of a Gauss step for members in lanes.
+    """Return the kernels of a Gauss step for batches of members, with one member in each lane.
 
-    Returns () if single members are faster, or if the arrays would need too much stack.
+    Returns () if members one by one are faster, or if the arrays of a batch would need too much stack.
     """
     arrays = MEMBER_BATCHES * step.tableau.stages * step.unknowns + 6 * program.dimension
     if _DOUBLE * LANES * arrays > MAX_STACK_BYTES:
@@ -356,12 +365,12 @@ def _traces(program: Program, step: Path) -> Traces | None:
 
 
 def _elapsed(program: Program) -> list[LaneKernel]:
-    """Return the kernel for the physical time of the steps of a block, if there is a monitor; else []."""
+    """Return the kernel of the physical time that a step takes, if there is a monitor; else []."""
     return [LaneKernel(program.monitor.elapsed)] if program.monitor and program.monitor.elapsed else []
 
 
 def _turns(program: Program) -> list[LaneKernel]:
-    """Return the kernels of the group elements whose product is the attitude."""
+    """Return the kernels of the attitude increments of a step: group elements, whose product is the attitude."""
     attitude = program.attitude
     if attitude is None or attitude.turn is None:
         return []
@@ -370,7 +379,11 @@ def _turns(program: Program) -> list[LaneKernel]:
 
 
 def _packs(program: Program, kernels: Sequence[Kernel]) -> Packs | None:
-    """Return packs of members; None if members have different coefficients or a function has no vector version."""
+    """Return batches of members with one member in each lane.
+
+    Returns None if members have different coefficients, if a function has no vector version, or if the arrays do not
+    fit on the stack.
+    """
     ops = operations(kernels)
     states = 2 * PACKS_PER_GROUP * LANES * 3 * program.dimension
     if program.step.corrected:
@@ -383,8 +396,9 @@ def _packs(program: Program, kernels: Sequence[Kernel]) -> Packs | None:
 def _with_transposes(program: Program, packs: Packs, transposes: Sequence[Kernel], stored: int) -> Packs:
     """Return the packs with transposes, if these can be computed in lanes too; else the packs unchanged.
 
-    ``stored`` is the number of bytes of stored states for one pack; it grows with the square of the number of packs.
-    ``reverse_packs`` becomes the largest number for which they fit on the stack.
+    ``stored`` is the number of bytes of the stored states for one pack. For several packs, the size of the stored
+    states grows as the square of their number. ``reverse_packs`` becomes the largest number of packs whose states fit
+    on the stack.
     """
     transposes = transposes if program.offers("members") else ()
     ops = operations(transposes)
@@ -397,21 +411,24 @@ def _with_transposes(program: Program, packs: Packs, transposes: Sequence[Kernel
 
 
 def _block(program: Program, more: int = 0, once: int = 0) -> int:
-    """Return the bytes of a block on the stack: ``more`` additional values for each stage, and ``once`` for all, in
-    each lane."""
+    """Return the number of bytes that a block of steps needs on the stack.
+
+    In each lane there are ``more`` additional values for each stage, and ``once`` additional values for all stages
+    together.
+    """
     n = program.dimension
     each = program.step.coefficients + 4 * n + 3 * n * n + more
     return _DOUBLE * LANES * (len(program.fractions) * each + once)
 
 
 def _group(program: Program) -> int:
-    """Return the number of values in each lane for a group of members."""
+    """Return the number of values in each lane that a group of members needs, without additional values of paths."""
     n = program.dimension
     return len(program.fractions) * program.step.coefficients + 7 * n + 3 * n * n
 
 
 def _without(kernel: Kernel, *names: str) -> Kernel:
-    """Return the kernel without the inputs and outputs of these names."""
+    """Return the kernel without the inputs and outputs that have one of these names."""
     inputs = {name: symbols for name, symbols in kernel.inputs.items() if name not in names}
     return replace(kernel, inputs=inputs, outputs=tuple(o for o in kernel.outputs if o.name not in names))
 
@@ -424,7 +441,7 @@ def _without_matrices(kernel: Kernel) -> Kernel:
     return replace(kernel, name="evaluate", outputs=outputs, named=named)
 
 
-#: For each kind of step, the function that finds its parts in lanes; other kinds have none.
+#: The function that finds the parts in lanes, for each kind of step that has such parts.
 LOWERINGS: Mapping[str, Callable[[Program, Any], Lanes | None]] = {
     "newton": _of_newton,
     "explicit": _of_explicit,

@@ -1,6 +1,6 @@
-"""Transposes of flows that recompute the state before a flow by the inverse flow, from the state after it.
+"""Transposes of flows that recompute the state before a flow from the state after it, by the inverse flow.
 
-With these, the reverse pass of members stores few states.
+With these transposes, the reverse pass of members of an ensemble stores few states.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from phigen.symbolic.expression import ZERO, symbol, symbols_of
 
 
 def recomputing_transposes(program: Program, step: Splitting) -> tuple[Kernel, ...]:
-    """Return transposes of flows that read the state after a flow, and also output the state before it, `STATE_BEFORE`.
+    """Return transposes of flows that read the state after a flow, and that also output the state before it,
+    `STATE_BEFORE`.
 
-    Returns () if there are forces, or if coefficients for the step −h differ from those for h by more than signs.
+    Returns () if there are forces, or if coefficients for the step −h differ from those for h by more than their signs.
     """
     transposes, parities = step.adjoint.steps if step.adjoint else (), of_coefficients(step)
     coefficients = {s for flow in step.flows for s in symbols_of(*flow.roots)}

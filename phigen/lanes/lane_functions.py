@@ -1,4 +1,4 @@
-"""Functions that a loop over SIMD lanes can call and still be compiled to vector instructions."""
+"""Elementary functions in loops over SIMD lanes: those with which a compiler can still vectorise a loop."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ from phigen.scheme.lowering import expand_powers
 from phigen.symbolic.expression import Expression, topological
 from phigen.symbolic.functions import FUNCTIONS
 
-#: Functions with a vector version, and functions that are formulas of these, with the formula.
+#: Functions with a vector version, and functions that are formulas in such functions, with their formulas.
 LANE_FUNCTIONS = tuple(f.name for f in FUNCTIONS.values() if f.lanes == f.name)
 LANE_FORMULAS = {f.name: f.lanes for f in FUNCTIONS.values() if f.lanes not in ("", f.name)}
 
-#: Functions with a small-argument form, a polynomial, for flows: those that phigen defines, then those of libraries.
+#: Functions for which flows have a polynomial for small arguments: first those that phigen defines, then those of
+#: libraries.
 SMALL_ARGUMENT_FUNCTIONS = tuple(
     f.name for f in sorted(FUNCTIONS.values(), key=lambda f: (f.written and f.name) or "") if f.near
 )
 
-#: Functions with a vector version for all arguments, or for |u| ≤ 10⁸ (sin and cos, whose reduction modulo π is exact
-#: up to there). The vector versions of exp beyond 700 and of log at 0 fail.
+#: Functions with a vector version for all arguments; for sin and cos, for all |u| ≤ 10⁸, since their reduction modulo π
+#: is exact up to there. The vector versions of exp beyond 700 and of log at 0 fail.
 FULL_RANGE_FUNCTIONS = (*SMALL_ARGUMENT_FUNCTIONS, "cos")
 
-#: Exponents of powers that remain after lowering and need no function.
+#: Exponents of powers that remain after lowering, and that need no library function.
 _ARITHMETIC = (Fraction(2), Fraction(-1), Fraction(1, 2))
 
 
 def operations(kernels: Iterable[Kernel]) -> set[str]:
-    """Return the operations in kernels: names of arithmetic operations and functions."""
+    """Return the names of all operations in kernels: arithmetic operations and functions."""
     return {e.op for e in topological(roots_of(kernels))}
 
 
@@ -38,18 +39,19 @@ def roots_of(kernels: Iterable[Kernel]) -> list[Expression]:
 
 
 def with_formulas(ops: Set[str]) -> frozenset[str]:
-    """Return the operations, and the vector functions that their formulas call."""
+    """Return the operations ``ops``, together with the vector functions that their formulas call."""
     called = (f for f in LANE_FUNCTIONS for op in ops & set(LANE_FORMULAS) if f"{{{f}}}" in LANE_FORMULAS[op])
     return frozenset({*ops, *called})
 
 
 def library_calls(ops: Set[str]) -> set[str]:
-    """Return the operations that are functions of the library without a vector version, which are called lane by
-    lane."""
+    """Return the operations that are library functions without a vector version. They are called for each lane
+    separately.
+    """
     known = {*LANE_FUNCTIONS, *LANE_FORMULAS}
     return {f.name for f in FUNCTIONS.values() if f.name in ops and f.written and not f.inline} - known
 
 
 def library_powers(kernels: Iterable[Kernel]) -> bool:
-    """Return whether a power needs a function of the library."""
+    """Whether a power in the kernels needs a library function."""
     return any(e.op == "pow" and e.value not in _ARITHMETIC for e in topological(expand_powers(roots_of(kernels))))

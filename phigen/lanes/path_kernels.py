@@ -1,7 +1,7 @@
-"""Kernels of steps along Karasev's paths with the Taylor series of several paths in SIMD lanes, one path each.
+"""Kernels of steps along Karasev's paths in SIMD lanes, with one path in each lane.
 
-A path is the solution of ṁ = π(m)p about its mean (docs/mathematics.md). The bytes of stack that its series need are
-counted here too.
+A path is the solution of ṁ = π(m)p about its mean (docs/mathematics.md); it is computed by Taylor series. This module
+also counts the values on the stack that the series need.
 """
 
 from __future__ import annotations
@@ -14,18 +14,21 @@ from phigen.scheme.steps import Path, PathAdjoint, PathLanes
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
 
-#: Largest number of Taylor terms of a path about its middle, the same as in the runtime.
+#: Largest number of Taylor terms of a path about its middle, which must equal that of the runtime.
 MAX_TERMS = 16
 
-#: Numbers of Taylor terms of derivatives to try, without and with a reverse pass; the first that fits on the stack is
-#: used.
+#: Numbers of Taylor terms to try for the derivatives of paths, without a reverse pass and (in SLOPE_TERMS_BACK) with
+#: one. The first number whose series fit on the stack is used.
 SLOPE_TERMS = (12, 8)
 SLOPE_TERMS_BACK = (MAX_TERMS, 12, 8)
 
 
 def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> tuple[int, int]:
-    """Return two numbers of additional values on the stack in each lane: for each stage of a step, and for an
-    expansion."""
+    """Return the numbers of additional values that paths need on the stack in each lane.
+
+    The first number is for each stage of a step, the second for one Taylor expansion with derivatives of
+    ``slope_terms`` terms.
+    """
     n, path, used = (
         dimension,
         step.recurrences,
@@ -37,19 +40,21 @@ def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> t
 
 
 def kernels(step: Path, lanes: PathLanes, coordinates: Sequence[str]) -> list[Kernel]:
-    """Return the kernels for blocks of steps."""
+    """Return the kernels that blocks of steps along paths need."""
     momentum = Kernel("momentum", "p = grad S_h(y)", lanes.curvature.inputs, lanes.curvature.outputs[:1])
     curvature, *further = traced(step, lanes.slopes, lanes.curvature, coordinates)
     return [curvature, momentum, *further, lanes.along_mean, lanes.invert]
 
 
 def back(path: PathAdjoint) -> list[Kernel]:
-    """Return the additional kernels for transposed steps."""
+    """Return the additional kernels that the reverse pass along paths needs."""
     return [path.slope]
 
 
 def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Sequence[str]) -> list[Kernel]:
-    """Return the kernels of expansions: p = ∇S_h with its derivative, and the coefficients of order 0 of all series."""
+    """Return the kernels of a Taylor expansion: p = ∇S_h with its derivative, and the coefficients of order 0 of all
+    series.
+    """
     path = step.recurrences
     coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
     values = _resolved(path.series, path.fixed, {})
@@ -78,7 +83,7 @@ def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Seque
 
 
 def _symbols(kind: str, values: Sequence[object]) -> tuple[Symbol, ...]:
-    """Return symbols of a kind, numbered from 0, one for each value."""
+    """Return a symbol of a kind for each of ``values``, numbered from 0."""
     return tuple(Symbol(kind, i) for i in range(len(values)))
 
 
@@ -89,9 +94,10 @@ def _resolved(
     first: int = 0,
     first_fixed: int = 0,
 ) -> tuple[tuple[Expression, ...], tuple[Expression, ...]]:
-    """Return the coefficients of order 0 of series, and constant values, as expressions in the ``known`` symbols.
+    """Return coefficients of order 0 of series, and values that are constant along a path, in terms of the ``known``
+    symbols.
 
-    ``first`` and ``first_fixed`` are the numbers of the first of these series and values.
+    ``first`` and ``first_fixed`` are the number of the first series and the number of the first constant value.
     """
     values_by_symbol = dict(known) | {Symbol(FIXED, first_fixed + i): e for i, e in enumerate(fixed)}
     values = []

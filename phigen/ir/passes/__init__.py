@@ -1,1 +1,1 @@
-"""Passes of the loop IR: pure functions from functions of the IR to functions of the IR."""
+"""Passes of the loop IR: each pass is a pure function that returns a changed function of the generated code."""

@@ -1,5 +1,7 @@
-"""Lowering by rows: functions run over a row segment, with pointers to its row and to the neighbouring rows of each
-array."""
+"""Lowering by rows, for C: functions run over the sites of a row segment.
+
+They receive pointers to the row of the segment and to the neighbouring rows of each array.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +13,14 @@ from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.nodes import Storage
 from phigen.symbolic.symbols import Symbol
 
-#: Indices of the site of the loop, of the other site of a bond or pair, and of the bond. The sign of the direction of
-#: the bond, and the record of the row segment.
+#: Variables of loops: the index of the site, the index of the other site of a bond or pair, the index of the bond, the
+#: direction of the bond (1 or −1), and the record of the row segment.
 SITE, OTHER, BOND, SIDE, ROW = (ir.fixed(name) for name in ("i", "j", "k", "side", "row"))
 SOLVER, AT_BONDS = ir.Member(ROW, "s"), ir.Member(ir.Member(ROW, "s"), "at_bonds")
 FROM, TO, LENGTH = ir.Member(ROW, "from"), ir.Member(ROW, "to"), ir.Member(SOLVER, "length")
 
 READ, WRITTEN = ir.Pointer(constant=True, restricted=True), ir.Pointer(constant=False, restricted=True)
-#: Member of the row record with the arrays of each kind of storage.
+#: Member of the row record that has the arrays, for each kind of storage.
 _MEMBERS = {Storage.STATE: "x", Storage.VARIATION: "varied", Storage.START: "start", Storage.OUTPUT: "out"}
 
 
@@ -26,8 +28,8 @@ _MEMBERS = {Storage.STATE: "x", Storage.VARIATION: "varied", Storage.START: "sta
 class RowLayout:
     """Layout of a lattice in rows.
 
-    ``lines`` are the rows that functions read, by their offsets from the row of the loop. ``members`` maps parameters
-    to their names in ``params``.
+    ``lines`` are the offsets of the rows that functions read from the row of the loop. ``members`` maps parameters to
+    the names of their members in the record ``params``.
     """
 
     lattice: LatticeLoops
@@ -46,28 +48,32 @@ class RowLayout:
         return next(k for k in range(1, sites.colours + 1) if k * sites.weights[-1] % sites.colours == 0)
 
     def line(self, offset: Sequence[int]) -> int:
-        """Return the number in ``lines`` of the row of a neighbour."""
+        """Return the index in ``lines`` of the row in which the neighbour at an ``offset`` lies."""
         return self.lines.index(tuple(offset[:-1])) if any(offset) else 0
 
     def place(self, line: int) -> str:
-        """Return the position of row ``line`` relative to the row of the loop, as text for a comment."""
+        """Return the position of row ``line`` relative to the row of the loop, such as "i + 1", as text for a
+        comment.
+        """
         axes = zip(self.lattice.step.sites.axes, self.lines[line], strict=False)
         return ", ".join(f"{axis} {'+' if o > 0 else '-'} {abs(o)}" for axis, o in axes if o)
 
     def row(self, arrays: ir.Value, line: int = 0, rows: str = "at") -> ir.Value:
-        """Return the address of row ``line`` in an array; the member ``rows`` of the segment has the offsets of the
-        rows."""
+        """Return the address of row number ``line`` in an array.
+
+        The member ``rows`` of the row record has the offset of each row in memory.
+        """
         return arrays if self.single_row else ir.Binary("+", arrays, ir.entry(ir.Member(ROW, rows), line))
 
 
 @dataclass(frozen=True)
 class Reading:
-    """Options of `RowDeclarations`: how a function accesses arrays.
+    """Options of `RowDeclarations`, which say how a function accesses arrays.
 
-    ``updated`` are the fields that it writes. ``seeds`` are the arrays of cotangents of each kind. With ``local``, the
-    function sums over the bonds of a site in local variables. ``here`` is the end of the bond or pair at the site of
-    the loop. ``at_bonds`` are the parameters at bonds, of which the ``oriented`` ones change their sign when seen from
-    the end b.
+    ``updated`` are the fields that it writes. ``seeds`` maps kinds of cotangents to the arrays that contain them. With
+    ``local``, the function sums over the bonds of a site in local variables. ``here`` is the end of the bond or pair at
+    which the site of the loop lies. ``at_bonds`` is the array of parameters at bonds; the ``oriented`` ones have the
+    opposite sign for the site at the end b.
     """
 
     updated: frozenset[str] = frozenset()
@@ -80,9 +86,10 @@ class Reading:
 
 @dataclass
 class RowDeclarations:
-    """Declarations of the values that a function reads, sorted by place.
+    """Declarations of the values that a function reads, sorted by the place where they are printed.
 
-    They belong before the loop over sites, to the site, or to the other end of a bond or pair.
+    The places are before the loop over sites, at its beginning, and inside an inner loop over the other ends of bonds
+    or pairs.
     """
 
     layout: RowLayout
@@ -98,8 +105,10 @@ class RowDeclarations:
     computed: list[ir.Statement] = field(default_factory=list)
 
     def read(self, body: Iterable[ir.Statement]) -> RowDeclarations:
-        """Add the declarations in some statements, and return this object; declarations of temporaries go to
-        ``computed``."""
+        """Record the declarations among some statements, and return this object.
+
+        Declarations of temporaries are recorded in ``computed``.
+        """
         for s in body:
             match s:
                 case ir.Declare(items=((name, value),)):
@@ -174,7 +183,7 @@ class RowDeclarations:
                     self._at_end(name, pointer, load)
 
     def _at_end(self, name: str, pointer: ir.Value, load: ir.Load) -> None:
-        """Add the declaration of a value at the site of the loop, or at the other end of a bond or pair."""
+        """Record the declaration of a value at the site of the loop, or at the other end of a bond or pair."""
         if not load.end:
             self.loaded[name] = ir.Entry(pointer, SITE)
         elif load.end == self.reading.here:
@@ -192,7 +201,7 @@ class RowDeclarations:
             self._once(name, local_name, in_row)
             return
         in_open_rows: ir.Value = ir.Constant(1.0)
-        if not self.layout.single_row:  # Read before the loop; gcc does not vectorise a loop with this access.
+        if not self.layout.single_row:  # before the loop, since gcc does not vectorise a loop with this access
             in_open_rows = ir.fixed(f"there{value.number}")
             self.once.append((in_open_rows.symbol, in_row))
         condition = tests[0] if len(tests) == 1 else ir.Binary("and", *tests)
@@ -216,11 +225,11 @@ class RowDeclarations:
         self.starts.setdefault(pointer.symbol, (kind, row))
 
     def pointer(self, base: str, line: int = 0) -> ir.Name:
-        """Return the pointer to row ``line`` of an array of the state, which is declared if it is new."""
+        """Return the pointer to row ``line`` of the array ``base`` of the state. It is declared at its first use."""
         return self.rows.setdefault((base, line), ir.label(f"{base}_row{line or ''}"))
 
     def before(self) -> Iterator[ir.Statement]:
-        """Yield the declarations that stand before the loop."""
+        """Yield the declarations that are printed before the loop over sites."""
         for updated in sorted(self.reading.updated):
             self.pointer(updated)
         pointers, neighbour_pointers = dict(self.starts), list[ir.Statement]()
@@ -236,7 +245,7 @@ class RowDeclarations:
         yield from (*self.substituted, *together(self.once), *grouped(pointers), *neighbour_pointers)
 
     def at_site(self) -> list[ir.Statement]:
-        """Return the declarations that stand at the beginning of the loop over sites."""
+        """Return the declarations that are printed at the beginning of the loop over sites."""
         return [*together(self.loaded.items()), *self.weights]
 
 
@@ -253,13 +262,13 @@ def over_sites(body: Iterable[ir.Statement], independent: str = "SITE", **fields
 
 
 def together(values: Iterable[tuple[str, ir.Value]]) -> list[ir.Statement]:
-    """Return one declaration of all these real constants; [] if there are none."""
+    """Return a single declaration of several real constants; [] if ``values`` is empty."""
     items = tuple(values)
     return [ir.Declare(ir.Type.REAL, items)] if items else []
 
 
 def grouped(pointers: Mapping[str, tuple[ir.Pointer, ir.Value]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of pointers, one declaration for each type."""
+    """Yield the declarations of pointers, with all pointers of one type in one declaration."""
     for kind in dict.fromkeys(kind for kind, _ in pointers.values()):
         yield ir.Declare(
             kind, tuple((name, row) for name, (pointer_kind, row) in pointers.items() if pointer_kind == kind)

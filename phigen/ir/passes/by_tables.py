@@ -1,4 +1,4 @@
-"""Lowering by tables: one array has the fields of all sites, and tables with numbers of sites give the neighbours.
+"""Lowering by tables: one array contains the fields of all sites, and tables contain the numbers of neighbouring sites.
 
 Functions receive coefficients or parameters, arrays of reals, and the record ``sites``. The runtime of a target fills
 this record:
@@ -15,8 +15,8 @@ this record:
 - values that parameters determine, by their names
 - ``massive``: in sums over pairs, the number of the site after the last with a mass
 
-The runtime also has the functions ``bonds`` and ``begins`` of ``sites``, and ``fill``, ``placed`` and ``joinSums``.
-``templates/js/runtime/sites.mjs`` is a model for other runtimes.
+The runtime also defines the methods ``bonds`` and ``begins`` of ``sites``, and the functions ``fill``, ``placed`` and
+``joinSums``. ``templates/js/runtime/sites.mjs`` is a model for other runtimes.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
 
 NUMBER, COLOUR = (ir.fixed(name) for name in ("k", "colour"))
 
-#: Names in JavaScript of the arrays of each kind of storage, and of parameters of functions, where they differ.
+#: Names of arrays in JavaScript, for each kind of storage and for parameters of functions whose names differ.
 _ARRAYS = {ir.Storage.STATE: "x", ir.Storage.VARIATION: "v", ir.Storage.START: "start", ir.Storage.SUM: "sums"}
 _PARAMETERS = {"state": "x", "varied": "v"}
 
 
 def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
-    """Return a function of a lattice on the level of memory."""
+    """Return a function on the level of memory, from a function of a lattice on the level of sites."""
     parameters = tuple(_PARAMETERS.get(p, p) for p in function.parameters)
     if not any(isinstance(s, ir.Store) for s in statements(function.body)):
         return replace(function, parameters=parameters, body=())
@@ -51,7 +51,8 @@ def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 class _Tables:
     """The lowering of one function.
 
-    ``head`` has the declarations before its loops, and ``hoisted`` the variables that these declare.
+    ``head`` has the declarations before the loops of the function, and ``hoisted`` the variables that these
+    declarations define.
     """
 
     function: ir.Function
@@ -164,7 +165,7 @@ class _Tables:
         return ir.Entry(self._parameter(array.name), site)
 
     def _parameter(self, name: str) -> ir.Name:
-        """Return the array of a parameter at sites or bonds."""
+        """Return the variable for the array of a parameter at sites or bonds, and record its declaration."""
         return self._hoisted(Symbol("at", name), ir.Member(self.params, name))
 
     def _hoisted(self, name: Symbol, value: ir.Value, kind: ir.Type = ir.Type.ARRAY) -> ir.Name:
@@ -179,7 +180,7 @@ class _Tables:
         return ir.Name(Symbol("beside", self.lattice.neighbours.index(load.offset)))
 
     def _neighbour(self, load: ir.Load) -> Iterator[ir.Statement]:
-        """Yield the declaration of the number of a neighbour, unless the loop has declared it already."""
+        """Yield the declaration of the number of a neighbouring site, unless the loop has declared it already."""
         site = self._site(load)
         if isinstance(site, ir.Name) and site not in (SITE, OTHER) and site.symbol not in self.hoisted:
             number = self.lattice.neighbours.index(load.offset)
@@ -193,7 +194,7 @@ def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
 
 
 def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
-    """Yield the calls that set extremes to their initial values; sums are set to 0 by callers."""
+    """Yield the calls that set maxima and minima to their initial values ∓∞. Callers set sums to 0."""
     for s in loop.stores:
         if s.extreme:
             ends = of_array(ir.Constant(0), s.array.number), of_array(ir.Constant(0), s.array.number + 1)
@@ -201,7 +202,7 @@ def _cleared(loop: ir.Loop) -> Iterator[ir.Statement]:
 
 
 def _sites_of(selection: ir.Selection) -> ir.Value | None:
-    """Return the list of the sites that a sweep updates; None if it updates all sites."""
+    """Return the list of the sites that a sweep updates; None if the sweep updates all sites."""
     if selection.window is not None:
         return ir.Member(SITES, "beside")
     if selection.colour is None and not selection.inside:

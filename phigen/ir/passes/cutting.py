@@ -1,7 +1,7 @@
 """Division of long straight-line functions into parts, since compile time is quadratic in the length of a function.
 
-Each store is moved to the earliest possible place. Temporaries that a later part reads become entries of a workspace
-array.
+First, each store is moved to the earliest possible place. Then, temporaries of one part that a later part reads become
+entries of a workspace array.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ WORKSPACE = ir.fixed("work")
 
 
 def cut(function: ir.Function, size: int) -> list[ir.Function]:
-    """Return the function of a kernel as parts of at most ``size`` statements; the caller clears arrays."""
+    """Return the function of a kernel as parts of at most ``size`` statements.
+
+    Statements that clear arrays are left out; the caller of the parts clears the arrays.
+    """
     statements = [s for s in function.body if is_temporary(s) or isinstance(s, ir.Assign)]
     if len(statements) <= size:
         return [function]
@@ -36,14 +39,14 @@ def cut(function: ir.Function, size: int) -> list[ir.Function]:
 
 
 def workspace(parts: Sequence[ir.Function]) -> int:
-    """Return the number of workspace entries that the parts of a function need."""
+    """Return the length of the workspace array that the parts of a function need."""
     entries = (s.target for part in parts for s in part.body if isinstance(s, ir.Assign))
     used = [e.index for e in entries if isinstance(e, ir.Entry) and e.array == WORKSPACE]
     return 1 + max((i.value for i in used if isinstance(i, ir.Constant) and isinstance(i.value, int)), default=0)
 
 
 def _stores_early(statements: Sequence[ir.Statement]) -> list[ir.Statement]:
-    """Return the statements in an order where each store follows the last temporary that it reads."""
+    """Return the statements in an order in which each store comes right after the last temporary that it reads."""
     temporaries = [s for s in statements if is_temporary(s)]
     position = {name: k for k, s in enumerate(temporaries) for name in _declared([s])}
     ready: dict[int, list[ir.Statement]] = {}
@@ -58,7 +61,9 @@ def _stores_early(statements: Sequence[ir.Statement]) -> list[ir.Statement]:
 def _part(
     reads: Sequence[ir.Statement], chunk: Sequence[ir.Statement], crossing: dict[str, Symbol]
 ) -> list[ir.Statement]:
-    """Return the statements of one part; the values in ``crossing`` are entries of the workspace."""
+    """Return the statements of one part; ``crossing`` maps values that several parts use to entries of the
+    workspace.
+    """
 
     def visit(e: Expression, arguments: list[Expression]) -> Expression:
         if e.op == "symbol":
@@ -87,6 +92,6 @@ def _declared(statements: Sequence[ir.Statement]) -> list[str]:
 
 
 def _symbols(statements: Sequence[ir.Statement]) -> list[str]:
-    """Return the symbols in the expressions of statements, in the order of evaluation."""
+    """Return the symbols in the expressions of statements, operands before the expressions that read them."""
     graphs = [v for v in values(tuple(statements)) if isinstance(v, Expression)]
     return [e.value for e in topological(graphs) if e.op == "symbol"]

@@ -1,7 +1,7 @@
-"""Forms of elementary functions: polynomials for small arguments, full-range functions, and versions for SIMD lanes.
+"""Forms of elementary functions: polynomials for small arguments, functions for all arguments, and versions for SIMD.
 
 This pass follows `phigen.ir.passes.temporaries`. It replaces calls such as ``sin`` by ``sin_near`` or ``sin_lane``,
-which the runtime of a target defines. Functions without such a version are called as before.
+functions which the runtime of a target defines. Functions that have no such version are called by their usual names.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from phigen.lanes.lane_functions import FULL_RANGE_FUNCTIONS, LANE_FORMULAS, LAN
 from phigen.symbolic.expression import Expression, fold, raw, topological
 from phigen.symbolic.special import SPECIAL
 
-#: Suffixes of the names of functions: for small arguments, for SIMD lanes, and for versions of the solver that replace
-#: library functions for all arguments.
+#: Suffixes of the names of functions: polynomials for small arguments; versions for SIMD lanes; and versions for all
+#: arguments that the solver defines in place of library functions.
 NEAR, LANE, OWN = "_near", "_lane", "_own"
 
-#: SIMD has the versions of functions for loops over lanes. IN_LANES has those for loops over sites, where functions
-#: with a removable singularity only have a small-argument form. FULL_RANGE has those of IN_LANES that are defined for
-#: all arguments.
+#: Versions of elementary functions for loops over lanes (SIMD) and for loops over sites (IN_LANES). Functions with a
+#: removable singularity are not in IN_LANES, since loops over sites only have their polynomials for small arguments.
+#: FULL_RANGE has the members of IN_LANES that are correct for all arguments.
 SIMD = {f: f + LANE for f in (*LANE_FUNCTIONS, *LANE_FORMULAS)}
 IN_LANES = {f: version for f, version in SIMD.items() if f not in SPECIAL}
 FULL_RANGE = {f: version for f, version in IN_LANES.items() if f in FULL_RANGE_FUNCTIONS}
 
 
 def calling(function: ir.Function, versions: Mapping[str, str]) -> ir.Function:
-    """Return the function with calls of other versions of elementary functions."""
+    """Return the function with each elementary function in ``versions`` replaced by its version."""
 
     def visit(e: Expression, arguments: list[Expression]) -> Expression:
         return raw(versions.get(e.op, e.op), tuple(arguments), e.value) if arguments else e
@@ -50,10 +50,11 @@ def calling(function: ir.Function, versions: Mapping[str, str]) -> ir.Function:
 def forms_of(
     functions: Iterable[ir.Function], small_argument: Iterable[str], limited: Set[str], versions: Mapping[str, str]
 ) -> dict[str, Mapping[str, str]]:
-    """Return the forms that some functions need, as suffix of their names → versions to call in this form.
+    """Return the forms in which functions are needed: a map from the suffix of a form to the versions that it calls.
 
-    ``small_argument`` are the elementary functions with a small-argument version. ``limited`` are those whose fast
-    versions fail at large arguments. If no ``limited`` function is called, there is one form, with the suffix "".
+    The form "_near" is for small arguments, and "_far" for all arguments. ``small_argument`` are the elementary
+    functions with a polynomial for small arguments. ``limited`` are the elementary functions whose fast versions fail
+    at large arguments. If no function calls one of these, there is a single form, with the suffix "".
     """
     graphs = [v for f in functions for v in values(f.body) if isinstance(v, Expression)]
     if {e.op for e in topological(graphs)}.isdisjoint(limited):

@@ -10,7 +10,7 @@ from phigen.scheme.kernel import Role
 
 
 def discard_unread(function: ir.Function) -> ir.Function:
-    """Return the function with a statement that marks each parameter which it does not read."""
+    """Return the function with statements that mark the parameters which it does not read as unused."""
     read = names_in(function.body)
     unread = (ir.Discard(p) for p in function.parameters if ir.fixed(p).symbol not in read)
     return function.with_body(*unread, *function.body)
@@ -19,6 +19,8 @@ def discard_unread(function: ir.Function) -> ir.Function:
 def typed_function(
     name: str, doc: str, parameters: Sequence[str], body: ir.Block, types: Mapping[str, ir.ParameterType]
 ) -> ir.Function:
-    """Return a function whose parameters have the types of that name in ``types``; unread parameters are marked."""
+    """Return a function whose parameters have the types in ``types``; parameters that the body does not read are marked
+    as unused.
+    """
     listed = tuple((p, types[p]) for p in parameters if p in types)
     return discard_unread(ir.Function(name, doc, Role.OTHER, tuple(parameters), body, listed))

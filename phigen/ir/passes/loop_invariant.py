@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from phigen.ir import nodes as ir
 from phigen.ir.walk import map_blocks
 
-#: Values that are the same in all iterations of loops over sites, bonds or pairs.
+#: Values that are equal in all iterations of a loop over sites, bonds or pairs.
 INVARIANT = ir.Coefficient | ir.SystemParameter | ir.Time
 
 

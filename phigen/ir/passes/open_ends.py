@@ -1,6 +1,7 @@
-"""Separate loops for sites away from open ends, where all terms are present, and for the other sites.
+"""Separate loops for sites away from open ends, where no term reaches beyond an end, and for sites near open ends.
 
-The pass applies on the level of sites, to expression graphs, before `phigen.ir.passes.temporaries`.
+The pass applies to functions on the level of sites, whose values are expression graphs; `phigen.ir.passes.temporaries`
+follows it.
 """
 
 from __future__ import annotations
@@ -12,12 +13,16 @@ from phigen.ir import nodes as ir
 from phigen.ir.walk import map_blocks, statements
 from phigen.symbolic.expression import ONE, Expression, substitute
 
-#: Suffix of the names of functions for sites near open ends.
+#: Suffix of the names of functions that are correct near open ends.
 NEAR_ENDS = "_end"
 
 
 def divided_at_ends(function: ir.Function) -> list[ir.Function]:
-    """Return a function for sites away from open ends and one for all sites; only the latter if they are the same."""
+    """Return a function without weights, for sites away from open ends, and the function with weights, for sites near
+    them.
+
+    If there are no weights, return only one function.
+    """
     if not any(map(_weight, statements(function.body))):
         return [function]
     near = replace(function, name=function.name + NEAR_ENDS, doc="the same for sites near open ends")
@@ -25,12 +30,12 @@ def divided_at_ends(function: ir.Function) -> list[ir.Function]:
 
 
 def _weight(s: ir.Statement) -> str:
-    """Return the name of the weight that a statement declares; "" for other statements."""
+    """Return the name of the weight of a term at open ends that a statement declares; "" for other statements."""
     return s.items[0][0] if isinstance(s, ir.Declare) and isinstance(s.items[0][1], ir.Inside) else ""
 
 
 def _without_weights(body: ir.Block) -> Iterator[ir.Statement]:
-    """Yield the statements with 1 in place of all weights, and without sums that become unused."""
+    """Yield the statements with 1 in place of all weights, and without additions of 0 that result."""
     ones = dict.fromkeys(filter(None, map(_weight, body)), ONE)
     graphs = (s.value for s in body if isinstance(s, ir.Update))
     values = iter(substitute([e for e in graphs if isinstance(e, Expression)], ones))

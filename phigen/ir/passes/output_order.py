@@ -1,5 +1,6 @@
-"""Order of the statements in the function of a kernel: named values, then for each output its temporaries and
-stores."""
+"""Order of the statements in the function of a kernel: first named values, then for each output its temporaries and
+stores.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +13,10 @@ from phigen.symbolic.expression import Expression
 
 
 def in_output_order(function: ir.Function, named: Sequence[str], *, headings: bool) -> ir.Function:
-    """Return the function with its statements sorted by output.
+    """Return the function with its statements ordered by the outputs that they compute.
 
-    ``named`` are the symbols of values with a name in the kernel, the momenta, which come first. With ``headings``,
-    there is a comment for each output, and its temporaries stand directly before its stores; otherwise all stores come
-    last.
+    First come ``named`` values, which are the momenta. With ``headings``, each output has a comment, its temporaries
+    and then its stores. Otherwise the stores of all outputs come last.
     """
     temporaries = {s.items[0][0]: s for s in function.body if isinstance(s, ir.Declare) and is_temporary(s)}
     stores: dict[str, list[ir.Statement]] = {}
@@ -26,7 +26,9 @@ def in_output_order(function: ir.Function, named: Sequence[str], *, headings: bo
     left = dict(temporaries)
 
     def taken(names: Iterable[str]) -> list[ir.Statement]:
-        """Remove the temporaries that these names need from ``left``, and return them in order."""
+        """Return the temporaries that the values ``names`` need, in order, and remove these temporaries from
+        ``left``.
+        """
         needed, rest = set[str](), [*names]
         while rest:
             name = rest.pop()
@@ -48,5 +50,5 @@ def in_output_order(function: ir.Function, named: Sequence[str], *, headings: bo
 
 
 def is_temporary(s: ir.Statement) -> bool:
-    """Whether a statement declares a computed value."""
+    """Whether a statement declares a value that the kernel computes, not an input."""
     return isinstance(s, ir.Declare) and not s.in_place and isinstance(s.items[0][1], Expression)

@@ -1,4 +1,7 @@
-"""Lowering by rows of sweeps, stages, observables, and sums over bonds or pairs."""
+"""Lowering by rows of functions on the level of sites: sweeps, stages, observables, and sums over bonds or pairs.
+
+The resulting functions run over the sites of a row segment; see `phigen.ir.passes.by_rows`.
+"""
 
 from __future__ import annotations
 
@@ -38,14 +41,15 @@ from phigen.symbolic.symbols import Symbol
 OUT = ir.fixed("out")
 OTHER_SITE = ir.Entry(ir.Member(SOLVER, "other"), BOND)
 ZERO, ONE = ir.Constant(0.0), ir.Constant(1.0)
-#: Distance between successive values of a site in arrays of callers.
+#: Distance in memory between successive values of one site, in arrays that callers pass.
 SITES: ir.Value = ir.Cast(ir.Member(SOLVER, "sites"))
 
 
 def sweep(function: ir.Function, layout: RowLayout, *, passed: bool = False, compensated: bool = False) -> ir.Function:
-    """Return the function of a sweep by rows.
+    """Return the function of a sweep over the sites of a row segment.
 
-    The colour of a coloured sweep is a constant in its code, or with ``passed`` a member of the row record.
+    The colour that the sweep updates is a constant in the code or, with ``passed``, a member of the row record. If
+    ``compensated``, fields are updated by compensated sums.
     """
     stores = function.loop.stores
     if function.role is Role.SWEEP_TANGENT:
@@ -86,7 +90,9 @@ def of_colour(
     low: ir.Value = FROM,
     **more: Any,
 ) -> ir.Loop:
-    """Return the loop over the sites of colour ``swept`` from ``low`` on; over all sites if ``colour`` is None."""
+    """Return the loop over the sites of colour ``swept`` from the site ``low`` on; over all sites if ``colour`` is
+    None.
+    """
     if colour is None:
         return over_sites(body, low=low, **more)
     first = ir.Called("first", (ROW, swept, low))
@@ -94,22 +100,25 @@ def of_colour(
 
 
 def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Statement]) -> ir.Function:
-    """Return the function with other parameters and another body; unread parameters are marked as unused."""
+    """Return the function with the given parameters and body; parameters that the body does not read are marked as
+    unused.
+    """
     return discard_unread(replace(function, parameters=parameters, body=tuple(body)))
 
 
 def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Function:
-    """Return the function of a kernel of the stage equation by rows, which assigns its outputs, or adds them if
-    ``adds``."""
+    """Return the function by rows of a kernel of the implicit equation of a stage. It assigns or ``adds`` its
+    outputs.
+    """
     return _storing(function, layout, dict(enumerate(outputs)), "out", WRITTEN, adds=adds)
 
 
 def _storing(
     function: ir.Function, layout: RowLayout, names: Mapping[int, str], member: str, kind: ir.Pointer, *, adds: bool
 ) -> ir.Function:
-    """Return a function by rows that stores to the arrays of a ``member`` of the row record.
+    """Return a function by rows that stores its results in the arrays of a ``member`` of the row record.
 
-    ``names`` has the names of their pointers by number of the array.
+    ``names`` maps the numbers of the arrays to the names of the pointers to them.
     """
     rows, selection = rows_of(function, layout), function.loop.selection
     head = grouped({name: (kind, layout.row(ir.entry(ir.Member(ROW, member), k))) for k, name in names.items()})
@@ -121,11 +130,11 @@ def _storing(
 
 @dataclass(frozen=True)
 class BondLoop:
-    """A function that sums over the bonds or pairs of a site, and the ``arguments`` of its loop over a row segment.
+    """A function that sums over the bonds or pairs of a site, and ``arguments`` of its version by rows.
 
-    ``oriented`` are the parameters at bonds that change sign when a bond is read from its end b. Arguments, besides
-    coef and row, may be ``at_bonds`` (the arrays of parameters at bonds), ``sign`` (the sign of the direction of bonds)
-    and ``across`` (a flag that the sites of the swept colour are at the other ends of the bonds).
+    ``oriented`` are the parameters at bonds that change sign for the site at the end b. The arguments follow ``coef``
+    and ``row``. They may be ``at_bonds`` (the arrays of parameters at bonds), ``sign`` (1 or −1, the direction in which
+    bonds are read) and ``across`` (a flag: the sites of the swept colour are at the opposite ends of the bonds).
     """
 
     function: ir.Function
@@ -139,7 +148,7 @@ class BondLoop:
 
     @property
     def across(self) -> bool:
-        """Whether callers pass the flag ``across``."""
+        """Whether the function has the parameter ``across``."""
         return "across" in self.arguments
 
     @property
@@ -149,10 +158,10 @@ class BondLoop:
 
 
 def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Function:
-    """Return the function of a density, an energy or the vector field by rows; it first calls the functions ``calls``
+    """Return the function by rows of a density, an energy or the vector field. It first calls the functions ``calls``
     for sums.
 
-    ``apart`` is the distance between successive values of a site in the output.
+    ``apart`` is the distance in memory between successive values of one site in the output.
     """
     rows, stores = rows_of(function, layout), function.loop.stores
     body = (*rows.at_site(), *rows.computed, *_observed(stores))
@@ -163,7 +172,7 @@ def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], a
 def observable_with_bonds(
     function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop], apart: ir.Value = SITES
 ) -> ir.Function:
-    """Return the function of an observable by rows that sums over the bonds of each site itself."""
+    """Return the function by rows of an observable, with inner loops that sum over the bonds of each site."""
     loop, observed = function.loop, function.loop.stores
     oriented = frozenset[str]().union(*(s.oriented for s in sums))
     outer = [*function.body, *(s for bond_loop in sums for s in bond_loop.function.body)]
@@ -194,12 +203,14 @@ def _at_bond(s: ir.Statement) -> bool:
 
 
 def _apart(stores: Sequence[ir.Store], apart: ir.Value) -> list[ir.Statement]:
-    """Return the declaration of the distance between values of a site, if an observable has several."""
+    """Return the declaration of the distance in memory between values of one site, if an observable has several
+    values.
+    """
     return [ir.index(ir.fixed("apart"), apart)] * any(s.array.number for s in stores)
 
 
 def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
-    """Yield the stores of values for callers; values that are to be added become terms of the assigned value."""
+    """Yield the stores of values for callers. Stores that add become further summands of the value that is assigned."""
     shares, apart = [s.value for s in stores if s.adds], ir.fixed("apart")
     for s in stores:
         if not s.adds:
@@ -211,7 +222,10 @@ def _observed(stores: Sequence[ir.Store]) -> Iterator[ir.Statement]:
 
 
 def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Function:
-    """Return the function by rows that sums over the bonds of each site; unless ``first``, it adds to existing sums."""
+    """Return the function by rows that sums over the bonds of each site.
+
+    It assigns the sums if it is the ``first`` function that computes them, else it adds to the present values.
+    """
     reading = Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds)
     rows, count = rows_of(bond_loop.function, layout, reading), len(bond_loop.function.loop.stores)
     sums = (ir.Entry(gathered(k), SITE) for k in range(count))
@@ -221,7 +235,7 @@ def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Fun
 
 
 def _begun(stores: Sequence[ir.Store]) -> ir.Declare:
-    """Return the declaration of the sums, with initial value 0, and of the extremes, with initial value ±∞."""
+    """Return the declaration of the sums with initial value 0, and of maxima and minima with initial value −∞ or ∞."""
     starts = {s.array.number: _start(s) for s in stores}
     items = tuple((ir.fixed(f"sum{k}").symbol, starts.get(k, ZERO)) for k in range(max(starts, default=0) + 1))
     return ir.Declare(ir.Type.REAL, items, mutable=True)
@@ -232,7 +246,7 @@ def _start(s: ir.Store) -> ir.Value:
 
 
 def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
-    """Return the loop that sums over the bonds of a site."""
+    """Return the loop that adds up the contributions of the bonds of one site."""
     sign = ir.fixed("sign") if "sign" in bond_loop.arguments else ONE
     updated = (u for s in bond_loop.function.loop.stores for u in updates(s, ir.fixed(f"sum{s.array.number}"), s.value))
     return bonds_of(bond_loop.function.loop, rows, updated, sign, across=bond_loop.across)
@@ -241,11 +255,12 @@ def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
 def bonds_of(
     loop: ir.Loop, rows: RowDeclarations, updated: Iterable[ir.Statement], sign: ir.Value, *, across: bool = False
 ) -> ir.Loop:
-    """Return the loop over the bonds of a site: those that begin there, those that end there, or both, by ``loop.end``.
+    """Return the loop over the bonds of a site: those that begin there ("a"), end there ("b"), or both (""), by
+    ``loop.end``.
 
-    Bonds whose end ``loop.chosen`` does not have the colour of the sweep are skipped; with ``across``, a flag of the
-    caller decides which end this is. ``sign`` is the sign of the direction of a bond, seen from the site where it
-    begins.
+    Bonds are skipped if their end ``loop.chosen`` does not have the colour of the sweep; with ``across``, a flag of the
+    caller decides which end is tested. ``sign`` is 1 or −1: the value of `SIDE`, the direction of a bond, at the site
+    where the bond begins.
     """
     names = [s.items[0][0] for s in loop.body if isinstance(s, ir.Declare)]
     reads_there = [(name, value) for name, value in rows.other.items() if name in names]
@@ -269,7 +284,7 @@ def bonds_of(
 
 
 def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Function:
-    """Return the function by rows that sums over all other sites, for the sites of a row segment."""
+    """Return the function by rows that sums over all other sites, for each site of a row segment."""
     rows = rows_of(bond_loop.function, layout)
     sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.function.loop.stores]
     arrays = {g.symbol: (WRITTEN, gathered(k)) for k, g in enumerate(sums)}

@@ -1,8 +1,9 @@
-"""Lowering by rows of transposed functions, without write conflicts between threads: a site writes only its own
-elements.
+"""Lowering by rows of transposed functions. A site writes only its own elements, so that threads have no write
+conflicts.
 
 A site adds to its own cotangents directly. Its contributions to the cotangents of other sites are stored in arrays, one
-for each contribution. In a second loop, each site adds the contributions that its neighbours have stored for it.
+array for each kind of contribution. In a second loop, each site adds the contributions that its neighbours have stored
+for it.
 """
 
 from __future__ import annotations
@@ -38,18 +39,21 @@ from phigen.symbolic.symbols import HERE
 BEGIN, END, APART, WHOLE, LANES, LANE, INDEX_TO = (
     ir.fixed(name) for name in ("begin", "end", "apart", "whole", "lanes", "l", "to")
 )
-#: Number of partial sums of a sum over sites (a macro), and the array of the sums; the runtime adds the partial sums.
+#: Number of partial sums for a sum over sites, a macro of the generated C; and the array of the sums. The runtime adds
+#: the partial sums.
 BATCH, SUMS = ir.fixed("ADDED"), ir.fixed("sums")
 
-#: Number of sites in a batch of a sum over pairs. The additions for different sites are independent, which hides their
-#: latency.
+#: Number of sites in a batch of a sum over pairs. Additions for different sites are independent, so the processor need
+#: not wait for the result of the previous addition.
 PAIR_BATCH = 32
 
 
 @dataclass(frozen=True)
 class Handed:
-    """Contribution of a site to the cotangent of field ``base`` at the site at an ``offset``; ``array`` is where it is
-    stored."""
+    """Contribution of each site to the cotangent of field ``base`` at the site ``offset`` away.
+
+    The contributions of all sites are stored in the array with the number ``array``.
+    """
 
     array: int
     base: int
@@ -58,12 +62,13 @@ class Handed:
 
 @dataclass(frozen=True)
 class Transpose:
-    """A transposed function on the level of sites, with the arrays of cotangents for the lowering.
+    """A transposed function on the level of sites, and the arrays in which its results are stored.
 
     The function reads cotangents of the kind ``seed``: those of the fields with the numbers ``fields``, or the
-    variations of the row if ``fields`` is empty. It stores contributions for neighbours in the arrays ``handed``. The
-    cotangents of its ``summed`` sums over bonds or pairs are stored in the arrays from number ``sums_from`` on. At
-    first, it adds the contributions ``received`` from a previous loop. The fields ``recomputed`` are written too.
+    variations in the row record if ``fields`` is empty. First it adds the contributions ``received``, which an earlier
+    loop has stored. It stores its contributions to neighbours in the arrays of ``handed``. The cotangents of the
+    ``summed`` sums over bonds or pairs that it reads are stored in the arrays from number ``sums_from`` on. It also
+    writes the fields ``recomputed``.
     """
 
     function: ir.Function
@@ -77,8 +82,10 @@ class Transpose:
 
 
 def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.Function:
-    """Return the first loop of a transposed function by rows; with ``vectors``, sums over sites are added in SIMD
-    registers."""
+    """Return the first loop of a transposed function by rows.
+
+    With ``vectors``, sums over sites are accumulated in SIMD registers.
+    """
     loop, fields = transpose.function.loop, transpose.fields
     variations = [ir.fixed(f"v_{k}") for k in range(layout.lattice.program.dimension)]
     pointers = [ir.fixed(f"bar_{k}") for k in fields] or variations
@@ -111,7 +118,9 @@ _COTANGENTS = (Storage.COTANGENT, Storage.START_COTANGENT)
 
 
 def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
-    """Return the contributions for other sites by array, and the statements that store all results of a site."""
+    """Return the contributions to other sites, by the number of their array, and the statements that store all results
+    of a site.
+    """
     places = {(h.base, h.offset): h.array for h in transpose.handed}
     handed_values: dict[int, ir.Value] = {}
     stores: list[ir.Statement] = []
@@ -133,7 +142,9 @@ def _stores(transpose: Transpose, rows: RowDeclarations) -> tuple[dict[int, ir.V
 
 
 def handing(name: str, doc: str, handed: Sequence[Handed], layout: RowLayout) -> ir.Function:
-    """Return the second loop of a transposed function: each site adds the contributions of its neighbours."""
+    """Return the second loop of a transposed function: each site adds the contributions that its neighbours have
+    stored.
+    """
     pointers, added = _added_up("handed", handed, layout)
     head = [_pointer("bar", "bar", k, layout) for k in dict.fromkeys(h.base for h in handed)]
     return ir.Function(name, doc, Role.OTHER, ("row",), (*pointers, *head, over_sites(added)))
@@ -142,7 +153,7 @@ def handing(name: str, doc: str, handed: Sequence[Handed], layout: RowLayout) ->
 def _added_up(
     prefix: str, handed: Sequence[Handed], layout: RowLayout
 ) -> tuple[list[ir.Statement], list[ir.Statement]]:
-    """Return the pointers to the contributions that neighbours store for a site, and the statements that add them."""
+    """Return the pointers to contributions that neighbours have stored for a site, and the statements that add them."""
     sums: dict[int, ir.Value] = {}
     pointers: dict[str, ir.Statement] = {}
     open_rows = prefix == "received" and any(layout.lattice.step.sites.open[:-1])
@@ -164,7 +175,10 @@ def _added_up(
 def in_batches(
     body: ir.Block, shares: Sequence[ir.Reduce], layout: RowLayout, colour: int | None
 ) -> Iterator[ir.Statement]:
-    """Yield the loop over sites; in sums over sites, each site of a batch has its own partial sum."""
+    """Yield the loop over sites. It has an inner loop over a batch of sites if there are sums over sites.
+
+    Each site of a batch then has its own partial sum for each of ``shares``.
+    """
     swept = ir.Constant(colour)
     if not shares:
         yield of_colour(body, colour, swept, layout, limit="end")
@@ -183,7 +197,7 @@ def in_batches(
 
 
 def in_vectors(body: ir.Block, shares: Sequence[ir.Reduce]) -> Iterator[ir.Statement]:
-    """Yield the loops over SIMD vectors of 8 sites and over the remaining sites; partial sums stay in registers."""
+    """Yield a loop over SIMD vectors of 8 sites and a loop over the remaining sites. Partial sums stay in registers."""
     names = [ir.fixed(f"share{k}") for k in range(len(shares))]
     yield ir.vectors(ir.Vector(ir.Constant(8)), *names, value=ir.Listed((ZERO,)))
     rest = ir.Binary("%", ir.Binary("-", INDEX_TO, FROM), ir.Constant(8))
@@ -209,10 +223,10 @@ def _totals(shares: Sequence[ir.Reduce], function: str, *arguments: ir.Value) ->
 
 @dataclass(frozen=True)
 class BondTranspose:
-    """The transpose of a function for sums over bonds or pairs, for the sites at the end ``end``.
+    """The transpose of a function for sums over bonds or pairs, for the sites that lie at the end ``end`` of bonds.
 
-    The cotangents of its ``count`` sums are in the arrays from number ``sums_from`` on. The ``oriented`` parameters at
-    bonds change their sign when seen from the end b.
+    The cotangents of the ``count`` sums are in the arrays from number ``sums_from`` on. Parameters at bonds that are
+    ``oriented`` have the opposite sign for the site at the end b.
     """
 
     function: ir.Function
@@ -223,7 +237,7 @@ class BondTranspose:
 
     @property
     def updates(self) -> list[ir.Update]:
-        """The stores and additions in the loop of the function."""
+        """The statements in the loop of the function that store results or add to them."""
         return [s for s in self.function.loop.body if isinstance(s, ir.Update)]
 
 
@@ -250,10 +264,10 @@ def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Function:
 
 
 def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
-    """Return the loop over sites with an inner loop over the bonds of each site.
+    """Return the loop over sites, with an inner loop over the bonds of each site.
 
-    Contributions to a sum over all sites are first added up at each site, which makes the chain of dependent additions
-    shorter.
+    Contributions to a sum over all sites are first added up at each site. This shortens the chain of additions that
+    depend on each other.
     """
     updates = transpose.updates
     at_bonds = {k: s.array for k, s in enumerate(updates) if isinstance(s, ir.Store) and s.end == "bond"}
@@ -273,10 +287,10 @@ def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
 
 
 def _over_pairs(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
-    """Return the loop over batches of sites with an inner loop over all other sites.
+    """Return the loop over batches of sites, with an inner loop over all other sites.
 
-    Batches are whole SIMD vectors of 8, for which rows have room. For each pair, all terms are computed before one is
-    added, since gcc does not vectorise the loop otherwise.
+    A batch consists of whole SIMD vectors of 8 sites; rows are padded for them. For each pair of sites, all terms are
+    computed before the first is added, since gcc does not vectorise the loop otherwise.
     """
     updates = transpose.updates
     first, left, count, batch = ir.fixed("first"), ir.fixed("left"), ir.fixed("count"), ir.Constant(PAIR_BATCH)
@@ -309,7 +323,11 @@ def _lanes(count: ir.Value, body: ir.Block, *, independent: str = "", note: str 
 
 
 def _into(s: ir.Update, k: int, site: ir.Value, value: ir.Value) -> ir.Assign:
-    """Return the statement that adds the sum of a site over bonds or pairs to a cotangent, or stores it at the site."""
+    """Return the statement that uses a result of a loop over bonds or pairs at a site: the sum ``value`` over all of
+    these.
+
+    It is added to a cotangent or to a sum over sites, or stored at the site.
+    """
     if isinstance(s, ir.Reduce):
         return ir.Assign(ir.fixed(f"share{k}"), value, adds=True)
     if s.array.storage is Storage.SUM:
@@ -322,14 +340,16 @@ def _zero(name: str) -> ir.Declare:
 
 
 def _pointer(prefix: str, member: str, k: int, layout: RowLayout | None, kind: ir.Pointer = WRITTEN) -> ir.Declare:
-    """Return the declaration of the pointer to array ``k`` in a member of the row record; with a layout, to its row
-    there."""
+    """Return the declaration of a pointer to array ``k`` in a ``member`` of the row record.
+
+    With a ``layout``, the pointer is to the row of the segment in this array.
+    """
     array = ir.entry(ir.Member(ROW, member), k)
     return ir.Declare(kind, ((ir.fixed(f"{prefix}_{k}").symbol, layout.row(array) if layout else array),))
 
 
 def _seeds(loop: ir.Loop) -> list[int]:
-    """Return the numbers of the cotangents of outputs that a loop reads at its site, or at the ends of its bonds."""
+    """Return the numbers of the cotangents of outputs that a loop reads at its own site, or at the ends of bonds."""
     loads = (
         value for s in loop.body if isinstance(s, ir.Declare) for _, value in s.items if isinstance(value, ir.Load)
     )

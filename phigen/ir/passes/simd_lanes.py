@@ -1,4 +1,4 @@
-"""SIMD lanes: straight-line functions that are evaluated at several points together.
+"""SIMD lanes: a straight-line function is evaluated at several points together, one point in each lane.
 
 Each array gets an inner index over the lanes, except for arrays that all lanes share.
 """
@@ -16,10 +16,11 @@ LANE, DISTINCT_COEF, LANES = ir.fixed("lane"), ir.fixed("distinct_coef"), ir.fix
 def in_lanes(
     function: ir.Function, shared: Set[str], alike: Set[str] = frozenset(), *, single: bool = False
 ) -> ir.Function:
-    """Return the function as a loop over all lanes; with ``single``, for one lane, whose number callers pass.
+    """Return the function as a loop over all lanes. With ``single``, return it for one lane, whose number is a
+    parameter.
 
-    The arrays ``shared`` have one value for all lanes. The arrays ``alike`` have one value if the parameter
-    ``distinct_coef`` of the function is 0.
+    Arrays in ``shared`` have one value for all lanes. Arrays in ``alike`` have one value for all lanes if the parameter
+    ``distinct_coef`` of the function is 0, else a value for each lane.
     """
 
     def at_lane(value: ir.Value) -> ir.Value:

@@ -10,7 +10,7 @@ from phigen.ir.walk import map_blocks
 
 
 def simultaneous(function: ir.Function) -> ir.Function:
-    """Return a sweep with a variable for each of its increments; functions with one increment are unchanged."""
+    """Return a sweep with a variable for each of its increments. A function with a single increment is unchanged."""
     if not function.role.is_sweep:
         return function
 

@@ -1,4 +1,6 @@
-"""Sites in loops: the names of their numbers, their indices in arrays of all sites, and the loop over pairs."""
+"""Sites in loops: names of the variables for numbers of sites, indices in arrays of all sites, and the loop over
+pairs.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +12,14 @@ SITE, OTHER, SITES, COUNT = (ir.fixed(name) for name in ("i", "j", "sites", "cou
 
 
 def of_array(site: ir.Value, number: int) -> ir.Value:
-    """Return the index of a site in array ``number`` of several consecutive arrays."""
+    """Return the index of a site in array ``number``, where several arrays follow one another in memory."""
     if number == 0:
         return site
     return ir.Binary("+", site, COUNT if number == 1 else ir.Binary("*", ir.Constant(number), COUNT))
 
 
 def over_pairs(body: Iterable[ir.Statement], selection: ir.Selection = ir.ALL_SITES) -> ir.Loop:
-    """Return the loop over all other sites in a selection."""
+    """Return the loop over the second sites of all pairs of a site; ``selection`` may exclude some of these."""
     other = ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),))
     high = ir.Member(SITES, "massive") if selection.massive else COUNT
     return ir.Loop("plain", (other, *body), "j", ir.Constant(selection.first), high)

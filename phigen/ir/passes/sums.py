@@ -1,4 +1,4 @@
-"""Statements for sums, compensated sums, and the largest or smallest of several values, in which NaN propagates."""
+"""Statements that compute sums, compensated sums, maxima and minima. A NaN among the values makes the result NaN."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Iterator
 
 from phigen.ir import nodes as ir
 
-#: Operator by which a value is compared with the current extreme.
+#: Operator that compares a value with the current maximum or minimum.
 _COMPARISONS = {"max": ">", "min": "<"}
 
 
 def limit(extreme: str, infinity: str) -> ir.Name:
-    """Return the initial value of an extreme, ∞ or −∞; ``infinity`` is the name of ∞ in the language."""
+    """Return the initial value of a maximum, −∞, or of a minimum, ∞; ``infinity`` is the name of ∞ in the language."""
     return ir.fixed(infinity if extreme == "min" else f"-{infinity}")
 
 
 def updates(s: ir.Store, place: ir.Value, value: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statements by which a store updates a place: sum, extreme, or assignment."""
+    """Yield the statements by which a store changes a place: addition, maximum or minimum, or assignment."""
     if not s.extreme:
         yield ir.Assign(place, value, s.adds)
         return
@@ -28,8 +28,10 @@ def updates(s: ir.Store, place: ir.Value, value: ir.Value) -> Iterator[ir.Statem
 
 
 def compensated_sum(k: int, field: ir.Value, compensation: ir.Value, increment: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statements of compensated sum ``k``: the field gets the increment, and the compensation term the
-    rounding error."""
+    """Yield the statements of compensated sum ``k``, which adds the increment to the field.
+
+    The rounding error of the addition is stored in the compensation term, and added with the next increment.
+    """
     add, total = ir.fixed(f"add{k}"), ir.fixed(f"sum{k}")
     items = ((add.symbol, ir.Accumulated(compensation, increment)), (total.symbol, ir.Binary("+", field, add)))
     yield ir.Declare(ir.Type.REAL, items)

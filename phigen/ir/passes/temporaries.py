@@ -1,6 +1,7 @@
-"""Temporaries: expression graphs are divided into statements.
+"""Temporaries: expression graphs are converted to statements.
 
-Integer powers become products, shared or long values get variables, and declarations that nothing reads are removed.
+Integer powers become products. Values that are used several times, and parts of long expressions, get variables.
+Declarations that nothing reads are removed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from phigen.symbolic.expression import Expression
 
 
 def temporaries(function: ir.Function) -> ir.Function:
-    """Return the function with variables for shared and long values, and without unread declarations."""
+    """Return the function with variables for shared values and parts of long expressions, without declarations that
+    nothing reads.
+    """
     function = map_blocks(function, _named)
     read = names_in(tuple(s.value for s in statements(function.body) if isinstance(s, ir.Update)))
 

@@ -1,4 +1,6 @@
-"""Lowering to whole arrays: each statement works on the arrays of all sites, bonds or pairs, without loops."""
+"""Lowering to whole arrays, for NumPy: each statement works on the arrays of all sites, bonds or pairs, without
+loops.
+"""
 
 from __future__ import annotations
 
@@ -15,27 +17,34 @@ from phigen.symbolic.symbols import HERE
 X, V, SITES, NP, BAR, COLOUR, BOND, SUMS, MOVED, OUT, AXIS = (
     ir.fixed(n) for n in ("x", "v", "sites", "np", "bar", "colour", "bond", "sums", "moved", "out", ":, None")
 )
-#: Names of the arrays of each kind of storage.
+#: Names of the parameters that contain the arrays of each kind of storage.
 _ARRAYS = {Storage.STATE: "x", Storage.VARIATION: "v", Storage.START: "start", Storage.SUM: "gathered"}
 _ARRAYS |= {Storage.COTANGENT: "bar", Storage.START_COTANGENT: "start_bar"}
 
-#: Values without a variable, which are printed where they are used.
+#: Values that get no variable; they are printed where they are used.
 _IN_PLACE = ir.Coefficient | ir.Time | ir.Inside | ir.HasColour | ir.OnSeam
 _READ_IN_PLACE = (Storage.START, Storage.SUM, Storage.SEED)
 
-#: Further parameters of transposed functions: cotangents, and the results to which derivatives are added.
+#: Further parameters of transposed functions: the cotangents, the sites, and the results to which derivatives are
+#: added.
 _TRANSPOSED = ("bar", "sites", "coef_bar", "parameters_bar")
 
 
 def sums_name(kernel: str) -> str:
-    """Return the name of the function for all sums over bonds or pairs, by the name of its kernel for one end."""
+    """Return the name of the function that computes all sums over bonds or pairs.
+
+    ``kernel`` is the name of its kernel for one end of the bonds.
+    """
     base = kernel.removesuffix("_a").removesuffix("_b")
     plain = base.removeprefix("bond_").removeprefix("pair_")
     return {"energy": "energies"}.get(plain, plain)
 
 
 def transposed_sums_name(kernel: str) -> str:
-    """Return the name of the transpose of a function for sums, by the name of its kernel for one end."""
+    """Return the name of the transpose of the function that computes all sums over bonds or pairs.
+
+    ``kernel`` is the name of its kernel for one end of the bonds.
+    """
     return kernel.removesuffix("_a").removesuffix("_b") + "_back"
 
 
@@ -49,7 +58,7 @@ class WholeArrays:
     lattice: LatticeLoops
 
     def sweep(self, function: ir.Function) -> ir.Function:
-        """Return a sweep as a function from a state, or for a tangent sweep from a variation, to the next one."""
+        """Return a sweep as a function that returns a new state or, for a tangent sweep, a new variation."""
         loop, array = function.loop, V if function.role is Role.SWEEP_TANGENT else X
         body = [*_unless_beside(loop, array), *self._sums(function), *self._reads(function), *_copied(MOVED, array)]
         for s in loop.stores:
@@ -61,7 +70,11 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(MOVED)))
 
     def stage(self, function: ir.Function) -> ir.Function:
-        """Return a kernel of the stage equation as a function of its unknown y (the parameter x) and of its start."""
+        """Return a kernel of the implicit equation of a stage as a function of y, its unknown, and of the state at the
+        start.
+
+        The name of the parameter y is x.
+        """
         shape = ir.Member(SITES, "sizes")
         values = (ir.Called("broadcast_to", (s.value, shape), NP) for s in function.loop.stores)
         result = ir.Return(ir.Called("array", (ir.Listed(tuple(values)),), NP))
@@ -81,7 +94,7 @@ class WholeArrays:
         return replace(function, parameters=("parameters", "x", *varied, "sites"), body=(*body, ir.Return(OUT)))
 
     def sums(self, functions: Sequence[ir.Function]) -> ir.Function:
-        """Return one function for the sums of several functions, such as those for the two ends of bonds."""
+        """Return a single function that adds the sums of several functions, such as those for the two ends of bonds."""
         body: list[ir.Statement] = []
         for function in functions:
             loop = function.loop
@@ -97,8 +110,10 @@ class WholeArrays:
     # ---- transposes
 
     def transposed_sweep(self, function: ir.Function, updated: Sequence[int]) -> ir.Function:
-        """Return a function from the cotangent after a sweep to the cotangent before, at the state ``x`` before the
-        sweep."""
+        """Return the transpose of a sweep: a function from the cotangent after the sweep to the cotangent before it.
+
+        The parameter ``x`` is the state before the sweep.
+        """
         loop = function.loop
         seeds = (_chosen(loop.selection, ir.entry(BAR, k), ir.Constant(0.0)) for k in updated)
         body = [*_unless_beside(loop, BAR), ir.real(ir.fixed("change_bar"), ir.Listed(tuple(seeds)))]
@@ -109,10 +124,10 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(BAR)))
 
     def transposed_stage(self, function: ir.Function, seed: str) -> ir.Function:
-        """Return the transpose of a kernel of the stage equation.
+        """Return the transpose of a kernel of the implicit equation of a stage.
 
-        It is a function of the cotangent ``seed`` that returns the cotangents of the unknown y and of the start of a
-        stage.
+        It is a function of the cotangent ``seed`` that returns two cotangents: of the unknown y of the equation, and of
+        the state at the start of the stage.
         """
         zeros, both = ir.Called("zeros_like", (X,), NP), (BAR, ir.fixed("start_bar"))
         body = [
@@ -126,7 +141,7 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(ir.Several(both))))
 
     def transposed_sums(self, functions: Sequence[ir.Function], name: str) -> ir.Function:
-        """Return the function from cotangents of sums over bonds or pairs to the cotangents of the state."""
+        """Return the transpose ``name`` of functions for sums: from cotangents of sums to cotangents of the state."""
         end = "here" if self.lattice.step.others.graph else AXIS.text
         body: list[ir.Statement] = []
         for function in functions:
@@ -137,7 +152,7 @@ class WholeArrays:
         return replace(functions[0], name=name, parameters=parameters, body=(*body, ir.Return(BAR)))
 
     def _transposed_sums(self, function: ir.Function, source: ir.Value) -> Iterator[ir.Statement]:
-        """Yield the call of the transpose of the function for sums that ``function`` reads."""
+        """Yield the call of the transpose of the sums over bonds or pairs that ``function`` reads."""
         for s in function.body:
             if isinstance(s, ir.GatherSums):
                 stores = [c for c in function.loop.stores if c.array.storage is Storage.SUM_COTANGENT]
@@ -148,7 +163,7 @@ class WholeArrays:
                 yield ir.Assign(BAR, ir.Called(called, (source, X, ir.Listed(tuple(listed)), *rest)))
 
     def _added_cotangents(self, loop: ir.Loop) -> Iterator[ir.Statement]:
-        """Yield the statements that add cotangents at the sites from which the values were read."""
+        """Yield the statements that add the contribution to each cotangent at the site of the value that was read."""
         for s in loop.body:
             match s:
                 case ir.Reduce(source, number, name, value):
@@ -165,7 +180,10 @@ class WholeArrays:
                     yield ir.Assign(into, self._returned(loop, s, value), adds=True)
 
     def _returned(self, loop: ir.Loop, s: ir.Store, value: ir.Value) -> ir.Value:
-        """Return a cotangent, shifted or summed to the sites from which its value was read."""
+        """Return a contribution to a cotangent, as an array over the sites of the values that were read.
+
+        It is shifted by the opposite offset, or summed over the bonds or pairs of each site.
+        """
         if s.end and loop.kind == "bonds":
             return ir.Called("summed", (value, ir.fixed("here" if s.end == "a" else "there")), SITES)
         if s.end:
@@ -176,7 +194,7 @@ class WholeArrays:
         return value
 
     def _everywhere(self, loop: ir.Loop, value: ir.Value) -> ir.Value:
-        """Return a value, which may be a single number, as an array over all sites, bonds or pairs."""
+        """Return a value as an array over all sites, bonds or pairs; the value may be a single number."""
         match loop.kind:
             case "bonds":
                 return ir.Called("broadcast_to", (value, ir.Member(ir.fixed("here"), "shape")), NP)
@@ -210,7 +228,7 @@ class WholeArrays:
             yield ir.Unpack(("here", "there", "bond"), ir.Called("bonds", which, SITES))
 
     def _summed(self, s: ir.Store, selection: ir.Selection) -> ir.Value:
-        """Return the sum, or the extreme, of a value over the bonds or pairs of each site."""
+        """Return the sum, the maximum or the minimum of a value over the bonds or pairs of each site."""
         graph = self.lattice.step.others.graph
         if s.extreme:
             choose = ir.fixed({"max": "np.maximum", "min": "np.minimum"}[s.extreme])
@@ -225,7 +243,7 @@ class WholeArrays:
         return ir.Called("_over_others", (s.value, SITES))
 
     def _reads(self, function: ir.Function) -> Iterator[ir.Statement]:
-        """Yield the lowered declarations of a function, then those in its loop."""
+        """Yield the lowered declarations before the loop of a function, then those inside the loop."""
         for s in (*function.body, *function.loop.body):
             match s:
                 case ir.Declare(items=((name, value),)):
@@ -262,7 +280,9 @@ class WholeArrays:
         return value
 
     def _load(self, array: ir.Array, offset: Sequence[int], end: str) -> ir.Value:
-        """Return an array at the offset, or at the end of bonds or pairs, at which a function reads it."""
+        """Return the array of a field at all sites, moved by an offset, or its values at one end of all bonds or
+        pairs.
+        """
         fields, increments = self.lattice.program.coordinates, self.lattice.step.sites.increments
         storage, number = ir.fixed(_ARRAYS.get(array.storage, array.name)), ir.Constant(array.number)
         whole: ir.Value = ir.Entry(storage, number)
@@ -280,7 +300,9 @@ class WholeArrays:
 
 
 def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
-    """Yield the functions; those that only differ from an earlier one by colour or window call the earlier one."""
+    """Yield the functions, each body only once. A function that differs from an earlier one only in colour or window
+    calls it.
+    """
     first: dict[ir.Block, ir.Function] = {}
     for function in functions:
         known = first.setdefault(function.body, function)
@@ -293,7 +315,7 @@ def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
 
 
 def _split(stores: Sequence[ir.Store]) -> tuple[list[ir.Store], list[ir.Store]]:
-    """Return the stores that assign, and the stores that add."""
+    """Return two lists: the stores that assign, and the stores that add."""
     return [s for s in stores if not s.adds], [s for s in stores if s.adds]
 
 
@@ -306,15 +328,16 @@ def _copied(name: ir.Name, value: ir.Value) -> Iterator[ir.Statement]:
 
 
 def _unless_beside(loop: ir.Loop, unchanged: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statement that skips a sweep over boundary seams if there are none, because the sizes fit the
-    colours."""
+    """Yield the statement that returns at once from a sweep over boundary seams, if the sizes fit the colours without
+    seams.
+    """
     if loop.selection.window is not None:
         beside = ir.Called("any", (), ir.Member(SITES, "beside"))
         yield ir.If(ir.Prefix("not", beside), (ir.Return(unchanged),))
 
 
 def _chosen(selection: ir.Selection, new: ir.Value, old: ir.Value) -> ir.Value:
-    """Return a value that is ``new`` at the sites of a selection and ``old`` elsewhere."""
+    """Return an array that is ``new`` at the sites of a selection, and ``old`` at all other sites."""
     if selection.window is not None:
         return ir.Select(ir.Member(SITES, "beside"), new, old)
     if selection.first:

@@ -1,4 +1,7 @@
-"""Lowering to work items of a device: each work item computes the values of one site; one array has all fields."""
+"""Lowering to work items of a device, such as a graphics card.
+
+Each work item computes the values of one site; one array contains all fields.
+"""
 
 from __future__ import annotations
 
@@ -14,11 +17,11 @@ from phigen.symbolic.symbols import Symbol
 #: Index of a bond among the bonds of a site.
 BOND = ir.fixed("b")
 
-#: First parameters of all kernels; the arrays follow.
+#: The first parameters of all kernels; the array parameters follow.
 ARGUMENTS = ("items", "count", "sites", "coefficients", "first")
 
-#: Array parameters of kernels by name, in their order; see the comment above the kernels in
-#: ``templates/c/device_lattice.h.jinja``.
+#: Array parameters of kernels, in their order. The comment above the kernels in ``templates/c/device_lattice.h.jinja``
+#: explains each of these names.
 _ARRAYS = ("neighbours", "weights", "on_seams", "at_sites", "dw", "x", "start", "varied", "out")
 _OF_GRAPHS = ("starts", "others", "at_bonds", "colours", "colour")
 _OF_SUMS = ("sums", "adds")
@@ -32,7 +35,7 @@ _STORED |= {ir.Storage.START: "start", ir.Storage.VARIATION: "varied", ir.Storag
 
 
 def kernel_arrays(lattice: LatticeLoops) -> tuple[str, ...]:
-    """Return the names of the array parameters of all kernels of a lattice, in order."""
+    """Return the names of the array parameters that all kernels of a lattice have, in order."""
     step = lattice.step
     absent = {
         "on_seams": not lattice.seams,
@@ -48,7 +51,7 @@ def kernel_arrays(lattice: LatticeLoops) -> tuple[str, ...]:
 
 
 def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
-    """Return a function over sites, bonds or pairs as the statements of one work item."""
+    """Return a function over sites, bonds or pairs as the statements of one work item, which computes one site."""
     items = _WorkItems(lattice)
     loops = [s for s in function.body if isinstance(s, ir.Loop)]
     head = [s for s in function.body if isinstance(s, ir.Declare)]
@@ -59,14 +62,17 @@ def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 
 @dataclass
 class _WorkItems:
-    """The lowering of one function; ``declared`` are the neighbours that have a variable already."""
+    """Lowering of one function to work items; ``declared`` are the neighbours whose numbers are in variables
+    already.
+    """
 
     lattice: LatticeLoops
     declared: set[int] = field(default_factory=set)
 
     def loop(self, loop: ir.Loop) -> Iterator[ir.Statement]:
-        """Yield the statements of a work item for a loop: those of its site, or a loop over the bonds or pairs of its
-        site."""
+        """Yield the statements of a work item for a loop: the body for its own site, or a loop over the bonds or pairs
+        of the site.
+        """
         if loop.kind == "sites":
             yield from (new for s in loop.body for new in self.lowered(s))
             return

@@ -1,4 +1,6 @@
-"""Zeros among the outputs of a kernel: arrays with many zeros are cleared first, or zeros are not stored at all."""
+"""Zeros among the outputs of a kernel: an array with many zeros is cleared by one statement, or zeros are not
+stored.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +9,15 @@ from collections import Counter
 from phigen.ir import nodes as ir
 from phigen.symbolic.expression import Expression
 
-#: Least number of zeros in an array that is cleared by one statement.
+#: Least number of zeros for which an array is cleared by one statement, in place of separate stores.
 MANY_ZEROS = 6
 
 
 def zeros_first(function: ir.Function) -> ir.Function:
-    """Return the function in which arrays with many zeros are cleared before their first store, without stores of their
-    zeros."""
+    """Return the function with a statement that clears each array with many zeros before its first store.
+
+    The stores of zeros in these arrays are removed.
+    """
     zeros = Counter(stored_array(s) for s in function.body if _is_zero(s))
     sizes = Counter(stored_array(s) for s in function.body)
     cleared = {array for array, count in zeros.items() if count >= MANY_ZEROS}
