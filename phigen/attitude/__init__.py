@@ -1,1 +1,2 @@
-"""Attitudes and positions: the group element whose coadjoint action is a step on the dual of a Lie algebra."""
+"""Attitudes and positions of bodies: the group element whose coadjoint action on the dual of a Lie algebra is a
+step."""

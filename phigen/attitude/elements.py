@@ -1,8 +1,8 @@
-"""Elements of the rotation group and of the group of motions, as formulas without cancellation.
+"""Elements of the group of rotations, and of rotations with translations, as formulas without cancellation.
 
 A rotation is represented by its unit quaternion (w, x, y, z) minus (1, 0, 0, 0), whose entries are small for small
-rotations. Let |p|² = s, and φ as in `phigen.symbolic.special`. Then exp(p/2) is the quaternion (c, p/4) divided by its
-length, where c = 1 − φ(s/4)s/4. Its square exp(p) needs no root:
+rotations. Let s = |p|², and φ be the function of `phigen.symbolic.special`. Then exp(p/2) is the quaternion (c, p/4)
+divided by its length, where c = 1 − φ(s/4)s/4. Its square exp(p) contains no root:
 
     (c² − u, cp/2)/(c² + u),    u = s/16.
 
@@ -28,10 +28,10 @@ _HALF = number(Fraction(1, 2))
 
 @dataclass(frozen=True)
 class Direction:
-    """Group element before its division by lengths.
+    """A group element whose quaternion and translation have not yet been divided by lengths.
 
     The rotation is the quaternion ``turn`` divided by its ``length``; the translation is ``shift`` divided by
-    ``length``². ``factor`` is the ratio of ``turn`` to the ``turn`` of `with_phi`.
+    ``length``². ``factor`` is the ratio of ``turn`` to the quaternion (1 − sφ, p/2) of `with_phi`.
     """
 
     turn: tuple[Expression, ...]
@@ -41,7 +41,10 @@ class Direction:
 
 
 def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
-    """Return exp(p, t), or its Cayley transform if ``cayley``; ``t`` is empty for rotations."""
+    """Return exp(p, t), or the Cayley transform of (p, t) if ``cayley``, before the division by lengths.
+
+    p is the rotation vector and t the translation; ``t`` is empty for rotations.
+    """
     s = dot(p, p)
     if cayley:
         increment = with_phi(p, t, ZERO)
@@ -55,9 +58,10 @@ def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
 
 
 def with_phi(p: Vector, t: Vector, phi: Expression) -> Direction:
-    """Return the element with the quaternion (1 − sφ, p/2), for any φ; φ = 0 gives the Cayley transform.
+    """Return the element with the quaternion (1 − sφ, p/2), s = |p|², before the division by lengths, for any value of
+    φ.
 
-    In the result, ``length`` is the square of the length of the quaternion.
+    φ = 0 gives the Cayley transform. In the result, ``length`` is the square of the length of the quaternion.
     """
     s = dot(p, p)
     c = ONE - s * phi
@@ -65,7 +69,7 @@ def with_phi(p: Vector, t: Vector, phi: Expression) -> Direction:
 
 
 def _shift(p: Vector, t: Vector, factors: Vector) -> tuple[Expression, ...]:
-    """Return the combination of t, p×t and p (p·t) with three factors; () if ``t`` is empty."""
+    """Return the sum of t, p×t and p (p·t), each times one of three ``factors``; () if ``t`` is empty."""
     if not t:
         return ()
     a, b, axial = factors[0], factors[1], factors[2] * dot(p, t)
@@ -73,8 +77,8 @@ def _shift(p: Vector, t: Vector, factors: Vector) -> tuple[Expression, ...]:
 
 
 def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
-    """Return the quaternion of exp(p) or of the Cayley transform, minus 1, and its translation unless ``t`` is
-    empty."""
+    """Return the quaternion of exp(p), or of the Cayley transform of p, minus 1; the translation follows unless ``t``
+    is empty."""
     increment = direction(p, t, cayley=cayley)
     per = ONE / increment.length
     s = dot(p, p)
@@ -83,12 +87,13 @@ def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
 
 
 def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
-    """Return exp(r) or exp(r, t), minus 1, for rotations by any angle.
+    """Return exp(r), or exp(r, t) with a translation, minus 1, for a rotation vector r of any length.
 
-    For a rotation about a coordinate axis without a translation, the quaternion is (1, tan(|r|/2)), not of unit length.
-    This form is the cheapest, since the flow computes sin and cos of the angle anyway; products of elements are
-    normalised at the end of a step. With a translation, the quaternion uses sin and 1 − cos of half the angle, as does
-    the flow (see `phigen.attitude.flow_elements.by_angles`).
+    For a rotation about a coordinate axis without translation, the quaternion is (1, tan(|r|/2)) with the tangent along
+    the axis. It is not of unit length; products of elements are normalised at the end of a step. This form is the
+    cheapest, since the flow computes sin and cos of the angle |r| anyway. With a translation, the quaternion uses sin
+    and 1 − cos of half the angle, as the increments of the flow then do (see
+    `phigen.attitude.flow_elements.by_angles`).
     """
     s, turning = dot(r, r), [ri for ri in r if not ri.is_zero]
     if len(turning) == 1 and not t:
@@ -118,7 +123,7 @@ def cross(a: Vector, b: Vector) -> list[Expression]:
 
 
 def product(a: Vector, b: Vector) -> list[Expression]:
-    """Return the product of two quaternions (w, x, y, z)."""
+    """Return the product of two quaternions with the components (w, x, y, z)."""
     cross_product = cross(a[1:], b[1:])
     return [
         a[0] * b[0] - dot(a[1:], b[1:]),

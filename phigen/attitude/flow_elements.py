@@ -1,11 +1,13 @@
-"""Group elements of exact flows of parts of H.
+"""Group elements of the exact flows of parts of H, which rotate a body in a splitting.
 
-A part is written as C + Q + R with a multiple C of a Casimir, Q = ½c|m|² with the angular momentum m, and a rest R. The
-gradients of Q and of R must be constant along the flows of both. Then the group element of the flow is exp(t∇Q)
-exp(t∇R), times the rotation by C. This rotation does not change x, and its times in the flows of a step add up to h. So
-it is applied once in a step. With forces, a monitor, time in H, or noise, the rotation is not uniform; then C has an
-element in each flow, as Q and R have. The element of a flow that is composed of commuting flows is the product of their
-elements. Elements of free rigid bodies are in `phigen.attitude.free_bodies`.
+A part is written as C + Q + R: a multiple C of a Casimir, Q = ½c|m|² with the angular momentum m, and the remainder R.
+The gradients of Q and R must be constant along the flows of Q and R. Then the group element of the flow is exp(t∇Q)
+exp(t∇R), times the rotation by C. The rotation by C does not change x, and the durations of the flows in a step add up
+to h. So it is applied once in a step.
+
+With forces, a monitor, noise, or a time in H, the rotation by C is not uniform. Then C has an element in each flow, as
+Q and R have. If a flow is composed of commuting flows, its element is the product of their elements. Elements of free
+rigid bodies are in `phigen.attitude.free_bodies`.
 """
 
 from __future__ import annotations
@@ -39,15 +41,16 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import PROVED, Statement, decide_zero
 
-#: Largest number of commuting summands of a part whose orders are all tried: 4! = 24 orders.
+#: Largest number of commuting summands of a part for which all orders are tried; 4 summands have 24 orders.
 MOST_PIECES = 4
 
 
 @dataclass(frozen=True)
 class Turning:
-    """Part of H as a sum of ``casimir``, ``terms`` and ``bodies``, with the flows of the summands one after the other.
+    """A part of H as a sum of functions whose flows have known group elements: ``casimir``, ``terms`` and ``bodies``.
 
-    If ``put_back`` is set, the rotation by the Casimir is applied once in a step, not in each flow.
+    The element of the part is the product of these elements. If ``put_back`` is set, the rotation by the Casimir is
+    applied once in a step, not in each flow.
     """
 
     casimir: Expression
@@ -57,19 +60,21 @@ class Turning:
 
     @property
     def factors(self) -> list[Expression]:
-        """The summands, other than free rigid bodies, whose flows have a group element in each flow of the part."""
+        """The summands whose group elements are applied in each flow of the part, except free rigid bodies."""
         turning = self.terms if self.put_back else (self.casimir, *self.terms)
         return [e for e in turning if not e.is_zero]
 
     @property
     def left(self) -> Expression:
-        """The summand without a group element in each flow: the Casimir if ``put_back`` is set, else 0."""
+        """The summand whose rotation is applied once in a step: the Casimir if ``put_back`` is set, else 0."""
         return self.casimir if self.put_back else ZERO
 
 
 def by_angles(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> tuple[Flow, ...]:
-    """Return the flows with increments in terms of functions of half the angles; the group elements need these
-    functions anyway."""
+    """Return the flows with increments written by functions of half the rotation angles.
+
+    The group elements of the flows need these functions anyway, so they are computed once.
+    """
     turning_parts = turnings(system, group, flows, put_back=put_back)
     return tuple(_by_angles(system, group, flow, turning) for flow, turning in zip(flows, turning_parts, strict=True))
 
@@ -94,9 +99,10 @@ def _by_angles(system: System, group: Group, flow: Flow, turning: Turning) -> Fl
 
 
 def _of_angle(function: str, sign: Expression, angle: Expression, *, double: bool) -> Expression:
-    """Return sin, cos or 1 − cos (versin) of ``sign`` times the angle, or twice the angle if ``double``.
+    """Return a function of ``sign`` times the angle, or twice the angle if ``double``, in terms of sin and 1 − cos of
+    the angle.
 
-    The result is written in sin and versin of the angle.
+    ``function`` is ``sin``, ``cos`` or ``versin``, which is 1 − cos.
     """
     sine, versine = call("sin", angle), call("versin", angle)
     if double:
@@ -105,18 +111,22 @@ def _of_angle(function: str, sign: Expression, angle: Expression, *, double: boo
 
 
 def _of_square(function: str, square: Expression) -> Expression:
-    """Return ``sinroot`` or ``cosroot`` of 4s in terms of these functions of s."""
+    """Return ``sinroot`` or ``cosroot`` of 4s in terms of the values of both functions at s, the ``square``."""
     sine = call("sinroot", square)
     return sine * call("cosroot", square) if function == "sinroot" else ONE - 2 * (square * sine**2)
 
 
 def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> list[Turning]:
-    """Return the `Turning` of each flow. Raises `SpecError` that names the first part without one."""
+    """Return for each flow its part of H as a sum of functions with known group elements.
+
+    Raises `SpecError` that names the first part for which phigen knows no such sum.
+    """
     return [_turning(system, group, flow, f"H_{k}", put_back=put_back) for k, flow in enumerate(flows, 1)]
 
 
 def _turning(system: System, group: Group, flow: Flow, name: str, *, put_back: bool) -> Turning:
-    """Return the `Turning` of a flow. ``name`` stands for the part in messages."""
+    """Return the part of a flow as a sum of functions with known group elements; ``name`` stands for the part in
+    messages."""
     summands = flow.pieces or (flow,)
     bodies = tuple(summand.motion for summand in summands if isinstance(summand.motion, EulerMotion))
     remaining = [summand.hamiltonian for summand in summands if not isinstance(summand.motion, EulerMotion)]
@@ -128,9 +138,10 @@ def _turning(system: System, group: Group, flow: Flow, name: str, *, put_back: b
 def turning_of(
     system: System, group: Group, h: Expression, name: str, pieces: Sequence[Expression] = (), *, put_back: bool
 ) -> Turning:
-    """Return a `Turning` of the function h; ``pieces`` are its commuting summands, if there are some.
+    """Return the function h as a sum of functions with known group elements; ``pieces`` are its commuting summands, if
+    any.
 
-    Raises `SpecError` that contains ``name`` if phigen finds none.
+    Raises `SpecError` with the ``name`` of h if phigen knows no such sum.
     """
     orders = permutations(pieces) if len(pieces) <= MOST_PIECES else iter([tuple(pieces)])
     for candidate in chain(_candidates(system, group, h), (Turning(ZERO, order) for order in orders if order)):
@@ -145,7 +156,10 @@ def turning_of(
 
 
 def _candidates(system: System, group: Group, h: Expression) -> Iterator[Turning]:
-    """Yield decompositions of h: h alone, with a multiple of |m|²/2 as a term, and with a multiple of a Casimir."""
+    """Yield ways to write h as a sum: h alone; with a multiple of |m|²/2 as a term; with a multiple of a Casimir.
+
+    m is the angular momentum.
+    """
     yield Turning(ZERO, (h,))
     if not group.matrices and group.vectors:
         m = [symbol(system.coordinates[i]) for i in group.rotation]
@@ -157,7 +171,7 @@ def _candidates(system: System, group: Group, h: Expression) -> Iterator[Turning
 
 
 def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expression]:
-    """Yield each c for which h − c q has no second derivative along at least one coordinate."""
+    """Yield each number c for which the second derivative of h − c q with respect to one of the coordinates is 0."""
     curvatures: list[Expression] = []
     for name in system.coordinates:
         numerator, denominator = (derivative(derivative(e, name), name) for e in (h, q))
@@ -173,7 +187,7 @@ def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expres
 
 
 def constancy(system: System, turning: Turning, name: str) -> Statement:
-    """Decide whether the gradient of each factor is constant along the flow of the factor and of the factors before
+    """Decide whether the gradient of each factor is constant along the flow of this factor and of all factors before
     it."""
     names, residuals = system.coordinates, list[tuple[str, Expression]]()
     fields = [hamiltonian_vector_field(system.poisson, gradient(f, names)) for f in turning.factors]
@@ -189,10 +203,10 @@ def constancy(system: System, turning: Turning, name: str) -> Statement:
 def factor_elements(
     system: System, group: Group, turning: Turning, t: Expression | None = None
 ) -> list[list[Expression]]:
-    """Return the elements, minus 1, of the factors and then of the bodies, as functions of the state before the flow.
+    """Return the group elements, minus 1, of all factors of a part and then of its free rigid bodies.
 
-    ``t`` is the time of the flow, by default the symbol of the time step. Raises `SpecError` for matrices whose
-    exponential has no closed form.
+    They are functions of the state before the flow. ``t`` is the duration of the flow, by default the symbol of the
+    step size. Raises `SpecError` for matrices whose exponential has no closed form.
     """
     t, elements = t or symbol(TIME), []
     for factor in turning.factors:
@@ -211,7 +225,8 @@ def factor_elements(
 
 
 def joined(group: Group, elements: Sequence[Sequence[Expression]]) -> list[Expression]:
-    """Return the product of elements of successive flows; arguments and result are elements minus 1."""
+    """Return the product of the group elements of successive flows; the arguments and the result are elements minus
+    1."""
     leading, *following = elements
     result = list(leading)
     for later in following:

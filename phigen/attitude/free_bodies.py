@@ -1,22 +1,23 @@
 """The group element of the exact flow of a free rigid body, by an elliptic integral of the third kind.
 
 Let x be the momentum in the body, ẋ = x × ω with ω_i = w_i x_i, and x' its value after the time t. The rotation from
-the body at time t to the body at time 0 takes x' to x. It is the product of the shortest such rotation M and of a
-rotation about x by the angle θ|x|:
+the body at time t to the body at time 0 takes x' to x. It is the product of the shortest rotation M that takes x' to x,
+and of a rotation about x by the angle θ|x|. As a quaternion that is not of unit length,
 
     M = (|x|² + x·x', x' × x),    θ̇ = ω'·(x + x')/(|x|² + x·x').
 
-Let l, m, h be the axes with the lowest, the middle and the highest E_i of `phigen.splitting.euler`, L = |x|, and
+Let l, m, h be the axes with the lowest, the middle and the highest value of the integrals E_i in
+`phigen.splitting.euler`, which also defines P, R, S, C, D, κ and z. Let L = |x|, and
 
     β_l = w_h − w_m,  β_m = w_l − w_h,  β_h = w_m − w_l,  c = β_h x_m² − β_m x_h²,  n = β_m c ≤ 0,
     W = (β_l x_m² − β_m x_l²)c/L²,  T = 4κ/(1 + z),  Q = P − R.
 
-Then θ = t w_l − β_h n ∫S²/(1 − nS²)dt + χ/L, where χ is the angle of the point
+Then θ = t w_l − β_h n ∫S²/(1 − nS²)dt + χ/L, where χ is the polar angle of the point
 
     (1 − (Q − WC)T²/2(1 + D),  LS(c/L² + β_m(Q + W)T²/2(1 + D))).
 
-An error of the angle does not change the momentum in space. Near x' = −x, where M is undefined, the attitude has
-relative errors of about 1e-16/ν with ν = 1 + x·x'/|x|². This occurs near the separatrix, on the way from one unstable
+An error of θ does not change the momentum in space. Near x' = −x, where M is undefined, the attitude has relative
+errors of about 1e-16/ν with ν = 1 + x·x'/|x|². This occurs near the separatrix, when the body moves from one unstable
 rotation to the opposite one. If x are momenta in space, the element is the inverse of the element for −H.
 """
 
@@ -36,7 +37,7 @@ Vector = Sequence[Expression]
 
 
 def rotates(group: Group) -> bool:
-    """Whether elements of the group are quaternions, or the matrices of the rotations of so(3)."""
+    """Whether the elements of a group are rotations in space: quaternions, or the 3×3 matrices of so(3)."""
     if not group.matrices:
         return True
     if (group.dimension, group.rows) != (3, 3) or not group.orthogonal:
@@ -46,7 +47,8 @@ def rotates(group: Group) -> bool:
 
 
 def elements(motion: EulerMotion, group: Group, t: Expression) -> list[list[Expression]]:
-    """Return elements, minus 1, whose product is the element of the flow for the time ``t``."""
+    """Return two group elements, minus 1, whose product is the element of the flow of a free rigid body for the time
+    ``t``."""
     weights = [derivative(derivative(motion.hamiltonian, name), name) for name in motion.coordinates]
     addition = motion.addition(t)
     x, changes = addition.x, addition.changes()
@@ -71,7 +73,7 @@ def elements(motion: EulerMotion, group: Group, t: Expression) -> list[list[Expr
 
 
 def _matrix(group: Group, q: Vector) -> list[Expression]:
-    """Return the rotation matrix, minus 1, of the quaternion 1 + q, which may have any length."""
+    """Return the rotation matrix, minus 1, for the quaternion 1 + q, which need not have unit length."""
     once = group.generator(q[1:])
     w, rows = ONE + q[0], group.rows
     scale = 2 * power(w**2 + dot(q[1:], q[1:]), -1)
@@ -83,7 +85,10 @@ def _matrix(group: Group, q: Vector) -> list[Expression]:
 
 @dataclass(frozen=True)
 class _SortedAxes:
-    """Components of the momentum x and of w in the order l, m, h of the axes; ``square`` is L², ``inverse`` is 1/L²."""
+    """The momentum x and the inverse moments w of a rigid body, with components in the order l, m, h of increasing E_i.
+
+    ``square`` is L² = |x|², ``inverse`` is 1/L². The formulas are those of this module.
+    """
 
     x: Vector
     weights: Vector
@@ -92,7 +97,7 @@ class _SortedAxes:
 
     @property
     def betas(self) -> tuple[Expression, Expression, Expression]:
-        """The constants β_l, β_m, β_h."""
+        """The constants β_l = w_h − w_m, β_m = w_l − w_h and β_h = w_m − w_l."""
         low, middle, high = self.weights
         return high - middle, low - high, middle - low
 
@@ -104,21 +109,21 @@ class _SortedAxes:
 
     @property
     def n(self) -> Expression:
-        """The parameter n = β_m c of the elliptic integral."""
+        """The parameter n = β_m c ≤ 0 of the elliptic integral of the third kind."""
         return self.betas[1] * self.c
 
     @property
     def linear(self) -> tuple[Expression, Expression]:
-        """The factors of t and of the integral in θ: w_l and −β_h n."""
+        """The factors of t and of the elliptic integral in the angle θ: w_l and −β_h n."""
         return self.weights[0], -(self.betas[2] * self.n)
 
     def point(
         self, q: Expression, unit: Expression, square: Expression, s: Expression, c: Expression, d: Expression
     ) -> tuple[Expression, Expression]:
-        """Return the point whose angle is χ, with its second entry divided by L.
+        """Return the point in the plane whose polar angle is χ, with its second coordinate divided by L.
 
         The arguments are Q, 1, T², S, C and D. If ``unit`` and ``square`` are 1 and T² times a common factor, the point
-        is multiplied by this factor too.
+        is multiplied by this factor, which does not change χ.
         """
         of_l, of_m, _ = self.betas
         ratio = self.c * self.inverse
@@ -128,17 +133,21 @@ class _SortedAxes:
 
 
 def identities() -> Iterator[tuple[str, Expression]]:
-    """Yield named residuals that vanish if the element is that of the flow, in independent symbols x_i, w_i and S.
+    """Yield pairs of a label and an expression in the independent symbols x_i, w_i and S.
 
-    The residuals assume that x' is the momentum after the flow, which the identities of the motion prove; Ṡ = CD.
+    All expressions vanish if the group element is that of the flow, provided that x' is the momentum after the flow.
+    The identities of `phigen.splitting.euler` prove this. The time derivative of S is CD.
     """
     yield from _shortest_rotation()
-    for order in ((0, 2, 1), (1, 2, 0)):  # cyclic permutations give the other orders of axes
+    for order in ((0, 2, 1), (1, 2, 0)):  # all other orders of the axes are cyclic permutations of these
         yield from _angle(order)
 
 
 def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of M x' = x and of Ṁ = M(ω − θ̇x')/2, the latter up to the length of M, for any ω."""
+    """Yield pairs of a label and an expression for M, the shortest rotation that takes x' to x.
+
+    All expressions vanish if M x' = x and if, up to the length of the quaternion M, Ṁ = M(ω − θ̇x')/2 for any ω.
+    """
     x, omega = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "ω"))
     end = [symbol(Symbol("attitude", "end", i)) for i in range(2)]
     end.append(sqrt(dot(x, x) - dot(end, end)))
@@ -154,9 +163,9 @@ def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
 
 
 def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
-    """Yield the residual of the formula for θ̇ (module docstring).
+    """Yield a label and an expression that vanishes if the formula for θ has the time derivative θ̇ of this module.
 
-    The axes l, m, h of smallest, middle and largest E_i have the indices ``order``.
+    ``order`` has the indices of the axes l, m, h with the smallest, the middle and the largest E_i.
     """
     x, w = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "w"))
     name = Symbol("attitude", "S")

@@ -1,8 +1,8 @@
-"""The group of an attitude: rotations of so(3), motions of se(3), or matrices of a representation.
+"""The group of an attitude: rotations of so(3), rotations with translations of se(3), or matrices of a representation.
 
-On the dual of a Lie algebra, a step x₀ → x₁ is the coadjoint action of a group element, which is a map τ (exp or
-Cayley) of the covector p. The product of these elements along a trajectory is the attitude g. It maps the body to
-space. The sign of the bracket decides between two conventions:
+On the dual of a Lie algebra, a step x₀ → x₁ is the coadjoint action of the group element τ(p), where τ is exp or the
+Cayley transform, and p is the covector of the step. The product of these elements along a trajectory is the attitude g,
+which maps vectors in the body to vectors in space. The sign of the bracket decides between two conventions:
 
 - minus: x are momenta in the body, ġ = g·Ω with Ω = ∇H, and the momentum in space is constant
 - plus: x are momenta in space, ġ = Ω·g, and the momentum in the body is constant
@@ -22,7 +22,7 @@ from phigen.realisations.cayley import closed_representation
 from phigen.spec.model import LieAlgebraForm
 from phigen.symbolic.expression import ONE, ZERO, Expression, total
 
-#: The values of ``reconstruct``.
+#: The values of the key ``reconstruct`` in specs: the form in which attitudes are computed.
 QUATERNION, MATRIX = "quaternion", "matrix"
 
 Triple = tuple[int, int, int]
@@ -31,11 +31,12 @@ Dense = tuple[tuple[Expression, ...], ...]
 
 @dataclass(frozen=True)
 class Group:
-    """Group of an attitude and its algebra, which has ``dimension`` components.
+    """The group of an attitude, and its Lie algebra with ``dimension`` components.
 
-    ``spatial`` says that x are momenta in space, so that elements are multiplied from the left. If the attitude is a
-    matrix, ``matrices`` has the generator of each component. Otherwise the attitude is a quaternion: ``rotation`` has
-    the indices of the components of so(3), and ``vectors`` the indices of each vector that they rotate.
+    ``spatial`` says that x are momenta in space, so that the elements of steps are multiplied from the left. If
+    attitudes are matrices, ``matrices`` has the generator of each component. Otherwise they are quaternions:
+    ``rotation`` has the indices of the components that form so(3), and ``vectors`` the indices of each vector that
+    so(3) rotates.
     """
 
     spatial: bool
@@ -46,31 +47,31 @@ class Group:
 
     @property
     def translation(self) -> tuple[int, ...]:
-        """The indices of the translations if the algebra is se(3); else ()."""
+        """The indices of the components that translate the body, if the algebra is se(3); else ()."""
         return self.vectors[0] if self.dimension == 6 and len(self.vectors) == 1 else ()
 
     @property
     def kind(self) -> str:
-        """``quaternion``, ``pose`` (quaternion and position) or ``matrix``."""
+        """The form of attitudes: ``quaternion``, ``pose`` (a quaternion and a position) or ``matrix``."""
         return MATRIX if self.matrices else "pose" if self.translation else QUATERNION
 
     @property
     def rows(self) -> int:
-        """Number of rows of the matrices; 0 for quaternions."""
+        """Number of rows of the matrices of the group; 0 for quaternions."""
         return len(self.matrices[0]) if self.matrices else 0
 
     @property
     def size(self) -> int:
-        """Number of entries of an element: 4 for quaternions, 7 for poses, rows² for matrices."""
+        """Number of entries of a group element: 4 for quaternions, 7 for poses, rows² for matrices."""
         return self.rows**2 or (7 if self.translation else 4)
 
     @property
     def orthogonal(self) -> bool:
-        """Whether elements are quaternions or orthogonal matrices, that is, whether all generators are skew."""
+        """Whether group elements are quaternions or orthogonal matrices; for matrices, all generators are then skew."""
         return all((m[i][j] + m[j][i]).is_zero for m in self.matrices for i in range(len(m)) for j in range(len(m)))
 
     def generator(self, p: Sequence[Expression]) -> list[Expression]:
-        """Return the matrix Σ p_i E_i, row by row."""
+        """Return the matrix Σ p_i E_i of an element p of the algebra, row by row."""
         size = range(self.rows)
         return [
             total(pi * m[i][j] for pi, m in zip(p, self.matrices, strict=True) if not (pi.is_zero or m[i][j].is_zero))
@@ -80,10 +81,10 @@ class Group:
 
 
 def group_of(system: System, requested: str, kind: str) -> Group:
-    """Return the group of a system for the value ``requested`` of ``reconstruct``; ``kind`` is the kind of its
-    bi-realisation.
+    """Return the group of attitudes of a system for the value ``requested`` of ``reconstruct``, quaternion or matrix.
 
-    Raises `SpecError` if π is not Lie–Poisson, or if its algebra has no such group.
+    ``kind`` is the kind of the bi-realisation. Raises `SpecError` if π is not Lie–Poisson, or if its algebra has no
+    such group.
     """
     algebra = system.lie_algebra
     if algebra is None:
@@ -99,9 +100,10 @@ def refused(system: System, message: str, hint: str = "") -> SpecError:
 
 
 def _rotations(system: System, algebra: LieAlgebra) -> Group:
-    """Return the group of quaternions for three coordinates that form so(3), with the vectors that they rotate.
+    """Return the group for quaternions: of three coordinates that form so(3), and of the vectors that these rotate.
 
-    If the algebra consists of so(3) and one vector, this is se(3).
+    If the algebra consists of so(3) and one vector, it is se(3). Raises `SpecError` unless exactly one such triple
+    exists.
     """
     triples = [(r, s) for r in combinations(range(algebra.dimension), 3) if (s := _sign(algebra, r))]
     if len(triples) != 1:
@@ -117,7 +119,10 @@ def _rotations(system: System, algebra: LieAlgebra) -> Group:
 
 
 def _sign(algebra: LieAlgebra, triple: tuple[int, ...]) -> int:
-    """Return ±1 if x ↦ (x_i, x_j, x_k) is a homomorphism to so(3) with [L_1, L_2] = ±L_3; 0 if it is none."""
+    """Return ±1 if the projection on three coordinates is a homomorphism to so(3) with [L_1, L_2] = ±L_3; 0 otherwise.
+
+    The three coordinates have the indices ``triple``; the projection sets all other components to 0.
+    """
     products = {(0, 1): 2, (1, 2): 0, (0, 2): 1}
     for sign in (1, -1):
         signs = {(0, 1): sign, (1, 2): sign, (0, 2): -sign}
@@ -135,19 +140,21 @@ def _place(triple: Sequence[int], i: int) -> int:
 
 
 def _components(algebra: LieAlgebra, i: int, j: int, triple: Sequence[int]) -> dict[int, object]:
-    """Return the components of [E_i, E_j] in a triple of indices, by their positions in the triple."""
+    """Return the components of [E_i, E_j] along three basis elements, by their positions in ``triple``."""
     row = algebra.bracket(i, j)
     return _numbers({k: c for k, c in row.items() if k in triple}, triple)
 
 
 def _numbers(row: Mapping[int, Expression], triple: Sequence[int]) -> dict[int, object]:
-    """Return the entries of a row by the positions of their indices in a triple, −1 for others; numbers as Python
-    numbers."""
+    """Return the entries of a row by the position of their index in ``triple``, or −1 for other indices.
+
+    Entries that are numbers become Python numbers.
+    """
     return {_place(triple, k): c.value if c.is_number else c for k, c in row.items()}
 
 
 def _vectors(algebra: LieAlgebra, rotation: Triple, sign: int) -> tuple[Triple, ...]:
-    """Return the index triples of the vectors that the components ``rotation`` rotate."""
+    """Return the triples of indices that transform as vectors under the components ``rotation``, which form so(3)."""
     left = [i for i in range(algebra.dimension) if i not in rotation]
     vectors: list[Triple] = []
     for a, b, c in permutations(left, 3):
@@ -172,7 +179,10 @@ def _is_vector(algebra: LieAlgebra, rotation: Triple, translation: Sequence[int]
 
 
 def _matrices(system: System, algebra: LieAlgebra, kind: str) -> Group:
-    """Return the group of the matrices that represent the algebra, with the sign of its bracket."""
+    """Return the group of the matrices that represent the algebra, with the sign that belongs to its bracket.
+
+    Raises `SpecError` if no faithful matrices are known that suit the ``kind`` of the bi-realisation.
+    """
     representation = closed_representation(algebra) if kind == "cayley" else known_representation(algebra)
     if representation is None:
         raise refused(
@@ -190,16 +200,19 @@ def _matrices(system: System, algebra: LieAlgebra, kind: str) -> Group:
 
 
 def _is_spatial(system: System, algebra: LieAlgebra) -> bool:
-    """Whether x are momenta in space: by the sign in the spec, else by the brackets of so(3); False for other
-    algebras."""
+    """Whether x are momenta in space: by the sign of the bracket in the spec or, without one, in the brackets of so(3).
+
+    If the algebra is given in another way, and is not so(3), x count as momenta in the body.
+    """
     if isinstance(system.form, LieAlgebraForm):
         return system.form.sign > 0
     return algebra.dimension == 3 and _sign(algebra, (0, 1, 2)) > 0
 
 
 def _signed(e: Expression, spatial: bool) -> Expression:
-    """Return an entry of a generator with the sign of the convention.
+    """Return an entry of a generator with the sign of the convention for momenta in the body or in space.
 
-    The matrices represent the bracket if elements are multiplied from the left; otherwise the negative matrices do.
+    The known matrices represent the bracket if elements are multiplied from the left, for momenta in space; otherwise
+    their negatives do.
     """
     return e if spatial else -ONE * e

@@ -1,12 +1,12 @@
 """Group elements that are matrices, minus 1: exp(P) and the Cayley transform of P = Σ p_i E_i, as formulas without
 loops.
 
-By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix of N rows. So all powers, and the series of exp,
-are combinations of 1, P, …, P^{N−1}, and their scalar factors obey a recurrence. This needs N − 2 products of matrices.
-Up to signs, the q_j are the elementary symmetric functions of the eigenvalues, which follow from the traces of powers
-by Newton's identities.
+By the theorem of Cayley and Hamilton, Pᴺ = Σ_{j<N} q_j Pʲ for a matrix with N rows. So all powers of P, and the series
+of exp, are combinations of 1, P, …, P^{N−1}, whose scalar factors satisfy a recurrence. This takes N − 2 products of
+matrices. Up to signs, the q_j are the elementary symmetric functions of the eigenvalues. They follow from the traces of
+powers of P by Newton's identities.
 
-In flows of a splitting, most P are rotations in planes, or shifts: P³ = −sP with a number s. Then exp(P) is 1 +
+In flows of a splitting, most P are rotations in planes, or shifts: P³ = −sP with a number s. Then exp(P) = 1 +
 sin(√s)/√s P + (1 − cos √s)/s P², for any s.
 """
 
@@ -21,7 +21,7 @@ from phigen.attitude.group import Dense, Group
 from phigen.symbolic.expression import ONE, ZERO, Expression, call, number, total
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Number of terms of the series of exp that double precision needs if the largest eigenvalue of P is at most 1/2.
+#: Degree of the series of exp that double precision requires if all eigenvalues of P have at most the modulus 1/2.
 TERMS = 14
 
 _HALF = number(Fraction(1, 2))
@@ -30,20 +30,20 @@ Flat = list[Expression]
 
 
 def size_of(group: Group, p: Sequence[Expression]) -> Expression:
-    """Return an upper bound for the squared modulus of the largest eigenvalue of P.
+    """Return an upper bound for the squared modulus of the largest eigenvalue of P = Σ p_i E_i.
 
-    The bound is the sum of the squares of all entries; half this sum for skew P.
+    The bound is the sum of the squares of all entries of P or, if all generators are skew, half of this sum.
     """
     squares = total(e**2 for e in group.generator(p))
     return _HALF * squares if group.orthogonal else squares
 
 
 def exponential(group: Group, p: Sequence[Expression]) -> Flat:
-    """Return the entries of exp(P) − 1, by a series that is accurate if `size_of` is at most 1/4."""
+    """Return the entries of exp(P) − 1 for P = Σ p_i E_i, by a series that is accurate if `size_of` is at most 1/4."""
     powers, (first, *recurrence) = _powers(group, p), [*_symmetric(group, p)]
     assert first is ONE
     rows = len(powers) + 1
-    # coefficients in P^rows = Σ last_j P^j
+    # the coefficients in the theorem of Cayley and Hamilton: P^rows = Σ last_j P^j
     last = [e if (rows - j) % 2 else -ONE * e for j, e in enumerate(reversed(recurrence))]
     factors = [number(Fraction(1, factorial(j))) if j else ZERO for j in range(rows)]
     power = [ZERO] * (rows - 1) + [ONE]
@@ -54,23 +54,24 @@ def exponential(group: Group, p: Sequence[Expression]) -> Flat:
 
 
 def cayley(group: Group, p: Sequence[Expression]) -> Flat:
-    """Return the entries of (1 − P/2)⁻¹(1 + P/2) − 1 = (1 − P/2)⁻¹P.
+    """Return the entries of the Cayley transform of P = Σ p_i E_i minus 1: (1 − P/2)⁻¹(1 + P/2) − 1 = (1 − P/2)⁻¹P.
 
-    With A = P/2 and its symmetric functions e_i, (1 − A)⁻¹ Σ(−1)ⁱe_i = Σ_k A^k Σ_{i < N−k} (−1)ⁱe_i.
+    Let A = P/2, with N rows, and let e_i be the elementary symmetric functions of its eigenvalues. Then (1 − A)⁻¹
+    Σ(−1)ⁱe_i = Σ_k A^k Σ_{i < N−k} (−1)ⁱe_i.
     """
     half = [_HALF * e for e in p]
     powers, symmetric = _powers(group, half), [*_symmetric(group, half)]
     rows = len(powers) + 1
     signed = [e if i % 2 == 0 else -ONE * e for i, e in enumerate(symmetric)]
     per = ONE / total(signed)
-    # The result is 2((1 − A)⁻¹ − 1), that is, 2/Σ(−1)ⁱe_i times the combination of powers of A with these factors.
-    # The first factor, of the unit matrix, is −(−1)ᴺe_N.
+    # The result is 2((1 − A)⁻¹ − 1), that is, 2/Σ(−1)ⁱe_i times the combination of the powers 1, A, A², … of A with
+    # these factors. The factor of the unit matrix is −(−1)ᴺe_N.
     sums = [-ONE * signed[rows], *(total(signed[: rows - k]) for k in range(1, rows))]
     return [2 * per * e for e in _combined(sums, powers)]
 
 
 def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
-    """Return the powers P, …, P^{N−1}."""
+    """Return the powers P, …, P^{N−1} of P = Σ p_i E_i, a matrix with N rows."""
     rows = group.rows
     powers = [group.generator(p)]
     while len(powers) < rows - 1:
@@ -79,9 +80,9 @@ def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
 
 
 def _symmetric(group: Group, p: Sequence[Expression]) -> Iterator[Expression]:
-    """Yield the elementary symmetric functions of the eigenvalues of P, from 1 to the determinant.
+    """Yield the elementary symmetric functions of the eigenvalues of P = Σ p_i E_i, from 1 to the determinant.
 
-    Those of odd degree are 0 if P is skew.
+    If all generators are skew, the functions of odd degree are 0.
     """
     powers = _powers(group, p)
     rows = len(powers) + 1
@@ -105,7 +106,7 @@ def _trace_of_product(a: Flat, b: Flat, rows: int) -> Expression:
 
 
 def _combined(factors: Sequence[Expression], powers: Sequence[Flat]) -> Flat:
-    """Return the matrix factors_0 · 1 + Σ factors_k P^k, row by row, from the powers P, P², …."""
+    """Return the entries of factors_0 · 1 + Σ factors_k P^k, row by row, from the ``powers`` P, P², …."""
     rows = len(powers) + 1
     return [
         total([factors[0]] * (i % (rows + 1) == 0) + [f * m[i] for f, m in zip(factors[1:], powers, strict=True)])
@@ -114,15 +115,16 @@ def _combined(factors: Sequence[Expression], powers: Sequence[Flat]) -> Flat:
 
 
 def multiplied(a: Sequence[Expression], b: Sequence[Expression]) -> Flat:
-    """Return the product of two square matrices; all three are lists of entries, row by row."""
+    """Return the product of two square matrices; the arguments and the result are lists of entries, row by row."""
     n = isqrt(len(a))
     return [total(a[i * n + k] * b[k * n + j] for k in range(n)) for i in range(n) for j in range(n)]
 
 
 def flow_exponential(group: Group, p: Sequence[Expression], positive: Sequence[str]) -> Flat | None:
-    """Return the entries of exp(P) − 1 in closed form; None if phigen knows no closed form.
+    """Return the entries of exp(P) − 1 for P = Σ p_i E_i in closed form; None if phigen knows no closed form.
 
-    phigen knows it for matrices with P³ = −sP, with a number or an expression s, and for sums of commuting ones.
+    A closed form is known if P³ = −sP with a number or an expression s, and for sums of commuting matrices of this
+    kind.
     """
     basis = [(pi, m) for pi, m in zip(p, group.matrices, strict=True) if not pi.is_zero]
     ratios = [_ratio(m) for _, m in basis]
@@ -138,12 +140,12 @@ def flow_exponential(group: Group, p: Sequence[Expression], positive: Sequence[s
 
 
 def product_less_1(a: Sequence[Expression], b: Sequence[Expression]) -> Flat:
-    """Return (1 + A)(1 + B) − 1, without cancellation."""
+    """Return the entries of (1 + A)(1 + B) − 1 without cancellation, from those of A and B."""
     return [x + y + z for x, y, z in zip(a, b, multiplied(a, b), strict=True)]
 
 
 def _ratio(matrix: Dense) -> Fraction | None:
-    """Return the number s with E³ = −sE for a matrix of numbers; None if there is none."""
+    """Return the number s with E³ = −sE for a matrix E of numbers; None if there is no such s."""
     e = [x for row in matrix for x in row]
     cube = multiplied(multiplied(e, e), e)
     if not all(x.is_number for x in (*e, *cube)):
@@ -159,7 +161,10 @@ def _commute(a: Dense, b: Dense) -> bool:
 
 
 def _of_constant(p: Expression, matrix: Dense, s: Fraction) -> Flat:
-    """Return exp(pE) − 1 for E³ = −sE; if s is a square, by sin and cos of √s p."""
+    """Return the entries of exp(pE) − 1 for a matrix E of numbers with E³ = −sE.
+
+    If s is the square of a rational number, sin and cos of √s p are used.
+    """
     e = [x for row in matrix for x in row]
     root = Fraction(isqrt(s.numerator), isqrt(s.denominator)) if s > 0 else Fraction(0)
     if s > 0 and root**2 == s:
@@ -172,7 +177,7 @@ def _of_constant(p: Expression, matrix: Dense, s: Fraction) -> Flat:
 
 
 def _of_plane(generator: Flat, positive: Sequence[str]) -> Flat | None:
-    """Return exp(P) − 1 if P³ = −sP, where s is 0, −tr P² or −tr P²/2; None for other P."""
+    """Return the entries of exp(P) − 1 if P³ = −sP for s = 0, s = −tr P² or s = −tr P²/2; None for other P."""
     square = multiplied(generator, generator)
     cube, trace = multiplied(square, generator), _trace(square, isqrt(len(square)))
     for s in (-_HALF * trace, -ONE * trace, ZERO):
@@ -184,5 +189,5 @@ def _of_plane(generator: Flat, positive: Sequence[str]) -> Flat | None:
 
 
 def _along_and_across(s: Expression) -> tuple[Expression, Expression]:
-    """Return sin(√s)/√s and (1 − cos √s)/s."""
+    """Return sin(√s)/√s and (1 − cos √s)/s, the factors of P and P² in exp(P) − 1 for P³ = −sP."""
     return call("sinroot", s), _HALF * call("sinroot", s / 4) ** 2

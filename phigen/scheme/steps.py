@@ -208,8 +208,9 @@ class _Staged:
 class InnerSolve:
     """Settings of the iteration that solves the implicit equation of a step.
 
-    ``tolerance`` bounds the last correction. ``relative`` says that errors are measured relative to each coordinate;
-    this is so for log-canonical π, whose coordinates keep their signs.
+    The iteration ends when the error that remains after a correction is estimated to be below ``tolerance``.
+    ``relative`` says that errors are measured relative to each coordinate; this is so for log-canonical π, whose
+    coordinates keep their signs.
     """
 
     max_iterations: int = 20

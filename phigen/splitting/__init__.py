@@ -1,1 +1,1 @@
-"""Explicit steps: H as a sum of parts with elementary flows, and these flows."""
+"""Splitting of H into parts with elementary flows, for explicit steps: the parts and their flows."""

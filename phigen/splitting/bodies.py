@@ -1,7 +1,7 @@
-"""Splittings of attracting bodies in relative coordinates: Kepler motions A and a small remainder B.
+"""Splittings for attracting bodies in relative coordinates: Kepler motions A, and a small remainder B.
 
-H is Σ p_i²/2m_i − Σ k_ij/|q_i − q_j| and further terms. Further terms without coordinates of the bodies, such as the
-free rotation of one of the bodies, belong to A, all others to B.
+H is Σ p_i²/2m_i − Σ k_ij/|q_i − q_j| plus further terms. Further terms that do not contain coordinates of the bodies,
+such as the free rotation of one of them, belong to A; all other further terms belong to B.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Generator, Poly
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Key of specs for relative coordinates.
+#: The key of specs that selects relative coordinates.
 KEY = "coordinates_from"
 
 _FORM = (
@@ -35,13 +35,13 @@ _HINT = "the first body is the heaviest, the others follow from the inside out, 
 
 
 class _NoBodiesError(Exception):
-    """H is not that of attracting bodies; the text is the reason."""
+    """Raised if H is not that of attracting bodies; the text is the reason."""
 
 
 def split_bodies(system: System, change: str) -> SplitHamiltonian:
-    """Return the parts A and B of H in the relative coordinates called ``change``.
+    """Return H as the sum of the parts A and B, in the relative coordinates called ``change`` in specs.
 
-    Raises `SpecError`, located at the key, if H is not of this form.
+    Raises `SpecError`, located at the key `KEY` of the spec, if H is not that of attracting bodies.
     """
     summands = hamiltonian_terms(system)
     ring = ring_of(system, summands)
@@ -61,14 +61,18 @@ def split_bodies(system: System, change: str) -> SplitHamiltonian:
 
 @dataclass(frozen=True)
 class _Distance:
-    """The variable 1/|q_a − q_b| of the ring, with a pair of coordinates (indices) for each axis."""
+    """A variable of the ring that stands for 1/|q_a − q_b|; ``pairs`` has, for each axis, the indices of two
+    coordinates."""
 
     variable: int
     pairs: tuple[tuple[int, int], ...]
 
 
 def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[Term]]:
-    """Return the bodies, and the terms that are neither kinetic energies nor attractions of pairs."""
+    """Return the attracting bodies in H, and the terms that are neither kinetic energies nor attractions of pairs.
+
+    Raises `_NoBodiesError` if H contains no attracting bodies, or if one of them lacks a momentum or a kinetic energy.
+    """
     distances = [d for g in ring.tower.generators if is_inverse_distance(g) for d in [_distance(ring, g)] if d]
     if not distances:
         raise _NoBodiesError("no attraction of two bodies was found")
@@ -111,7 +115,10 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
 
 
 def _distance(ring: Ring, generator: Generator) -> _Distance | None:
-    """Return the distance of a generator, if its argument is a sum of squares of differences of two coordinates."""
+    """Return the two bodies whose inverse distance is a variable (``generator``) of the ring.
+
+    Returns None if the argument of the root is not a sum of squares of differences of two coordinates.
+    """
     (argument,) = generator.arguments
     support, tower = ring.support(argument), ring.tower
     pairs = []
@@ -127,7 +134,10 @@ def _distance(ring: Ring, generator: Generator) -> _Distance | None:
 
 
 def _axes(pairs: Iterator[tuple[int, int]]) -> list[list[int]]:
-    """Return the coordinates along each axis, in order. Coordinates whose difference occurs in H are on one axis."""
+    """Return for each axis the indices of the coordinates along it, in order.
+
+    ``pairs`` are pairs of coordinates whose difference occurs in H; such coordinates lie along one axis.
+    """
     axes: list[set[int]] = []
     for pair in pairs:
         merged = {*pair}.union(*(axis for axis in axes if not axis.isdisjoint(pair)))
@@ -142,7 +152,7 @@ def _power(ring: Ring, variable: int, exponent: int) -> Monomial:
 def _commuting_terms(
     ring: Ring, bodies: AttractingBodies, other_terms: Sequence[Term]
 ) -> tuple[list[Term], list[Term]]:
-    """Return the terms that commute with all coordinates of the bodies, and the remaining terms."""
+    """Return two lists: the terms that commute with all coordinates of the bodies, and all other terms."""
     body_coordinates = {ring.coordinates.index(name) for name in bodies.names}
     partners = {j for i in body_coordinates for j in (i, *ring.brackets_of[i])}
     alone = [t for t in other_terms if partners.isdisjoint(ring.support(t.element))]
@@ -150,12 +160,13 @@ def _commuting_terms(
 
 
 def _with_others(ring: Ring, flow: Flow, terms: Sequence[Term]) -> Flow:
-    """Return the composition of a flow with that of ``terms``, which commute with the flow."""
+    """Return the flow composed with the flow of the sum of ``terms``, which commute with its Hamiltonian."""
     return composed(ring.coordinates, [flow, _flow(ring, terms)]) if terms else flow
 
 
 def _flow(ring: Ring, terms: Sequence[Term]) -> Flow:
-    """Return the flow of a sum of terms. Raises `_NoBodiesError` if the terms do not commute, or have no flow."""
+    """Return the flow of a sum of terms. Raises `_NoBodiesError` if they do not commute with each other, or have no
+    flow."""
     conflicts = Conflicts(ring).grouped(terms)
     if len(conflicts) > 1:
         first, second = (shortened(group[0].expression) for group in conflicts[:2])
@@ -169,7 +180,10 @@ def _flow(ring: Ring, terms: Sequence[Term]) -> Flow:
 def _remainder(
     system: System, ring: Ring, remainder: Expression, terms: Sequence[Term], positions: frozenset[int], *, moving: bool
 ) -> Flow | None:
-    """Return the flow of B, or None if B is 0. A ``moving`` remainder contains momenta."""
+    """Return the flow of B, which consists of ``remainder`` and the further ``terms``; None if B is 0.
+
+    ``moving`` says that the remainder contains momenta. Raises `_NoBodiesError` if the terms of B do not commute.
+    """
     shifting = [t for t in terms if positions.issuperset(ring.support(t.element))]
     other_terms = [t for t in terms if t not in shifting]
     if moving and not remainder.is_zero and terms:

@@ -1,8 +1,9 @@
-"""Linear equations of coordinates along the flow of a part, by closing sets of monomials under differentiation.
+"""Linear equations for coordinates along the flow of a part of H, found by repeated differentiation of monomials.
 
-The derivative of a coordinate along π∇G is a polynomial in the moving variables, and each new monomial of it joins a
-list. If the list is finite, its entries w satisfy ẇ = Aw, where A contains only frozen and static quantities. Kicks and
-drifts, rotations, shears and scalings are special cases, as are triangular polynomial equations.
+The derivative of a coordinate along π∇G is a polynomial in the variables that move, and each new monomial in it is
+added to a list. If this ends, the monomials w in the list satisfy ẇ = Aw, and A contains only quantities that are
+constant along the flow. Kicks, drifts, rotations, shears and scalings are special cases, as are triangular polynomial
+equations.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from dataclasses import dataclass
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: Bounds of a list: number of monomials, their degree, and number of coordinates in a list without products. Longer
-#: lists are treated as infinite.
+#: Bounds for a list of monomials w with ẇ = Aw: the number of its monomials, their degree, and the number of monomials
+#: if all are single coordinates. Longer lists are treated as infinite.
 MOST_MONOMIALS, MOST_DEGREE, MOST_COORDINATES = 16, 8, 64
 
 Row = dict[Monomial, Poly]
@@ -22,9 +23,11 @@ Row = dict[Monomial, Poly]
 
 @dataclass(frozen=True)
 class LinearMotion:
-    """Linear equations ẇ = Aw for the monomials w in ``basis``; the first of them are the ``coordinates`` (indices).
+    """Linear equations ẇ = Aw for monomials w; their exponents are in ``basis``, and the first ones are single
+    coordinates.
 
-    A, the ``matrix``, is constant. If the equations need the monomial 1, it is the last one.
+    ``coordinates`` has the indices of these coordinates. The entries of A, the ``matrix``, are constant along the flow.
+    If the equations contain the monomial 1, it is the last one.
     """
 
     coordinates: tuple[int, ...]
@@ -34,9 +37,10 @@ class LinearMotion:
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion of the coordinates: linear equations for some, and the rates of the ``other`` coordinates by index.
+    """The motion along a vector field: systems of ``linear`` equations, and the rates of all ``other`` coordinates by
+    index.
 
-    ``moving`` are the variables that are not constant.
+    ``moving`` has the indices of the variables of the ring that are not constant.
     """
 
     moving: frozenset[int]
@@ -45,7 +49,8 @@ class Motion:
 
 
 def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
-    """Return the motion along a vector field."""
+    """Return the motion along a vector field: for each coordinate that moves, linear equations if there are any, else
+    its rate."""
     rates = {v: ring.rate(ring.tower.gens[v], field) for v in ring.state}
     rates = {v: r for v, r in rates.items() if r != 0}
     rows: dict[Monomial, Row] = {}
@@ -68,8 +73,10 @@ def motion_of(ring: Ring, field: Sequence[Poly]) -> Motion:
 def _closed(
     ring: Ring, rates: Mapping[int, Poly], start: Monomial, known_rows: Mapping[Monomial, Row]
 ) -> dict[Monomial, Row] | None:
-    """Return the rows of all monomials in the repeated derivatives of ``start``; None if there seem to be infinitely
-    many.
+    """Return the derivatives of all monomials that occur in repeated derivatives of the monomial ``start``.
+
+    ``known_rows`` are results of earlier calls; their monomials are left out. Returns None if the monomials exceed the
+    bounds, and so may be infinitely many.
     """
     rows: dict[Monomial, Row] = {}
     pending = [start]
@@ -86,7 +93,7 @@ def _closed(
 
 
 def _row(ring: Ring, rates: Mapping[int, Poly], m: Monomial) -> Row:
-    """Return the derivative of a monomial, by monomials."""
+    """Return the derivative of a monomial as a map: monomial in the moving variables → coefficient."""
     parts = []
     for v, rate in rates.items():
         if m[v]:
@@ -97,7 +104,7 @@ def _row(ring: Ring, rates: Mapping[int, Poly], m: Monomial) -> Row:
 
 
 def _motions(ring: Ring, rows: Mapping[Monomial, Row], starts: Mapping[Monomial, int]) -> Iterator[LinearMotion]:
-    """Yield the linear equations, divided into systems that share no monomials other than 1."""
+    """Yield the linear equations as independent systems, which share no monomial other than 1."""
     label = {m: k for k, m in enumerate(rows) if any(m)}
     for m, row in rows.items():
         merged = {label[k] for k in (m, *row) if any(k)}

@@ -1,6 +1,7 @@
-"""Assignment of terms that do not commute to different parts: a colouring of the graph of conflicts.
+"""Grouping of the terms of H into sums of commuting terms, by colouring a graph: its edges join terms that do not
+commute.
 
-The colouring is by D. Brélaz (DSATUR, 1979), which uses two colours wherever two are sufficient, as on lattices.
+The algorithm is that of D. Brélaz (DSATUR, 1979). It uses two colours wherever two are sufficient, as on many lattices.
 """
 
 from __future__ import annotations
@@ -15,19 +16,19 @@ from phigen.splitting.flow import Term
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: Number of pairs of terms above which the progress display shows a stage for them.
+#: Number of pairs of terms above which the progress display shows the decision which pairs commute.
 MIN_PAIRS_FOR_PROGRESS = 100
 
 
 class Conflicts:
-    """Which pairs of terms of H commute.
+    """Cache of the decisions which pairs of terms of H commute.
 
-    Results for a term and for a pair are cached, since most candidate groupings share them.
+    Many candidate groupings of H contain the same terms, so results for a term and for a pair are stored.
     """
 
     def __init__(self, ring: Ring) -> None:
         self.ring = ring
-        self._terms: dict[int, Term] = {}  # keeps the terms alive, so that their ids stay unique
+        self._terms: dict[int, Term] = {}  # results are stored by id, so the terms must stay alive
         self._supports: dict[int, frozenset[int]] = {}
         self._partners: dict[int, frozenset[int]] = {}
         self._monomials: dict[int, frozenset[Monomial]] = {}
@@ -35,19 +36,19 @@ class Conflicts:
         self._fields: dict[int, list[Poly]] = {}
 
     def support(self, term: Term) -> frozenset[int]:
-        """Return the coordinates that a term depends on."""
+        """Return the indices of the coordinates on which a term depends."""
         self._know(term)
         return self._supports[id(term)]
 
     def monomials(self, term: Term) -> frozenset[Monomial]:
-        """Return the monomials of a term in the state-dependent variables."""
+        """Return the exponents of the monomials of a term in the variables that depend on coordinates."""
         self._know(term)
         if id(term) not in self._monomials:
             self._monomials[id(term)] = frozenset(self.ring.terms(term.element, self.ring.state))
         return self._monomials[id(term)]
 
     def graph(self, terms: Sequence[Term]) -> list[set[int]]:
-        """Return for each term the terms that it does not commute with."""
+        """Return, for each term, the indices of the terms with which it does not commute."""
         supports = [self.support(t) for t in terms]
         partners = [self._partners[id(t)] for t in terms]
         pairs = [(i, j) for i in range(len(terms)) for j in range(i) if not partners[i].isdisjoint(supports[j])]
@@ -60,7 +61,8 @@ class Conflicts:
         return conflicts
 
     def grouped(self, terms: Sequence[Term]) -> list[list[Term]]:
-        """Return the terms in commuting groups, in as few groups as the colouring needs."""
+        """Return the terms in groups of commuting terms; the number of groups is the number of colours of the conflict
+        graph."""
         neighbours = self.graph(terms)
         colours = coloured(neighbours, [self.support(t) for t in terms])
         return [[t for t, c in zip(terms, colours, strict=True) if c == k] for k in sorted(set(colours))]
@@ -72,7 +74,7 @@ class Conflicts:
             self._partners[id(term)] = frozenset(j for i in support for j in self.ring.brackets_of[i])
 
     def _decide(self, pairs: Sequence[tuple[Term, Term]]) -> None:
-        """Decide for each pair whether its terms commute, and store the results."""
+        """Decide for each pair of terms whether they commute, and store the results."""
         open_ = [(a, b) for a, b in pairs if (id(a), id(b)) not in self._commute]
         with (
             progress.stage("pairs of terms", len(open_))
@@ -85,7 +87,7 @@ class Conflicts:
                     running.done = k
 
     def _brackets_to_zero(self, a: Term, b: Term) -> bool:
-        """Whether {a, b} = 0 is proved, by the vector field of b, which is computed once."""
+        """Whether {a, b} = 0 is proved; the vector field of b is computed once and stored."""
         if all(pair in self.ring.zero_pairs for pair in product(self.support(a), self.support(b))):
             return True
         if id(b) not in self._fields:
@@ -95,13 +97,14 @@ class Conflicts:
 
 
 def coloured(neighbours: Sequence[set[int]], supports: Sequence[Collection[int]]) -> list[int]:
-    """Return a colour for each node, from 0, such that neighbours differ.
+    """Return a colour, from 0 on, for each node of a graph, such that neighbours have different colours.
 
-    Among the possible colours, a node gets that of the nodes with which it shares most of its support.
+    ``supports`` has the coordinates of each node. Among the possible colours, a node gets the colour of those nodes
+    with which it shares the most coordinates.
     """
     colours = [-1] * len(neighbours)
     neighbour_colours: list[set[int]] = [set() for _ in neighbours]
-    sharing: list[Counter[int]] = []  # for each colour: coordinate → number of nodes that have it
+    sharing: list[Counter[int]] = []  # for each colour: coordinate → number of nodes with this colour and coordinate
     uncoloured = set(range(len(neighbours)))
     while uncoloured:
         i = max(uncoloured, key=lambda i: (len(neighbour_colours[i]), len(neighbours[i]), -i))

@@ -1,4 +1,5 @@
-"""Check of the floating-point values of matrix exponentials against rigorous enclosures by ball arithmetic."""
+"""Check that matrix exponentials in floating-point arithmetic lie within rounding of rigorous enclosures by ball
+arithmetic."""
 
 from __future__ import annotations
 
@@ -12,18 +13,22 @@ from phigen.splitting.matrices import MAX_PADE_NORM, PADE, MatrixExponential
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement
 
-#: Times at which the values are compared, as multiples of 1/‖A‖.
+#: Times t at which exp(tA) − 1 is checked, as multiples of 1/‖A‖.
 TIMES = (1e-3, 1.0, 30.0)
 
-#: Largest error relative to the norm of the matrix, in units of rounding, for each row and for each unit of ‖tA‖.
+#: Largest accepted error of exp(tA) − 1, relative to its norm and in units of the machine precision, divided by the sum
+#: of ‖tA‖ and the number of rows.
 UNITS = 8.0
 
-#: Precision of the enclosures in bits.
+#: Precision of the ball arithmetic in bits.
 BITS = 200
 
 
 def enclosed(name: str, exponential: MatrixExponential, values: Mapping[str, float]) -> Statement:
-    """Return the statement that exp(tA) − 1 is exact up to rounding, for these values of parameters."""
+    """Return the statement that exp(tA) − 1 is exact up to rounding; ``values`` are values of the parameters in A.
+
+    ``name`` is the name of the statement.
+    """
     try:
         rates = np.array(evaluate(list(exponential.rates), values)).reshape(exponential.size, -1)
     except (DomainError, KeyError):
@@ -35,7 +40,8 @@ def enclosed(name: str, exponential: MatrixExponential, values: Mapping[str, flo
 
 
 def exponential_less_one(a: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return exp(a) − 1 as the generated code computes it."""
+    """Return exp(a) − 1 for a square matrix, computed as in the generated code: Padé approximation, scaling and
+    squaring."""
     n, norm = len(a), float(np.abs(a).sum(axis=1).max())
     if not np.isfinite(norm):
         return np.full_like(a, np.nan)
@@ -53,7 +59,7 @@ def exponential_less_one(a: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _error(a: NDArray[np.float64]) -> float:
-    """Return the error of exp(a) − 1 relative to its norm."""
+    """Return the largest error of an entry of exp(a) − 1, relative to the norm of this matrix, by ball arithmetic."""
     computed, precision = exponential_less_one(a), ctx.prec
     try:
         ctx.prec = BITS

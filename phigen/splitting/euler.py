@@ -1,15 +1,16 @@
-"""The flow of a free rigid body: ẋ_i = α_i x_j x_k for three coordinates, α of both signs, by elliptic functions.
+"""The flow of a free rigid body by elliptic functions: ẋ_i = α_i x_j x_k for cyclic indices i, j, k, with α of both
+signs.
 
-The differences of E_i = α_j α_k x_i² are constant. Let max and min be the largest and the smallest E_i, P = max − min,
-and R the third E_i minus min. With S, C and κ of `phigen.symbolic.elliptic`, the addition theorem of Jacobi's functions
-yields
+The differences of the E_i = α_j α_k x_i² are constant. Let max and min be the largest and the smallest E_i, P = max −
+min, and R the third E_i minus min. S, C and κ are the functions of `phigen.symbolic.elliptic`, evaluated at the time of
+the flow. Then the addition theorem of Jacobi's functions gives the state x' after the flow:
 
     x_i' = (x_i σ_j σ_k + α_i x_j x_k S σ_i)/D,    σ_i² = D + E_i S²,    D = 1 − max S² = C² − min S²,
 
-where σ_i > 0, but σ_i = C for the smallest E_i. An error of κ results in the motion over a different time; it does not
-change the energy and |x|. No phase is stored between steps, and no division is by the difference of two moments: the
-separatrix, rotations about an axis and symmetric bodies are not special cases. Near the separatrix R has the accuracy
-of x_i close to its axis.
+where σ_i > 0, except that σ_i = C for the smallest E_i. An error of κ changes only the time over which the body moves;
+energy and |x| stay constant. No phase is stored between steps, and no formula divides by the difference of two moments
+of inertia. So the separatrix, rotations about an axis and symmetric bodies are not special cases. Near the separatrix,
+R is as accurate as those x_i that are small there.
 
 C. G. J. Jacobi, Sur la rotation d'un corps, Crelle's Journal 39 (1850); R. van Zon, J. Schofield, Numerical
 implementation of the exact dynamics of free rigid bodies, Journal of Computational Physics 225 (2007).
@@ -28,7 +29,7 @@ from phigen.symbolic.symbols import Symbol
 
 Vector = Sequence[Expression]
 
-#: For each index, the other two indices in cyclic order.
+#: For each index i, the other two indices (j, k) such that i, j, k is a cyclic permutation.
 CYCLIC = ((1, 2), (2, 0), (0, 1))
 
 _HALF = number(Fraction(1, 2))
@@ -36,7 +37,10 @@ _HALF = number(Fraction(1, 2))
 
 @dataclass(frozen=True)
 class EulerMotion:
-    """The motion ẋ_i = α_i x_j x_k of the ``coordinates`` x_i; the ``factors`` α_i depend on parameters only."""
+    """The motion of a free rigid body: ẋ_i = α_i x_j x_k for cyclic i, j, k.
+
+    ``coordinates`` are the names of the x_i; the ``factors`` α_i depend on parameters only.
+    """
 
     coordinates: tuple[str, ...]
     factors: tuple[Expression, ...]
@@ -44,16 +48,16 @@ class EulerMotion:
 
     @property
     def manner(self) -> str:
-        """Description of the motion, for reports."""
+        """The motion in words, for reports."""
         return f"{', '.join(self.coordinates)} moved as a free rigid body, by elliptic functions"
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return the expressions unchanged: proofs on this motion need no further symbols."""
+        """Return the expressions unchanged, as proofs about this motion need no auxiliary symbols, unlike those about
+        `RelativeMotions`."""
         return [*roots]
 
     def field(self, names: Sequence[str]) -> list[Expression]:
-        """Return the rates of all coordinates ``names``; coordinates that are not part of the motion have the rate
-        0."""
+        """Return the rates of all coordinates ``names``; coordinates that do not belong to the body have the rate 0."""
         x = [symbol(name) for name in self.coordinates]
         rates = [a * x[j] * x[k] for a, (j, k) in zip(self.factors, CYCLIC, strict=True)]
         return self._placed(names, rates)
@@ -63,11 +67,12 @@ class EulerMotion:
         return self._placed(names, self.addition(symbol(TIME)).changes())
 
     def addition(self, time: Expression) -> Addition:
-        """Return the addition theorem for a duration."""
+        """Return the quantities of the addition theorem for a flow over the duration ``time``."""
         return Addition.at([symbol(name) for name in self.coordinates], self.factors, time)
 
     def residuals(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals that vanish if the increments are the motion."""
+        """Yield pairs of a label and an expression; all expressions vanish if the increments solve the equations of
+        motion."""
         yield from identities()
 
     def _placed(self, names: Sequence[str], values: Vector) -> list[Expression]:
@@ -77,7 +82,11 @@ class EulerMotion:
 
 @dataclass(frozen=True)
 class Addition:
-    """The addition theorem at a state ``x``: P, R and κ, the E_i (``levels``), and conditions for their order."""
+    """The quantities of the addition theorem for the flow of a free rigid body from the state ``x``.
+
+    These are P, R, κ, the first integrals E_i (``levels``), and three expressions whose signs give the order of the
+    E_i; see the formulas of this module.
+    """
 
     x: Vector
     factors: Vector
@@ -89,7 +98,7 @@ class Addition:
 
     @classmethod
     def at(cls, x: Vector, factors: Vector, time: Expression) -> Addition:
-        """Return the theorem for a duration."""
+        """Return the quantities for a flow from the state ``x`` over the duration ``time``."""
         levels = levels_of(x, factors)
         conditions = _order(levels)
         low, middle, high = sorted_by(conditions, levels)
@@ -97,22 +106,22 @@ class Addition:
         return cls(x, factors, levels, conditions, p, r, call(AMPLITUDE, time, p, r))
 
     def sorted(self, values: Vector) -> tuple[Expression, Expression, Expression]:
-        """Return the three values in the order of the E_i: those of the lowest, the middle and the highest E_i."""
+        """Return three values that belong to the axes i in the order of increasing E_i."""
         return sorted_by(self.conditions, values)
 
     def changes(self) -> list[Expression]:
-        """Return the increments of the x_i."""
+        """Return the increments of the x_i in the flow."""
         s, c, _ = functions_of(self.kappa, self.p, self.r)
         low, _, high = self.sorted(self.levels)
         gaps_below, gaps_above = [e - low for e in self.levels], [high - e for e in self.levels]
         square, z = s**2, self.p * self.kappa**2
         roots = [sqrt(c**2 + e * square) for e in gaps_below]
-        # On the separatrix C > 0, but rounding may make it negative.
+        # On the separatrix (R = 0) C > 0 and C equals a root, but rounding may make C negative.
         sigma = self._at_lowest([call("choose", self.r, c, root) for root in roots], roots)
         versine = 8 * z * power(1 + z, -2)  # 1 − C
         losses = self._at_lowest([versine] * 3, [d * square / (1 + r) for d, r in zip(gaps_above, roots, strict=True)])
         divisor = c**2 - low * square
-        # For small D, σ_j σ_k − D is computed from 1 − σ_j and 1 − σ_k, which are not small.
+        # The difference σ_j σ_k − D, without cancellation: for large D from 1 − σ_j and 1 − σ_k, which are then small.
         gaps = [
             call("choose", divisor - _HALF, high * square - (u + v - u * v), sigma[j] * sigma[k] - divisor)
             for j, k, u, v in ((j, k, losses[j], losses[k]) for j, k in CYCLIC)
@@ -120,10 +129,11 @@ class Addition:
         return _ends(self.x, self.factors, sigma, s, divisor, gaps)
 
     def _at_lowest(self, chosen: Vector, others: Vector) -> list[Expression]:
-        """Return the i-th of ``chosen`` for the i with the lowest E_i, and the values of ``others`` for the other two
-        indices.
+        """Return three values: that of ``chosen`` for the axis with the lowest E_i, those of ``others`` for the other
+        two axes.
 
-        On the separatrix two E_i are equal, but have different derivatives.
+        The axis is selected by the same conditions everywhere, because on the separatrix two E_i are equal but have
+        different derivatives.
         """
         second, third, _ = self.conditions
         first_two = ((chosen[0], others[0]), (others[1], chosen[1]))
@@ -140,8 +150,11 @@ def levels_of(x: Vector, factors: Vector) -> list[Expression]:
 
 
 def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
-    """Return three conditions, positive if: E_2 > E_1; E_3 is above the lower of these; the upper of these is above
-    the rest."""
+    """Return three expressions whose signs give the order of the E_i, from ``levels``.
+
+    They are positive in these cases. First: E_2 > E_1. Second: E_3 is above the lower one of E_1 and E_2. Third: the
+    upper one of E_1 and E_2 is above the larger one of the remaining two.
+    """
     second = levels[1] - levels[0]
     lower, upper = call("choose", second, *levels[:2]), call("choose", second, levels[1], levels[0])
     third = levels[2] - lower
@@ -149,7 +162,8 @@ def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
 
 
 def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Expression, Expression, Expression]:
-    """Return three values in the order of the E_i, the lowest first, by the conditions of `_order`."""
+    """Return three values that belong to the axes i in the order of increasing E_i; ``conditions`` are those of
+    `_order`."""
     second, third, last = conditions
     lower, upper = call("choose", second, *values[:2]), call("choose", second, values[1], values[0])
     low, upper_pair = call("choose", third, lower, values[2]), call("choose", third, values[2], lower)
@@ -159,7 +173,8 @@ def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Express
 def _ends(
     x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Expression, gaps: Vector
 ) -> list[Expression]:
-    """Return the increments of the x_i; ``gaps`` are σ_j σ_k − D."""
+    """Return the increments of the x_i from σ_i, S and D (``divisor``), and from the differences ``gaps`` = σ_j σ_k −
+    D."""
     inverse = power(divisor, -1)
     return [
         (x[i] * gap + factors[i] * x[j] * x[k] * (s * sigma[i])) * inverse
@@ -168,16 +183,17 @@ def _ends(
 
 
 def moved(x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Expression) -> list[Expression]:
-    """Return the x_i after the flow, from σ_i, S and D."""
+    """Return the x_i after the flow from σ_i, S and D (``divisor``)."""
     gaps = [sigma[j] * sigma[k] - divisor for j, k in CYCLIC]
     return [a + b for a, b in zip(x, _ends(x, factors, sigma, s, divisor, gaps), strict=True)]
 
 
 def identities() -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals that vanish if the increments are the flow, in independent symbols x_i, α_i and S.
+    """Yield pairs of a label and an expression in the independent symbols x_i, α_i and S.
 
-    Let E_m be the largest E_i. Then σ_m = 1 and Ṡ = σ_j σ_k, which is CD for the elliptic functions, and σ_j, σ_k are
-    roots of 1 − (E_m − E_j)S². The factors σ_j σ_k − D are compared with their form for small S.
+    All expressions vanish if the increments are the flow. Let E_m be the largest E_i. Then σ_m = 1, and the other two
+    σ_j, σ_k are roots of 1 − (E_m − E_j)S². The time derivative of S is σ_j σ_k, which is CD for the elliptic
+    functions. The differences σ_j σ_k − D are also compared with their form for small S.
     """
     names = [Symbol("body", kind, i) for kind in ("x", "a") for i in range(3)]
     x, factors = ([symbol(name) for name in symbol_names] for symbol_names in (names[:3], names[3:]))
@@ -198,7 +214,7 @@ def identities() -> Iterator[tuple[str, Expression]]:
 
 
 def _function_identities() -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals that vanish if dS(κ)/dt = CD for dκ/dt = (1 + z)D/4."""
+    """Yield pairs of a label and an expression that vanishes if S(κ), with dκ/dt = (1 + z)D/4, satisfies dS/dt = CD."""
     name, p, r = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "R"))
     kappa = symbol(name)
     s, c, _ = functions_of(kappa, p, r)

@@ -1,13 +1,13 @@
-"""exp(tA)w − w in closed form, for the linear equations ẇ = Aw of `phigen.splitting.closure`.
+"""The solution of linear equations ẇ = Aw in closed form: the increment exp(tA)w − w.
 
-The closed forms use a relation between powers of A. The entries of A are constant along the flow:
+A closed form exists if powers of A satisfy one of these relations, in which c and d are constant along the flow:
 
-- A^k = 0: a polynomial in t
-- A^{a+1} = dA^a: Σ_{k<a} (tA)^k/k! and (e^{td} − …) A^a/d^a, the terms of the exponential series from (td)^a on
-- A^{a+2} = −cA^a: likewise with sin and cos of t√c, or with sinh and cosh, for a = 1 and a = 2
+- A^k = 0: the solution is a polynomial in t.
+- A^{a+1} = dA^a: the solution consists of Σ_{k<a} (tA)^k/k! and of A^a/d^a times the terms of e^{td} from (td)^a on.
+- A^{a+2} = −cA^a for a = 1 or 2: a similar formula, with sin and cos of t√c, or with sinh and cosh.
 
-If d depends on the state, A/d may be 0/0 where d vanishes, so A^a/d^a is not in the ring. Then the entire functions of
-`phigen.symbolic.entire` replace the quotients; they are valid for both signs of c.
+If d depends on the state, A/d may be 0/0 where d vanishes, and then A^a/d^a is not in the ring. In this case the
+quotients are replaced by the entire functions of `phigen.symbolic.entire`, which are also valid for both signs of c.
 """
 
 from __future__ import annotations
@@ -25,29 +25,31 @@ from phigen.symbolic.tower import Poly, rational
 
 Matrix = Sequence[Sequence[Poly]]
 
-#: Largest number of powers of a matrix that are computed: for 64 rows, all powers would take minutes.
+#: Largest number of powers A, A², … of a matrix that are computed; all powers of a matrix with 64 rows would take
+#: minutes.
 MOST_POWERS = 16
 
-#: Description of a motion at a constant rate.
+#: Word for reports: a motion at a constant rate.
 SHIFTED = "shifted"
 
 _HALF = number(Fraction(1, 2))
 
 
 class NoClosedFormError(Exception):
-    """No closed form is known; the text names the matrix."""
+    """Raised if no closed form of exp(tA) is known; the text describes the matrix A."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """The increments of the coordinates of a linear motion, and a word that describes the motion."""
+    """The increments of the coordinates of a linear motion, and ``manner``, a word for reports that describes the
+    motion."""
 
     increments: tuple[Expression, ...]
     manner: str
 
 
 def solve(ring: Ring, motion: LinearMotion) -> Solution:
-    """Return exp(tA)w − w for the coordinates of the motion. Raises `NoClosedFormError`."""
+    """Return exp(tA)w − w for the coordinates of a linear motion. Raises `NoClosedFormError`."""
     w = [ring.monomial(m) for m in motion.basis]
     if len(w) == 1:
         growth = ring.expression(motion.matrix[0][0] * ring.tower.variable(TIME))
@@ -64,9 +66,9 @@ def solve(ring: Ring, motion: LinearMotion) -> Solution:
 
 
 def _powers(ring: Ring, a: Matrix) -> list[Matrix]:
-    """Return A, A², …, up to the first power that vanishes.
+    """Return the powers A, A², … of a matrix, up to the first power that vanishes.
 
-    If none vanishes, there are as many as A has rows, but at least 4 and at most `MOST_POWERS`.
+    If no power vanishes, the number of powers is the number of rows, but at least 4 and at most `MOST_POWERS`.
     """
     powers = [a]
     while len(powers) < max(4, min(len(a), MOST_POWERS)) and not _vanishes(powers[-1]):
@@ -75,7 +77,10 @@ def _powers(ring: Ring, a: Matrix) -> list[Matrix]:
 
 
 def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]]) -> Solution | None:
-    """Return Σ t^k A^k w/k! if some power of A vanishes, else None."""
+    """Return the solution Σ t^k A^k w/k! if a power of A vanishes, else None.
+
+    ``powers`` are A, A², …, and ``images`` are Aw, A²w, …
+    """
     if not _vanishes(powers[-1]):
         return None
     tower, t, factorial = ring.tower, ring.tower.variable(TIME), 1
@@ -89,7 +94,7 @@ def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[P
 
 
 def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
-    """Return the solution if A^{a+1} = dA^a, else None."""
+    """Return the solution if A^{a+1} = dA^a for some d, else None; ``images`` are Aw, A²w, …"""
     d = _ratio(ring, powers[a], powers[a - 1], powers[0])
     if d is None:
         return None
@@ -110,7 +115,7 @@ def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 
 
 def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
-    """Return the solution if A^{a+2} = −cA^a, else None."""
+    """Return the solution if A^{a+2} = −cA^a for some c, else None; ``images`` are Aw, A²w, …"""
     c = None if len(powers) < a + 2 else _ratio(ring, powers[a + 1], powers[a - 1], powers[1])
     if c is None:
         return None
@@ -129,9 +134,10 @@ def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 def _without_quotients(
     ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], c: Poly, a: int
 ) -> Solution | None:
-    """Return the solution by functions of s = ct², or None.
+    """Return the solution for A^{a+2} = −cA^a by entire functions of s = ct², without dividing by c; None if there is
+    none.
 
-    sin and 1 − cos of the angle √s are computed from those of its half.
+    sin and 1 − cos of the angle √s are computed from functions of half the angle.
     """
     t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
     if a == 1:
@@ -144,9 +150,10 @@ def _without_quotients(
 
 
 def _solution_of_scaled_matrix(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Expression) -> Solution:
-    """Return the solution for a = 1, with A = fM: the static factor f of all entries multiplies the time.
+    """Return the solution for A³ = −cA by entire functions of ``s`` = ct².
 
-    M²w is computed as M times Mw if that needs fewer operations than the entries of M², as for cross products.
+    A is written as fM with a factor f that does not depend on the state, and f multiplies the time. M²w is computed as
+    M times Mw where that needs fewer operations than the entries of M², as for cross products.
     """
     factor = _static_factor(ring, matrix)
     once = [ring.expression(v / factor) for v in images[0]]
@@ -160,7 +167,7 @@ def _solution_of_scaled_matrix(ring: Ring, matrix: Matrix, images: Sequence[Sequ
 
 
 def _static_factor(ring: Ring, a: Matrix) -> Poly:
-    """Return the common factor of all entries of a matrix, if it does not depend on the state; else 1."""
+    """Return the greatest common factor of all entries of a matrix; 1 if this factor depends on the state."""
     factor = reduce(lambda x, y: x.gcd(y), [e for row in a for e in row if e != 0])
     return ring.tower.constant(1) if ring.support(factor) else factor
 
@@ -168,9 +175,10 @@ def _static_factor(ring: Ring, a: Matrix) -> Poly:
 def _circular(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """Return the solution with sin and cos.
+    """Return the solution for A^{a+2} = −e²A^a with θ = te, the ``angle``, by sin and cos.
 
-    It is sin(θ)A/e + (1 − cos θ)A²/e² for a = 1, and tA + (1 − cos θ)A²/e² + (θ − sin θ)A³/e³ for a = 2.
+    The matrix is sin(θ)A/e + (1 − cos θ)A²/e² for a = 1, and tA + (1 − cos θ)A²/e² + (θ − sin θ)A³/e³ for a = 2.
+    ``first`` is Aw, ``units`` are the quotients of A^k w and e^k.
     """
     sine, versine = call("sin", angle), call("versin", angle)
     if a == 1:
@@ -183,7 +191,10 @@ def _circular(
 def _hyperbolic(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """Return the solution with sinh and cosh; cosh θ − 1 = 2 sinh²(θ/2) replaces 1 − cos θ."""
+    """Return the solution for A^{a+2} = e²A^a by sinh and cosh; cosh θ − 1 is written as 2 sinh²(θ/2).
+
+    ``angle`` is θ = te, ``first`` is Aw, and ``units`` are the quotients of A^k w and e^k.
+    """
     s, c = call("sinh", angle / 2), call("cosh", angle / 2)
     if a == 1:
         increments = tuple(2 * s * (c * u + s * v) for u, v in zip(*units, strict=True))
@@ -209,9 +220,10 @@ def _image(ring: Ring, a: Matrix, w: Sequence[Poly]) -> list[Poly]:
 
 
 def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
-    """Return d with a = d·b, or None if the ring contains no such d.
+    """Return d with a = d·b for two matrices a and b, or None if the ring contains no such d.
 
-    If cancelled reciprocals hide d from the division, d is on the diagonal of ``guess``.
+    If polynomial division finds no d, because reciprocals in the entries have been cancelled, the diagonal entries of
+    ``guess`` are tried.
     """
     pairs = [(x, y) for left, right in zip(a, b, strict=True) for x, y in zip(left, right, strict=True)]
     if any(x != 0 and y == 0 for x, y in pairs):
@@ -223,7 +235,8 @@ def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
 
 
 def _quotients(ring: Ring, elements: Sequence[Poly], divisor: Poly) -> list[Expression] | None:
-    """Return the elements divided by the divisor; None unless all quotients are in the ring."""
+    """Return the quotients of the elements and the divisor as expressions; None unless the ring contains all of
+    them."""
     divided = [divmod(e, divisor) for e in elements]
     return (
         None
@@ -234,7 +247,7 @@ def _quotients(ring: Ring, elements: Sequence[Poly], divisor: Poly) -> list[Expr
 
 @dataclass(frozen=True)
 class _Root:
-    """The root of c = ±(scale·element)²; ``positive`` is true for the sign +."""
+    """A polynomial c written as ±(scale·element)²; ``positive`` says that the sign is +."""
 
     positive: bool
     scale: Expression
@@ -242,7 +255,8 @@ class _Root:
 
 
 def _root(ring: Ring, c: Poly) -> _Root | None:
-    """Return the square root of c or of −c, if it is an element of the ring times the root of a number; else None."""
+    """Return c written as plus or minus a square, of an element of the ring times the square root of a number; else
+    None."""
     content, factors = c.factor()
     if any(multiplicity % 2 for _, multiplicity in factors):
         return None

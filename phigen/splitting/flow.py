@@ -1,7 +1,7 @@
-"""The exact flow of one part of H, as increments of the coordinates.
+"""The exact flow of a part of H, as increments of the coordinates.
 
-A part is a sum of terms that commute with one another. If the joint equations of motion have a closed form, this is
-the flow. Otherwise the flow is the composition of the flows of the terms, in any order, since they commute.
+A part is a sum of terms that commute with one another. If its equations of motion have a closed form, this is the flow.
+Otherwise the flow is the composition of the flows of the terms, whose order does not matter since they commute.
 """
 
 from __future__ import annotations
@@ -26,21 +26,24 @@ from phigen.symbolic.remainders import REMAINDERS
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.tower import Poly, Tower
 
-#: Motions whose flows have special formulas, which are proved by identities.
+#: Motions whose flows have formulas of their own, which are proved by identities in independent symbols.
 Motion = KeplerMotion | RelativeMotions | EulerMotion
 
-#: Methods for linear equations; each includes those before it. They are closed forms, exponentials of matrices that are
-#: computed before the steps, and exponentials of small matrices that depend on the state.
+#: Methods for linear equations ẇ = Aw; each value includes those before it. CLOSED_FORMS: formulas for exp(tA).
+#: EXPONENTIALS: matrices exp(tA) that are computed as numbers before the steps. SMALL_MATRICES: formulas for exp(tA) if
+#: A depends on the state and has at most four rows.
 CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES = range(3)
 
-#: Description of a linear motion with a matrix exponential.
+#: Words for reports: a linear motion by a matrix exponential that is computed before the steps.
 BY_MATRIX = "moved by exp(tA), computed before the steps"
 
 
 @dataclass(frozen=True)
 class Term:
-    """A term of H, as written by the user and as an element of the ring; ``motion`` is set for Kepler motions and
-    rigid bodies."""
+    """A term of H, as written by the user and as an element of the ring.
+
+    ``motion`` is set if the term is a Kepler motion or a free rigid body.
+    """
 
     expression: Expression
     element: Poly
@@ -49,11 +52,12 @@ class Term:
 
 @dataclass(frozen=True)
 class Flow:
-    """The flow of ``hamiltonian`` over the time `TIME`: x + ``increment``; ``manner`` describes the motion in words.
+    """The flow of ``hamiltonian`` over the time `TIME`: it maps x to x + ``increment``; ``manner`` describes it in
+    words.
 
-    If it is the flow of a ``force``, a vector field, the Hamiltonian is 0. ``pieces`` are the commuting flows of which
-    it is composed, if there are several; a flow with a ``motion`` of bodies has no pieces. ``exponentials`` are the
-    matrix exponentials whose entries occur in the increments, as symbols.
+    If it is the flow of a ``force``, which is a vector field, the Hamiltonian is 0. If the flow is composed of several
+    commuting flows, these are its ``pieces``. ``motion`` is set for Kepler motions and rigid bodies. ``exponentials``
+    are the matrix exponentials whose entries occur as symbols in the increments.
     """
 
     hamiltonian: Expression
@@ -66,21 +70,21 @@ class Flow:
 
     @property
     def letter(self) -> str:
-        """The letter of the part in formulas: H, or F for a force."""
+        """The letter that stands for the part in formulas: H, or F for a force."""
         return "F" if self.force else "H"
 
     @property
     def has_motion(self) -> bool:
-        """Whether the flow, or one of its pieces, has a ``motion``."""
+        """Whether the flow, or one of its pieces, is a Kepler motion or that of a free rigid body."""
         return any(flow.motion for flow in (self, *self.pieces))
 
     def vector_field(self, system: System) -> tuple[Expression, ...]:
-        """Return the vector field of the flow."""
+        """Return the vector field of which this is the flow: the force, or π∇H for the Hamiltonian H of the part."""
         return self.force or hamiltonian_vector_field(system.poisson, gradient(self.hamiltonian, system.coordinates))
 
     @property
     def calls_remainders(self) -> bool:
-        """Whether the flow contains exponentials of small matrices that depend on the state."""
+        """Whether the increments contain exponentials of small matrices that depend on the state."""
         return any(e.op in REMAINDERS for e in topological(self.increment))
 
     @property
@@ -90,7 +94,7 @@ class Flow:
 
 
 class NoFlowError(Exception):
-    """No elementary flow of a term is known; the text is the reason."""
+    """Raised if no elementary flow of a term is known; the text is the reason."""
 
     def __init__(self, term: Term, reason: str) -> None:
         super().__init__(reason)
@@ -98,10 +102,11 @@ class NoFlowError(Exception):
 
 
 def flow_of(ring: Ring, terms: Sequence[Term], *, numeric: bool = True) -> Flow:
-    """Return the flow of a sum of commuting terms: in closed form or, if ``numeric``, by matrix exponentials.
+    """Return the flow of a sum of commuting terms, by the simplest method that gives all flows.
 
-    Matrix exponentials are computed before the steps. If the matrix depends on the state, they are computed by the
-    theorem of Cayley and Hamilton, which is the last choice. Raises `NoFlowError` for the first term without a flow.
+    These methods are tried in order: closed forms; if ``numeric``, matrix exponentials that are computed before the
+    steps; and, if ``numeric``, exponentials of small matrices that depend on the state. Raises `NoFlowError` for the
+    first term without a flow.
     """
     motions = [_flow_of_motion(ring, term, term.motion) for term in terms if term.motion]
     if motions:
@@ -139,14 +144,14 @@ def _flow_of(ring: Ring, terms: Sequence[Term], methods: int) -> Flow:
 
 
 def _flow_of_motion(ring: Ring, term: Term, motion: KeplerMotion | EulerMotion) -> Flow:
-    """Return the flow of a term that is a motion of bodies."""
+    """Return the flow of a term that is a Kepler motion or a free rigid body."""
     return Flow(term.expression, tuple(motion.increments(ring.coordinates)), motion.manner, motion=motion)
 
 
 def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
-    """Return the composition of flows that commute.
+    """Return the composition of commuting flows.
 
-    Flows that change fewer coordinates come first; so later flows read few updated coordinates.
+    Flows that change few coordinates come first, so that later flows read few changed coordinates.
     """
     ordered = sorted(flows, key=lambda f: f.moving)
     so_far: list[Expression] = [ZERO] * len(coordinates)
@@ -161,10 +166,10 @@ def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
 
 
 def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Flow | str:
-    """Return the joint flow of terms, or the reason why there is none; ``linear`` admits only linear equations.
+    """Return the flow of a sum of terms, from its equations of motion as a whole, or the reason why there is none.
 
-    Solutions of linear equations compute small coordinates to full relative precision, unlike differences from a
-    constant sum. ``methods`` is `CLOSED_FORMS`, `EXPONENTIALS` or `SMALL_MATRICES`.
+    ``linear`` admits only linear equations, whose solutions have full relative precision even for small coordinates; a
+    difference from a constant sum would not. ``methods`` is `CLOSED_FORMS`, `EXPONENTIALS` or `SMALL_MATRICES`.
     """
     g = total(t.expression for t in terms)
     field = ring.field(ring.tower.combine(t.element for t in terms))
@@ -179,9 +184,9 @@ def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, metho
 
 @dataclass(frozen=True)
 class Solved:
-    """Increments along a vector field, a description of the motion, and its matrix exponentials.
+    """The solution of the equations of a vector field: increments, a description in words, and the matrix exponentials.
 
-    ``shifted`` are the indices of the coordinates that move at a constant rate.
+    ``shifted`` has the indices of the coordinates that move at a constant rate.
     """
 
     increments: list[Expression]
@@ -191,10 +196,10 @@ class Solved:
 
 
 def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Solved | str:
-    """Return the increments along a vector field, or the reason why there are none.
+    """Return the increments along a vector field, which need not be Hamiltonian, or the reason why there are none.
 
-    The field need not be Hamiltonian. Linear first integrals are substituted if that leads to a solution. ``linear``
-    and ``methods`` are those of `joint_flow`.
+    Linear first integrals are substituted as constants if that leads to a solution. The arguments ``linear`` and
+    ``methods`` are explained at `joint_flow`.
     """
     direct = _increments(ring, field, linear)
     if not isinstance(direct, str):
@@ -207,12 +212,15 @@ def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False, methods: 
 
 
 def _nonlinear(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """Return the increments by methods for equations that are not linear in the coordinates, or None."""
+    """Return the increments along a vector field by methods for nonlinear equations, or None if no method applies.
+
+    The methods use first integrals, a common factor of all rates, or a closed form on spheres.
+    """
     return _with_integrals(ring, field) or _with_common_factor(ring, field) or _on_sphere(ring, field)
 
 
 def _on_sphere(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """Return the increments by a closed form on spheres, or None."""
+    """Return the increments along a vector field whose flow on spheres has a closed form, else None."""
     solution = spheres.solve(ring, field)
     if solution is None:
         return None
@@ -222,7 +230,12 @@ def _on_sphere(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 
 
 def _increments(ring: Ring, field: Sequence[Poly], linear: bool = False, methods: int = CLOSED_FORMS) -> Solved | str:
-    """Return the increments along a vector field, or the reason why there are none."""
+    """Return the increments along a vector field from its equations as they are, or the reason why there is no
+    solution.
+
+    Linear equations are solved by the given ``methods``; unless ``linear``, equations of a single coordinate are solved
+    too.
+    """
     motion = motion_of(ring, field)
     increments: list[Expression] = [ZERO] * len(ring.coordinates)
     manners: dict[str, list[int]] = {}
@@ -263,13 +276,14 @@ def _increments(ring: Ring, field: Sequence[Poly], linear: bool = False, methods
 def _with_replacements(
     increments: Sequence[Expression], places: Sequence[int], values: Sequence[Expression]
 ) -> list[Expression]:
-    """Return the increments with those at ``places`` replaced by ``values``."""
+    """Return a list of increments in which the increments with the indices ``places`` are replaced by ``values``."""
     replacements = dict(zip(places, values, strict=True))
     return [replacements.get(i, e) for i, e in enumerate(increments)]
 
 
 def _with_integrals(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """Return the increments with linear first integrals substituted as constants, or None."""
+    """Return the increments along a vector field after linear first integrals are substituted as constants; None if
+    that fails."""
     smaller = reduced(ring, field)
     solution = None if smaller is None else _increments(smaller.ring, smaller.field)
     if smaller is None or solution is None or isinstance(solution, str):
@@ -283,10 +297,10 @@ def _with_integrals(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 
 
 def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
-    """Return the increments if all rates have a common factor that is constant along the flow, or None.
+    """Return the increments if all rates have a common factor that is constant along the flow, else None.
 
-    The flow of a function of a first integral is that of the integral at another speed: (q² + p²)² rotates q and p by
-    an angle that is proportional to q² + p².
+    This is so for functions of a first integral. For instance, (q² + p²)² rotates q and p, as q² + p² does, but with a
+    speed proportional to q² + p².
     """
     moving = [f for f in field if f != 0]
     factor = reduce(lambda a, b: a.gcd(b), moving) if moving else ring.tower.constant(1)
@@ -302,9 +316,10 @@ def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 
 
 def _as_written(ring: Ring, g: Expression, solution: Solved) -> list[Expression]:
-    """Return the increments; for shifted coordinates, t π∇g with g as written by the user, if this is cheaper.
+    """Return the increments of a flow of g, in the cheaper of two forms for coordinates that move at a constant rate.
 
-    An example is g = (x − y)⁴.
+    One form is that of ``solution``, in which polynomials are expanded. The other is t π∇g with g as the user has
+    written it, for instance as (x − y)⁴.
     """
     slope = gradient(symbol(TIME) * g, ring.coordinates)
     field = hamiltonian_vector_field(ring.brackets, slope)
@@ -313,7 +328,7 @@ def _as_written(ring: Ring, g: Expression, solution: Solved) -> list[Expression]
 
 
 def _operations(ring: Ring, increments: Sequence[Expression]) -> int:
-    """Return the number of operations of the increments that depend on the state."""
+    """Return the number of operations in the increments that depend on the state."""
     moving: set[int] = set()
     for e in topological(increments):
         if (e.op == "symbol" and e.value in ring.coordinates) or any(id(a) in moving for a in e.args):

@@ -1,12 +1,13 @@
-"""The flows of forces, as parts of a splitting in addition to those of H: of ẋ = πζ + f, or of its summands.
+"""The flows of forces, which are parts of a splitting in addition to those of H: the flow of ẋ = πζ + f, or of summands
+of this field.
 
-Three divisions are tried, and the first one in which every summand has a flow is used: the whole field; πζ and f; πζ
-for each covector ζ_i dx_i and f for each component. πζ_i dx_i is the Hamiltonian field of x_i times a factor, tangent
-to the leaves, so each summand of πζ preserves the Casimirs.
+Three divisions are tried, and the first one in which every summand has a flow is used: the whole field; πζ and f; πζ_i
+dx_i for each component of ζ, and each component of f. π times ζ_i dx_i is the Hamiltonian field of x_i times a factor.
+It is tangent to the symplectic leaves, so each summand of πζ preserves the Casimirs.
 
-Damping, ζ = λπb with b = ∇H, is divided for each block of π: into the terms of b that do not depend on the coordinates
-of the block, and each component of the remaining terms. Flows that do not change coordinates that others read form one
-part.
+Damping is ζ = λπb with b = ∇H. It is divided for each block of π: into the terms of b that do not depend on the
+coordinates of the block, and the components of the remaining terms. Two flows become one part if neither changes a
+coordinate that the other reads.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ _DAMPING_HINT = (
 
 
 def force_flows(system: System) -> tuple[Flow, ...]:
-    """Return the flows of the forces; none without forces.
+    """Return the flows of the forces of a system, as parts of a splitting; empty without forces.
 
-    Raises `SpecError`, naming the summand that has no flow.
+    Raises `SpecError`, naming a summand that has no flow.
     """
     if system.forces is None:
         return ()
@@ -52,7 +53,7 @@ def force_flows(system: System) -> tuple[Flow, ...]:
 
 
 def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
-    """Return the flows of the forces in closed form, with as few summands as possible."""
+    """Return the flows of the forces in closed form: of the whole field or, if it has none, of summands."""
     tangent = hamiltonian_vector_field(system.poisson, forces.covector)
     common_flow = _flow(system, tuple(a + b for a, b in zip(tangent, forces.vector, strict=True)))
     if isinstance(common_flow, Flow):
@@ -64,8 +65,8 @@ def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
 
 
 def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow, ...]:
-    """Return the flows of πζ: a single flow, else a flow for each covector, else those of damping and of the other
-    covectors."""
+    """Return the flows of πζ: one flow; else a flow for each component of ζ; else flows of the damping and of all other
+    components."""
     try:
         covectors = list(_covectors(system, forces.covector))
         return tuple(_summand_flows(system, tangent, covectors, ("forces", "covector"), ("damping",)))
@@ -81,7 +82,7 @@ def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow
 
 
 def _damping_flows(system: System, damping: Expression) -> list[Flow]:
-    """Return the flows of λππb, b = ∇H, for all blocks of π, combined into as few parts as possible."""
+    """Return the flows of the damping field λππb with b = ∇H, for all blocks of π, combined into few parts."""
     flows = [
         flow for block in blocks(system.coordinates, system.poisson) for flow in _damped_block(system, damping, block)
     ]
@@ -105,7 +106,7 @@ def _damping_flows(system: System, damping: Expression) -> list[Flow]:
 
 
 def _merged_flows(flows: Sequence[Flow]) -> Flow:
-    """Return several flows as one; none of them may change coordinates that another one reads or changes."""
+    """Return several flows as one flow; none of them may change a coordinate that another one reads or changes."""
     increment, force = (
         tuple(total(entries) for entries in zip(*vectors, strict=True))
         for vectors in ([f.increment for f in flows], [f.force for f in flows])
@@ -114,7 +115,10 @@ def _merged_flows(flows: Sequence[Flow]) -> Flow:
 
 
 def _damped_block(system: System, damping: Expression, block: Sequence[int]) -> Iterator[Flow]:
-    """Yield the flows of λππb for the components of b in a block of π."""
+    """Yield the flows of the damping field λππb, where b is the part of ∇H in a block of π.
+
+    b is divided into as few summands as possible, such that each has a flow.
+    """
     slopes = gradient(system.hamiltonian, system.coordinates)
     ring = ring_of(system, slopes)
     variables = [
@@ -147,7 +151,7 @@ def _damped(system: System, damping: Expression, b: Sequence[Expression]) -> Flo
 
 
 def _covectors(system: System, covector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:
-    """Yield the fields of the single covectors ζ_i dx_i, with their names."""
+    """Yield for each component of a covector ζ its name and its field πζ_i dx_i."""
     for i, (c, zeta) in enumerate(zip(system.coordinates, covector, strict=True)):
         if not zeta.is_zero:
             alone = [zeta if k == i else ZERO for k in range(system.dimension)]
@@ -163,9 +167,9 @@ def _components(vector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:
 def _summand_flows(
     system: System, field: Field, summands: Sequence[tuple[str, Field]], *keys: tuple[str, ...]
 ) -> Iterator[Flow]:
-    """Yield the flow of a field or, if it is not elementary, the flows of its summands.
+    """Yield the flow of a field or, if it has none in closed form, the flows of its summands.
 
-    ``keys`` are the keys of the spec that may have defined the field, for errors.
+    Raises `SpecError` if a summand has no flow; ``keys`` are the keys of the spec at which the error is located.
     """
     common_flow = _flow(system, field) if summands else ""
     if isinstance(common_flow, Flow):
@@ -181,7 +185,7 @@ def _summand_flows(
 
 
 def _flow(system: System, field: Field, methods: int = CLOSED_FORMS) -> Flow | str:
-    """Return the flow of a vector field by ``methods`` of `solved`, or the reason why there is none."""
+    """Return the flow of a vector field, or the reason why there is none; ``methods`` is explained at `joint_flow`."""
     ring = ring_of(system, field)
     solution = solved(ring, ring.tower.convert_all(field), methods=methods)
     if isinstance(solution, str):

@@ -1,10 +1,10 @@
-"""Sums of terms of H whose joint flow is simpler than those of the terms, such as rotations about a vector.
+"""Sums of terms of H whose joint flow is simpler than the flows of the single terms, such as rotations about a vector.
 
-*Cancelling terms.* For m·N on se(3)*, each m_i N_i changes m and N by products of both, while the sum changes neither
-and rotates other vectors about N. Terms are summed if monomials of their vector fields cancel.
+*Cancelling terms.* For m·N on se(3)*, each term m_i N_i changes m and N by products of both. Their sum changes neither
+m nor N, and rotates other vectors about N. Terms are summed if monomials of their vector fields cancel.
 
-*Linear terms.* The flow of Σ v_i m_i, where all v commute with each other and with all m, is a rotation about v, a
-shear, or another motion of a Lie algebra: v is constant, and m satisfies linear equations.
+*Linear terms.* In Σ v_i m_i let all v commute with each other and with all m. Then v is constant along the flow, and m
+satisfies linear equations: the flow is a rotation about v, a shear, or another linear action of the algebra.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from phigen.splitting.terms import monomial_terms
 from phigen.symbolic.expression import total
 from phigen.symbolic.tower import Poly
 
-#: A coordinate of the field, and a monomial.
+#: Place of a coefficient in a vector field: index of the coordinate, and exponents of the monomial in its rate.
 _Place = tuple[int, Monomial]
 
 
 def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
-    """Yield the terms with such sums in place of their summands: cancelling terms, linear terms, and both.
+    """Yield lists of terms in which some terms are replaced by their sum: cancelling terms, linear terms, and both
+    kinds.
 
     Nothing is yielded if π is constant.
     """
@@ -36,9 +37,9 @@ def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
 
 
 def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms with a sum in place of those whose fields have cancelling monomials.
+    """Return the terms with those summed whose vector fields have monomials that cancel.
 
-    None if there are none, or the sum has no flow.
+    Returns None if there are no such terms, or if no sum has a flow.
     """
     fields = [_field_monomials(ring, t) for t in terms]
     users: dict[_Place, list[int]] = {}
@@ -59,7 +60,8 @@ def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
 
 
 def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
-    """Return a list with the sum of several terms as its only term; None if the sum has no flow."""
+    """Return a list with the sum of several terms as its only element; None if there is only one term, or no flow of
+    the sum."""
     if len(group) == 1:
         return None
     sum_of_terms = Term(total(t.expression for t in group), ring.tower.combine(t.element for t in group))
@@ -67,7 +69,7 @@ def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
 
 
 def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:
-    """Return the coefficients of π∇G, by coordinate and monomial in all variables of the ring."""
+    """Return the coefficients of the vector field π∇G of a term G, by coordinate and monomial."""
     return {
         (i, tuple(map(int, m))): c
         for i, rate in enumerate(ring.field(term.element))
@@ -77,7 +79,11 @@ def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:
 
 
 def _with_linear(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms with a sum in place of those that are linear in an algebra; None if all of these commute."""
+    """Return the terms with those summed that are linear in the coordinates of an algebra, times constants of the
+    motion.
+
+    Returns None if all these terms commute with each other, or if their sum has no flow.
+    """
     algebra = _algebra(ring)
     linear: list[Term] = []
     other_terms: list[Term] = []
@@ -95,13 +101,14 @@ def _with_linear(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
 
 
 def _algebra(ring: Ring) -> frozenset[int]:
-    """Return the coordinates that have a non-constant bracket with some coordinate."""
+    """Return the indices of the coordinates that have at least one non-constant bracket."""
     n = range(len(ring.coordinates))
     return frozenset(i for i in n if any(ring.support(ring.poisson[i][j]) for j in ring.brackets_of[i]))
 
 
 def _is_linear(ring: Ring, element: Poly, algebra: Collection[int]) -> bool:
-    """Whether a monomial is one coordinate of the algebra times factors that commute with the algebra."""
+    """Whether a monomial is one coordinate of the algebra times factors that commute with each other and with the
+    algebra."""
     names = [ring.coordinates[i] for i in algebra]
     ((monomial, _),) = ring.terms(element, ring.state).items()
     reading = [

@@ -1,7 +1,7 @@
-"""Linear first integrals of a part, and its equations with the integrals as constants.
+"""Linear first integrals of the flow of a part, and its equations after these integrals are substituted as constants.
 
-The sum S = s_1 + s_2 of two spins is constant along the flow of s_1·s_2. With S as a constant, ṡ_1 = s_1 × s_2 becomes
-the linear equation ṡ_1 = s_1 × S.
+For example, the sum S = s_1 + s_2 of two spins is constant along the flow of s_1·s_2. With S as a constant, ṡ_1 = s_1 ×
+s_2 becomes the linear equation ṡ_1 = s_1 × S.
 """
 
 from __future__ import annotations
@@ -19,10 +19,12 @@ from phigen.symbolic.tower import Poly, Tower, rational
 
 @dataclass(frozen=True)
 class Reduced:
-    """A ring in which some coordinates are eliminated: x_i = I − L_i, with an integral I, a symbol of the ring.
+    """Equations of motion after elimination of some coordinates x_i = I_i − L_i by linear first integrals I_i = x_i +
+    L_i.
 
-    ``forms`` has for each of these coordinates the linear form L_i in the others. ``field`` is the vector field in this
-    ring, 0 for the eliminated coordinates. ``integrals`` maps the symbols of integrals to their expressions.
+    ``ring`` has the symbols of the I_i in place of these coordinates. ``field`` is the vector field in this ring, with
+    0 for the eliminated coordinates. ``forms`` maps the index of an eliminated coordinate to the linear form L_i in the
+    other coordinates. ``integrals`` maps the symbol of I_i to x_i + L_i.
     """
 
     ring: Ring
@@ -32,10 +34,9 @@ class Reduced:
 
 
 def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
-    """Return the equations after elimination of the coordinates that linear integrals with rational coefficients
-    determine.
+    """Return the equations of a vector field after elimination of coordinates by linear first integrals.
 
-    None if there are no such integrals.
+    The integrals have rational coefficients. Returns None if there are none.
     """
     moving = [i for i, f in enumerate(field) if f != 0]
     relations = kernel(Field(), _equations(field, moving), len(moving))
@@ -43,7 +44,7 @@ def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
         return None
     forms: dict[int, Expression] = {}
     integrals: dict[str, Expression] = {}
-    for relation in relations:  # a relation is 1 at its last coordinate, where all others are 0
+    for relation in relations:  # its last coordinate has the factor 1, and no other relation has it
         pivot = moving[max(relation)]
         other_terms = total(
             number(rational(c)) * symbol(ring.coordinates[moving[k]]) for k, c in relation.items() if moving[k] != pivot
@@ -61,7 +62,10 @@ def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
 
 
 def _equations(field: Sequence[Poly], moving: Sequence[int]) -> list[dict[int, object]]:
-    """Return one row for each monomial, for the equation Σ_k c_k field_k = 0."""
+    """Return the linear equations for the c_k in Σ_k c_k field_k = 0, one row for each monomial of the field.
+
+    ``moving`` has the indices of the components that are not 0; k counts these.
+    """
     rows: dict[tuple[int, ...], dict[int, object]] = {}
     for k, i in enumerate(moving):
         for monomial, c in field[i].to_dict().items():

@@ -1,14 +1,14 @@
 """The flow of a Kepler motion, H = w|p|²/2 − k/|q| with w = 1/m, by universal variables.
 
-Let μ = wk, v = wp, r0 = |q|, η = q·v, β = 2μ/r0 − |v|², and s the universal anomaly of `phigen.symbolic.universal`:
+Let μ = wk, v = wp, r0 = |q|, η = q·v, β = 2μ/r0 − |v|², and let s be the universal anomaly of
+`phigen.symbolic.universal`. The state (q', p') after the flow is
 
     q' − q = g v − (μG2/r0) q,    p' − p = −(kG1/(r r0)) q − (μG2/r) p,
     g = r0 G1 + ηG2,    r = r0 + ηG1 + (μ − βr0)G2 = |q'|,
 
-where G1 = 2SC, G2 = 2S², C = cosroot(βs²/4) and S = s sinroot(βs²/4)/2. These are the coefficients f, g, ḟ, ġ of
-Lagrange, with g written without the time: an error of s results in the motion over a different time, and does not
-change the energy. The formula, which divides by neither β nor w, holds for ellipses, parabolas, hyperbolas and both
-signs of k.
+where G1 = 2SC, G2 = 2S², C = cosroot(βs²/4) and S = s sinroot(βs²/4)/2. The factors are the coefficients f, g, ḟ, ġ of
+Lagrange, except that g is written without the time. So an error of s changes only the time over which the body moves,
+and not the energy. No formula divides by β or w: ellipses, parabolas, hyperbolas and both signs of k are covered.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ Vector = Sequence[Expression]
 
 @dataclass(frozen=True)
 class KeplerMotion:
-    """The motion of w|p|²/2 − k/|q| with ``position`` q and ``momentum`` p, coordinates or linear forms of coordinates.
+    """The Kepler motion of w|p|²/2 − k/|q| with ``position`` q and ``momentum`` p.
 
-    ``inverse_mass`` is w, ``strength`` is k; both depend on parameters only.
+    The components of q and p are coordinates or linear forms of coordinates. ``inverse_mass`` is w and ``strength`` is
+    k; both depend on parameters only.
     """
 
     position: tuple[Expression, ...]
@@ -44,11 +45,11 @@ class KeplerMotion:
 
     @property
     def manner(self) -> str:
-        """Description of the motion, for reports."""
+        """The motion in words, for reports."""
         return f"{', '.join(map(str, (*self.position, *self.momentum)))} moved along a conic section"
 
     def rates(self) -> tuple[list[Expression], list[Expression]]:
-        """Return the rates of q and p, wp and −kq/|q|³."""
+        """Return the time derivatives of q and p, which are wp and −kq/|q|³."""
         pull = self.strength * self.cube
         return [self.inverse_mass * e for e in self.momentum], [-(pull * e) for e in self.position]
 
@@ -58,26 +59,31 @@ class KeplerMotion:
         return power(sqrt(square(self.position)), -3)
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return the expressions with a symbol for 1/|q|³, for proofs."""
+        """Return the expressions unchanged, as proofs about a single Kepler motion need no auxiliary symbols, unlike
+        `RelativeMotions`."""
         return [*roots]
 
     def changes(self) -> tuple[list[Expression], list[Expression]]:
-        """Return the changes of q and p over the time of the flow."""
+        """Return the changes of q and p in the flow over the time `TIME`."""
         orbit = _Orbit.through(self.position, self.momentum, self.inverse_mass, self.strength)
         s = call(ANOMALY, symbol(TIME), orbit.distance, orbit.moment, orbit.beta, orbit.mu, orbit.spin)
         z = orbit.beta * s**2 / 4
         return orbit.changes(call("cosroot", z), s * call("sinroot", z) / 2)
 
     def field(self, coordinates: Sequence[str]) -> list[Expression]:
-        """Return the rates of all ``coordinates``, those of the motion as its position and momentum."""
+        """Return the rates of all ``coordinates``; those that are not part of the motion have the rate 0.
+
+        The position and the momentum of the motion must be coordinates.
+        """
         return self._placed(coordinates, self.rates())
 
     def increments(self, coordinates: Sequence[str]) -> list[Expression]:
-        """Return the increments of all ``coordinates`` over the time of the flow."""
+        """Return the increments of all ``coordinates`` in the flow over the time `TIME`."""
         return self._placed(coordinates, self.changes())
 
     def residuals(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals that vanish if the increments are the motion."""
+        """Yield pairs of a label and an expression; all expressions vanish if the increments solve the equations of
+        motion."""
         yield from identities()
 
     def _placed(
@@ -90,7 +96,10 @@ class KeplerMotion:
 
 @dataclass(frozen=True)
 class _Orbit:
-    """An orbit, given by its initial state, with r0, η, β and μ."""
+    """The orbit of a Kepler motion through a state, with the constants of the formulas: r0, η, β and μ.
+
+    They are called ``distance``, ``moment``, ``beta`` and ``mu``.
+    """
 
     position: Vector
     momentum: Vector
@@ -103,7 +112,7 @@ class _Orbit:
 
     @classmethod
     def through(cls, q: Vector, p: Vector, w: Expression, k: Expression) -> _Orbit:
-        """Return the orbit through the state (q, p)."""
+        """Return the orbit through the state (q, p), for the inverse mass w and the strength k."""
         distance, mu = sqrt(square(q)), w * k
         moment = w * total(a * b for a, b in zip(q, p, strict=True))
         beta = 2 * mu * power(distance, -1) - w**2 * square(p)
@@ -111,21 +120,21 @@ class _Orbit:
 
     @property
     def spin(self) -> Expression:
-        """The square of the angular momentum per mass, |q × v|²."""
+        """The square of the angular momentum per mass, |q × v|² with v = wp."""
         pairs = list(combinations(zip(self.position, self.momentum, strict=True), 2))
         return self.inverse_mass**2 * total((a * d - b * c) ** 2 for (a, b), (c, d) in pairs)
 
     def end(self, c: Expression, s: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return G1, G2 and the final distance r, from C and S."""
+        """Return G1, G2 and the distance r = |q'| after the flow, from the values C and S of the formulas."""
         g1, g2 = 2 * s * c, 2 * s**2
         return g1, g2, self.distance + (self.moment * g1 + (self.mu - self.beta * self.distance) * g2)
 
     def changes(self, c: Expression, s: Expression) -> tuple[list[Expression], list[Expression]]:
-        """Return q' − q and p' − p, from C and S."""
+        """Return the changes q' − q and p' − p in the flow, from the values C and S of the formulas."""
         g1, g2, r = self.end(c, s)
         inverse, inverse_end = power(self.distance, -1), power(r, -1)
         along = self.inverse_mass * (self.distance * g1 + self.moment * g2)
-        # the products of unrounded factors keep the flow canonical
+        # multiplied in this order, both changes contain the same rounded factors, so that the flow stays canonical
         towards = self.inverse_mass * (self.strength * g2)
         pull = inverse * inverse_end * (self.strength * g1)
         q_change = [along * b - towards * inverse * a for a, b in zip(self.position, self.momentum, strict=True)]
@@ -134,12 +143,13 @@ class _Orbit:
 
 
 def identities() -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals that vanish if the increments are the flow.
+    """Yield pairs of a label and an expression in the independent symbols C, S, r0, η, β, w, k and one component of q
+    and p.
 
-    They are functions of C, S, r0, η, β, w, k and one component of q and of p. Along the motion ds = dt/r, so dS/dt =
-    C/(2r) and dC/dt = −βS/(2r); the initial state is constant. The residuals are those of the equations of motion with
-    r for |q'|, and of r² = |q'|² with |v|² = 2wk/r0 − β. C² + βS² = 1 is substituted as β = (1 − C²)/S², so that only
-    rational functions of independent symbols remain.
+    All expressions vanish if the increments are the flow. Along the motion ds = dt/r, hence dS/dt = C/(2r) and dC/dt =
+    −βS/(2r), while the initial state is constant. The expressions are the residuals of the equations of motion, with r
+    in place of |q'|, and of r² = |q'|², with |v|² = 2wk/r0 − β. The relation C² + βS² = 1 is substituted as β = (1 −
+    C²)/S².
     """
     names = [Symbol("orbit", name) for name in ("C", "S", "r0", "η", "β", "w", "k", "q", "p")]
     c, s, distance, moment, beta, w, k, q, p = map(symbol, names)
@@ -166,10 +176,10 @@ def identities() -> Iterator[tuple[str, Expression]]:
 
 
 def square(vector: Vector) -> Expression:
-    """Return |v|²."""
+    """Return the square |v|² of the length of a vector."""
     return total(e**2 for e in vector)
 
 
 def inverse_length(vector: Vector) -> Expression:
-    """Return 1/|v|."""
+    """Return 1/|v| for a vector v."""
     return power(sqrt(square(vector)), -1)

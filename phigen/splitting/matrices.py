@@ -1,12 +1,13 @@
-"""Linear parts with a matrix known before the steps: exp(tA) − 1 as numbers, for any A up to `MOST_ROWS` rows.
+"""Flows of linear equations ẇ = Aw by matrices exp(tA) − 1 that are computed as numbers before the steps.
 
-The entries of A are functions of parameters. The coefficients of a linear motion may also contain values that are
-constant along the flow but change from step to step, such as a coupling to a coordinate of another part. Products of
-such values with moving variables are then further unknowns: q̇ = p, ṗ = −q + f is linear in q, p and f, with f as the
-third unknown.
+The entries of A are functions of parameters; A has at most `MOST_ROWS` rows. The coefficients of a linear motion may
+also contain values that are constant along the flow but change from step to step, such as a coordinate of another part.
+Products of such values with moving variables are then further unknowns: q̇ = p, ṗ = −q + f is linear in q, p and f,
+with f as the third unknown.
 
-Scaling and squaring: if ‖A/2^s‖ ≤ 1/2, the Padé approximant of order 6 is F = 2(V − U)⁻¹U, with the even part V and the
-odd part U of its numerator. F ↦ 2F + F² maps exp(A) − 1 to exp(2A) − 1, which preserves all digits for a small A.
+Matrix exponentials are computed by scaling and squaring. If ‖A/2^s‖ ≤ 1/2, the Padé approximant of order 6 for
+exp(A/2^s) − 1 is F = 2(V − U)⁻¹U, where V is the even and U the odd part of its numerator. The map F ↦ 2F + F² takes
+exp(A) − 1 to exp(2A) − 1, and preserves all digits for small A.
 """
 
 from __future__ import annotations
@@ -22,18 +23,19 @@ from phigen.symbolic.expression import Expression, symbol, total
 from phigen.symbolic.symbols import EXPONENTIAL, Symbol
 from phigen.symbolic.tower import Poly
 
-#: Largest number of rows of a matrix, and largest number of factors of an unknown. A step multiplies by the whole
+#: Largest number of rows of A, and largest number of factors in an unknown; a step multiplies a vector by the whole
 #: matrix.
 MOST_ROWS, MOST_DEGREE = 64, 8
 
-#: The numerator of the Padé approximant of order 6, and the largest norm for which it is used: the error is 2·10⁻¹⁷.
+#: The coefficients of the numerator of the Padé approximant of order 6 for exp, and the largest norm of a matrix for
+#: which it is used. Its error is then 2·10⁻¹⁷.
 PADE = tuple(Fraction(1, n) * m for m, n in ((1, 1), (1, 2), (5, 44), (1, 66), (1, 792), (1, 15840), (1, 665280)))
 MAX_PADE_NORM = 0.5
 
 
 @dataclass(frozen=True)
 class MatrixExponential:
-    """exp(tA) − 1, computed before the steps; ``rates`` are the entries of A, row by row."""
+    """The matrix exp(tA) − 1, which is computed before the steps; ``rates`` are the entries of A, row by row."""
 
     rates: tuple[Expression, ...]
 
@@ -49,13 +51,13 @@ class MatrixExponential:
 
     @property
     def symbols(self) -> list[Symbol]:
-        """The symbols of the entries of exp(tA) − 1, row by row; equal matrices have equal symbols."""
+        """The symbols of the entries of exp(tA) − 1, row by row; equal matrices A have equal symbols."""
         key = blake2b(b"|".join(e.digest for e in self.rates), digest_size=8).hexdigest()
         return [Symbol(EXPONENTIAL, key, k) for k in range(len(self.rates))]
 
     @cached_property
     def reached(self) -> list[set[int]]:
-        """For each row, the columns in which exp(tA) − 1 may be nonzero, by the zeros of A."""
+        """For each row of exp(tA) − 1, the columns whose entries may be nonzero, by the pattern of zeros of A."""
         n = range(self.size)
         columns = [{j for j in n if not self.rates[i * self.size + j].is_zero} for i in n]
         while True:
@@ -65,7 +67,8 @@ class MatrixExponential:
             columns = wider
 
     def slopes(self) -> dict[str, Expression]:
-        """Return the derivatives of the entries of exp(tA) − 1 with respect to the time, by symbol: A exp(tA)."""
+        """Return the time derivatives of the entries of exp(tA) − 1, the matrix A exp(tA), by the symbol of the
+        entry."""
         n, entries = self.size, self.symbols
         rates: dict[str, Expression] = {}
         for k, name in enumerate(entries):
@@ -77,14 +80,14 @@ class MatrixExponential:
 
 @dataclass(frozen=True)
 class StaticSolution:
-    """The increments of the coordinates of a linear motion, in terms of the entries of a matrix exponential."""
+    """The increments of the coordinates of a linear motion, and the matrix exponential whose symbols they contain."""
 
     increments: tuple[Expression, ...]
     exponential: MatrixExponential
 
 
 def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
-    """Return exp(tA)w − w for a matrix with static entries; None if the equations have no such matrix."""
+    """Return exp(tA)w − w for the coordinates of a linear motion, if A can be computed before the steps; else None."""
     rows = _static_rows(ring, motion)
     if rows is None:
         return None
@@ -102,8 +105,11 @@ def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
 
 
 def _static_rows(ring: Ring, motion: LinearMotion) -> dict[Monomial, dict[Monomial, Poly]] | None:
-    """Return the equations of the products of unknowns with constant values, or None if these equations are not
-    closed."""
+    """Return linear equations whose coefficients depend on parameters only: unknown → (unknown → coefficient).
+
+    The unknowns are products of the monomials of the motion with values that are constant along the flow. Returns None
+    if the number or the degree of the unknowns exceeds the limits.
+    """
     matrix = {
         m: {k: c for k, c in zip(motion.basis, row, strict=True) if c != 0}
         for m, row in zip(motion.basis, motion.matrix, strict=True)

@@ -1,7 +1,8 @@
-"""Motions among the terms of H: sums of p²/2m and −k/|q| of one body, which do not commute, and free rigid bodies.
+"""Kepler motions and free rigid bodies in H, and the division of H into a large and a small part.
 
-A body has two or three coordinates q, with 1/|q| in H, and their conjugate momenta. The remaining terms are
-perturbations. If these are small compared with the motions, H = A + εB is near-integrable.
+A Kepler motion is a sum of p²/2m and −k/|q| for a single body; these two terms do not commute. The body has two or
+three coordinates q, with 1/|q| in H, and their conjugate momenta p. All terms of H outside of these motions are
+perturbations. If they are small compared with the motions, H = A + εB is near-integrable.
 """
 
 from __future__ import annotations
@@ -20,19 +21,20 @@ from phigen.symbolic.expression import symbol
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.tower import Generator, Poly
 
-#: Dimensions of space in which a body may move.
+#: Dimensions of space in which Kepler motions are recognised.
 _DIMENSIONS = (2, 3)
 
-#: Largest ratio of the coefficients of a perturbation to those of the motions for which near-integrable methods are
-#: used. Below this ratio, errors of ε² h^6 and ε³ h^4 are less than those of general methods of order 4.
+#: Largest ratio of the coefficients of the perturbations to those of the motions for which methods for near-integrable
+#: systems are used. Below it, their errors ε² h^6 and ε³ h^4 are smaller than those of general methods of order 4.
 SMALL = 0.02
 
 
 def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term] | None:
-    """Return the terms with each motion as a single term, the motions first; None if there are no motions.
+    """Return the terms of H with each Kepler motion as a single term; these terms come first. None if there are no
+    motions.
 
-    The motions are Kepler motions and, if ``rigid``, free rigid bodies. Only terms of a single body belong to its
-    motion: (p_1 + p_2)² is not divided, and commutes with functions of q_1 − q_2.
+    If ``rigid``, free rigid bodies are single terms too. Only terms of one body belong to its motion: (p_1 + p_2)² is
+    not divided, so that it still commutes with functions of q_1 − q_2.
     """
     motions: list[tuple[KeplerMotion | EulerMotion, Poly]] = [*_motions(ring, terms)]
     if rigid:
@@ -44,11 +46,12 @@ def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term
 
 
 def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> int | None:
-    """Return the index of the part εB of a near-integrable H = A + εB; None if H is not such a sum of two parts.
+    """Return the index of the part εB of a near-integrable H = A + εB; None if H does not consist of a large and a
+    small part.
 
-    A part with a factor that is declared small is small. Without such a declaration, or if the small parameter also
-    occurs as a divisor, such as a small mass in p²/2m, the part without Kepler motions is small if its coefficients
-    are.
+    If parameters are declared small, εB is the part whose terms have such a factor. This rule does not apply if a small
+    parameter is also a divisor, such as the small mass in p²/2m. Without the rule, the part without Kepler motions and
+    rigid bodies is εB if its coefficients are small.
     """
     if len(parts) != 2:
         return None
@@ -65,20 +68,22 @@ def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> i
 
 
 def _vanishes_with(ring: Ring, term: Term, variables: Sequence[int]) -> bool:
-    """Whether every monomial of a term has one of these variables as a factor."""
+    """Whether every monomial of a term has at least one of these variables of the ring as a factor."""
     return all(any(exponents[v] for v in variables) for exponents in term.element.to_dict())
 
 
 def _divided_by(ring: Ring, term: Term, names: Sequence[str]) -> bool:
-    """Whether one of these parameters occurs in a denominator of a term."""
+    """Whether one of the parameters ``names`` occurs in a denominator of a term."""
     powers = term.element.degrees()[len(ring.tower.symbols) :]
     occurring = (g for g, degree in zip(ring.tower.generators, powers, strict=True) if degree > 0)
     return any(g.kind == "reciprocal" and ring.tower.depends_on(g.arguments[0], names) for g in occurring)
 
 
 def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
-    """Return the sum of the magnitudes of the coefficients of terms that change coordinates, with default
-    parameters."""
+    """Return the sum of the absolute values of the coefficients of some terms, for the default values of parameters.
+
+    Terms whose vector field is 0 do not count.
+    """
     values = {p.name: float(p.value) for p in system.parameters}
     sizes = []
     for term in terms:
@@ -92,7 +97,8 @@ def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
 
 
 def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> list[Term]:
-    """Return the terms without the monomials of the motions; terms that contain none of them are left as written."""
+    """Return the terms of H without the monomials that belong to motions; terms without such monomials are left as
+    written."""
     untouched, remaining = [], []
     for term in terms:
         motion_monomials = {
@@ -108,12 +114,12 @@ def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> li
 
 
 def _is_of(ring: Ring, term: Term, motion: Term) -> bool:
-    """Whether a term depends only on the coordinates of the motion."""
+    """Whether a term depends only on coordinates of the motion."""
     return {*ring.support(term.element)} <= {*ring.support(motion.element)}
 
 
 def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, Poly]]:
-    """Yield the Kepler motions in H, each with its element of the ring."""
+    """Yield the Kepler motions in H, each with its Hamiltonian as an element of the ring."""
     size = len(ring.tower.gens)
     supports = [{*ring.support(t.element)} for t in terms]
     for generator in ring.tower.generators:
@@ -138,20 +144,22 @@ def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, 
 
 
 def is_inverse_distance(generator: Generator) -> bool:
-    """Whether a generator is one over a square root."""
+    """Whether a variable of the ring stands for one over a square root."""
     return generator.kind == "root" and generator.degree == 2 and generator.inverse
 
 
 def _distance_from(ring: Ring, arguments: Sequence[Poly]) -> tuple[int, ...]:
-    """Return the coordinates whose squares sum to the argument of a root; () if the argument has another form."""
+    """Return the indices of the coordinates q if the argument of a root is |q|²; () if it has another form."""
     support = ring.support(arguments[0])
     squares = ring.tower.combine(ring.tower.variable(ring.coordinates[i]) ** 2 for i in support)
     return support if len(support) in _DIMENSIONS and arguments[0] == squares else ()
 
 
 def conjugate(ring: Ring, i: int) -> int | None:
-    """Return the coordinate p with {q, p} = 1 for q = x_i, if neither has a bracket with another coordinate; else
-    None."""
+    """Return the index of the momentum p of the coordinate q = x_i, with {q, p} = 1.
+
+    Returns None if there is none, or if q or p has a bracket with a third coordinate.
+    """
     partners = ring.brackets_of[i]
     alone = len(partners) == 1 and ring.brackets_of[partners[0]] == [i]
     return partners[0] if alone and ring.poisson[i][partners[0]] == 1 else None

@@ -1,4 +1,4 @@
-"""Grouping of the terms of H into parts: as few as possible, each of commuting terms with elementary flows."""
+"""Division of H into parts, as few as possible: each part is a sum of commuting terms with elementary flows."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Poly
 
-#: Largest number of companions (functions without a flow) that are subtracted from the terms.
+#: Largest number of companions whose multiples are subtracted from terms: Casimirs and similar functions, see
+#: `phigen.splitting.regrouping`.
 MAX_COMPANIONS = 3
 
 
 @dataclass(frozen=True)
 class SplitHamiltonian:
-    """The flows of the parts of H, in the order of a step.
+    """H as a sum of parts: the flows of the parts, in the order in which a step applies them.
 
     ``kick`` is the index of the part V if the method requires {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`); the
-    Hamiltonian of its flow may contain a multiple of {V, {V, T}}. ``small`` is the index of the part εB of a
-    near-integrable H = A + εB.
+    Hamiltonian of its flow may then contain κ{V, {V, T}}. ``small`` is the index of the part εB of a near-integrable H
+    = A + εB.
     """
 
     flows: tuple[Flow, ...]
@@ -39,14 +40,16 @@ class SplitHamiltonian:
 
 
 def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitHamiltonian:
-    """Return H as a sum of parts with elementary flows: as few as possible and, among these, with the most invariants.
+    """Return H as a sum of parts with elementary flows.
 
-    If ``motions``, Kepler motions are single terms; if also ``rigid``, so are free rigid bodies. A near-integrable H is
-    split into its two parts. Raises `SpecError`, located at the Hamiltonian, with the term that has no flow.
+    The number of parts is as small as possible; among divisions with the same number, those whose parts preserve the
+    most invariants are preferred. If ``motions``, a Kepler motion is a single term; if also ``rigid``, so is a free
+    rigid body. A near-integrable H is divided into its large and its small part. Raises `SpecError`, located at the
+    Hamiltonian, with a term that has no flow.
     """
     summands = hamiltonian_terms(system)
     ring = ring_of(system, summands)
-    # A constant H is one term, so that there is a flow, although it changes nothing.
+    # A constant H becomes one term, so that there is a part, whose flow changes nothing.
     terms = terms_of(ring, summands) or [Term(system.hamiltonian, ring.tower.convert(system.hamiltonian))]
     invariants = _invariants(system, ring)
     refused: NoFlowError | None = None
@@ -70,7 +73,7 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
         if rank < least:
             best, least = SplitHamiltonian(flows, small=small_index), rank
         if best and best.small is not None:
-            break  # no grouping is better than two parts, one of them small
+            break  # no division is better than a large and a small part
     if best is None:
         raise _refusal(system, refused)
     return (
@@ -81,7 +84,8 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
 
 
 def _invariants(system: System, ring: Ring) -> list[Poly]:
-    """Return the invariants of the spec, without those that contain functions or symbols that H and π do not have."""
+    """Return the invariants of the spec as elements of the ring; those with functions or symbols that H and π lack are
+    omitted."""
     elements = []
     for e in system.invariants.values():
         try:
@@ -92,9 +96,9 @@ def _invariants(system: System, ring: Ring) -> list[Poly]:
 
 
 def _lost_invariant_count(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly]) -> int:
-    """Return the number of invariants that at least one part does not preserve.
+    """Return the number of invariants that are not constant along the flows of all parts.
 
-    For example, s_1 + s_2 is constant along the flow of s_1·s_2, but not of x_1 x_2.
+    For example, s_1 + s_2 is constant along the flow of s_1·s_2, but not along that of x_1 x_2.
     """
     sums = [ring.tower.combine(t.element for t in part) for part in parts]
     return sum(not all(ring.commute(invariant, g) for g in sums) for invariant in invariants)
@@ -103,8 +107,11 @@ def _lost_invariant_count(ring: Ring, parts: Sequence[Sequence[Term]], invariant
 def _candidates(
     system: System, conflicts: Conflicts, terms: list[Term], *, motions: bool, rigid: bool
 ) -> Iterator[list[Term]]:
-    """Yield lists of terms: as written, with whole squares, with motions, by blocks, without companions, and in
-    groups."""
+    """Yield lists of terms whose sum is H, among which the best division into parts is searched.
+
+    The lists are, in this order: the terms as written; with squares of sums undivided; with motions as single terms;
+    summed by blocks of π; with companions subtracted; and with groups of terms summed.
+    """
     yield terms
     ring = conflicts.ring
     whole_terms = _with_whole_summands(ring, hamiltonian_terms(system))
@@ -126,9 +133,10 @@ def _candidates(
 
 
 def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term] | None:
-    """Return the terms with those summands undivided that have a flow, such as squares of linear forms.
+    """Return the terms of H, in which summands that have a flow as a whole are not expanded; None if there are no such
+    summands.
 
-    None if there are none. (v·m)² on so(3) rotates m about v, while its monomials do not commute.
+    An example on so(3) is (v·m)²: it rotates m about v, while its monomials do not commute with each other.
     """
     whole_terms: list[Term] = []
     remaining: list[Expression] = []
@@ -145,7 +153,10 @@ def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term]
 
 
 def _without_companions(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:
-    """Yield the terms minus companions if this reduces the number of parts."""
+    """Yield lists of terms with multiples of companions subtracted, where this reduces the number of parts.
+
+    Companions are Casimirs and similar functions; see `phigen.splitting.regrouping`.
+    """
     ring = conflicts.ring
     for _ in range(MAX_COMPANIONS):
         fewest = len(conflicts.grouped(terms))
@@ -164,7 +175,8 @@ def _without_companions(system: System, conflicts: Conflicts, terms: list[Term])
 
 
 def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
-    """Return the flows; parts whose sum has linear equations with a closed form are merged into one flow."""
+    """Return the flows, in which two parts are merged into one if the equations of their sum are linear with a closed
+    form."""
     for i, first in enumerate(flows):
         for second in flows[i + 1 :]:
             if first.has_motion or second.has_motion:
@@ -177,8 +189,7 @@ def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
 
 
 def _exact_linear_flow(ring: Ring, flows: list[Flow]) -> list[Flow]:
-    """Return one exact flow, by a matrix exponential, if the equations of the sum of all parts are linear; else the
-    flows."""
+    """Return the exact flow of H as the only part, if its equations of motion are linear; else the given flows."""
     if len(flows) == 1:
         return flows
     terms = [Term(f.hamiltonian, ring.tower.convert(f.hamiltonian)) for f in flows]

@@ -1,9 +1,9 @@
 """Other forms of H as a sum of terms, which may need fewer parts.
 
-*Quadratic companions* are functions without an effect on the other terms. A Casimir C has no flow, and |P|² on se(3)*
-commutes with every function of P. In H = λC + (H − λC), a suitable λ cancels a term that conflicts with others, at no
-cost: the free rigid body then has two parts instead of three. C is a Casimir of π, or of a closed bracket of some
-coordinates.
+*Companions* are quadratic functions C that do not affect the other terms: a Casimir has no flow, and |P|² on se(3)*
+commutes with every function of P. In H = λC + (H − λC), a suitable λ cancels a term that does not commute with others.
+For example, the free rigid body then has two parts instead of three. C is a Casimir of π, or of the brackets of some
+coordinates that are closed under brackets.
 
 *Blocks.* Terms that couple the same blocks of π, such as products of the components of two spins, are summed.
 """
@@ -23,12 +23,15 @@ from phigen.splitting.terms import joined, monomial_terms
 from phigen.symbolic.expression import Expression, total
 from phigen.symbolic.tower import Poly
 
-#: Largest number of coordinates of a closed bracket whose Casimirs are searched for.
+#: Largest number of coordinates that are closed under brackets for which Casimirs of their brackets are searched.
 MOST_COORDINATES = 8
 
 
 def with_companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> Iterator[list[Term]]:
-    """Yield the terms with λC subtracted, for each companion C and each λ that cancels a monomial."""
+    """Yield lists of terms in which λC is subtracted and added as a separate term, for each companion C.
+
+    λ takes each value that cancels a monomial of H.
+    """
     ring = conflicts.ring
     for companion in _companions(system, conflicts, terms):
         of_companion = ring.terms(companion.element, ring.state)
@@ -52,7 +55,12 @@ def with_companions(system: System, conflicts: Conflicts, terms: Sequence[Term])
 
 
 def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> Iterator[Term]:
-    """Yield the companions: Casimirs, and quadratic Casimirs of the closed brackets of pairs of conflicting terms."""
+    """Yield functions C whose multiples may be subtracted from terms: Casimirs of π, and quadratic Casimirs of
+    sub-brackets.
+
+    A sub-bracket is that of the smallest set of coordinates which is closed under brackets and contains those of two
+    terms that do not commute.
+    """
     ring, candidates = conflicts.ring, list(system.casimirs.values())
     closures: set[tuple[int, ...]] = set()
     for i, neighbours in enumerate(conflicts.graph(terms)):
@@ -64,12 +72,13 @@ def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> 
     for e in candidates:
         try:
             yield Term(e, ring.tower.convert(e))
-        except ValueError:  # the Casimir contains functions that H and π do not have
+        except ValueError:  # Casimirs with functions that H and π do not have are omitted
             continue
 
 
 def _closure(ring: Ring, coordinates: set[int]) -> tuple[int, ...]:
-    """Return the smallest set of coordinates that contains these and is closed under brackets."""
+    """Return the smallest set of coordinates that contains ``coordinates`` and is closed under brackets, as sorted
+    indices."""
     while True:
         added = {k for i in coordinates for j in coordinates for k in ring.support(ring.poisson[i][j])}
         if added <= coordinates:
@@ -84,8 +93,8 @@ def _casimirs_within(system: System, inside: Sequence[int]) -> list[Expression]:
 
 
 def by_blocks(system: System, ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms with those summed that depend on the same two or more blocks of π; None if there are no such
-    terms."""
+    """Return the terms, in which those are summed that depend on the same two or more blocks of π; None if there are
+    none."""
     block_of = {i: k for k, block in enumerate(blocks(system.coordinates, system.poisson)) for i in block}
     groups: dict[tuple[int, ...], list[Term]] = {}
     for n, term in enumerate(terms):

@@ -1,13 +1,14 @@
-"""Kepler motions of bodies in relative coordinates, written in Cartesian coordinates: a linear canonical change.
+"""Kepler motions of attracting bodies in relative coordinates Q_i, P_i, which are linear forms of Cartesian
+coordinates.
 
-Bodies 0, …, N have masses m_i, positions q_i and momenta p_i; k_ij is the strength of the attraction −k_ij/|q_i − q_j|,
-M_i = m_0 + … + m_i, and M is the total mass. A is the sum of w_i|P_i|²/2 − K_i/|Q_i| over i ≥ 1 and of |p_0 + … +
-p_N|²/2M, the motion of the centre of mass. B = H − A.
+Bodies 0, …, N have masses m_i, positions q_i and momenta p_i, and k_ij is the strength of the attraction −k_ij/|q_i −
+q_j|. Let M_i = m_0 + … + m_i, and M be the total mass. The part A of H is the sum of w_i|P_i|²/2 − K_i/|Q_i| over i ≥ 1
+and of |p_0 + … + p_N|²/2M, the motion of the centre of mass. The part B is H − A.
 
-- *Jacobi*: Q_i = q_i − (m_0 q_0 + … + m_{i−1} q_{i−1})/M_{i−1} and P_i = p_i − (m_i/M_i)(p_0 + … + p_i), with
-  w_i = M_i/(m_i M_{i−1}) and K_i = Σ_{j<i} k_ij. The kinetic energy is that of the Q_i and of the centre of mass.
-- *Democratic heliocentric*: Q_i = q_i − q_0 and P_i = p_i − (m_i/M)(p_0 + … + p_N), with w_i = 1/m_i and K_i = k_i0.
-  The kinetic energy has one more term, |p_0 − (m_0/M)(p_0 + … + p_N)|²/2m_0.
+- *Jacobi*: Q_i = q_i − (m_0 q_0 + … + m_{i−1} q_{i−1})/M_{i−1} and P_i = p_i − (m_i/M_i)(p_0 + … + p_i), with w_i =
+  M_i/(m_i M_{i−1}) and K_i = Σ_{j<i} k_ij. A contains the whole kinetic energy.
+- *Democratic heliocentric*: Q_i = q_i − q_0 and P_i = p_i − (m_i/M)(p_0 + … + p_N), with w_i = 1/m_i and K_i = k_i0. A
+  lacks one term of the kinetic energy, |p_0 − (m_0/M)(p_0 + … + p_N)|²/2m_0.
 
 J. Wisdom, M. Holman, Symplectic maps for the n-body problem, Astronomical Journal 102 (1991); M. J. Duncan, H. F.
 Levison, M. H. Lee, A multiple time step symplectic algorithm for integrating close encounters, Astronomical Journal 116
@@ -29,7 +30,10 @@ from phigen.symbolic.symbols import Symbol
 
 @dataclass(frozen=True)
 class AttractingBodies:
-    """Attracting bodies: names of positions and momenta along each axis, masses, and strengths k_ij for i > j."""
+    """Attracting bodies: for each body the names of its positions and of its momenta, and its mass.
+
+    ``strengths`` maps (i, j) with i > j to the strength k_ij of the attraction −k_ij/|q_i − q_j|.
+    """
 
     positions: tuple[tuple[str, ...], ...]
     momenta: tuple[tuple[str, ...], ...]
@@ -38,12 +42,12 @@ class AttractingBodies:
 
     @property
     def axes(self) -> int:
-        """The dimension of space."""
+        """The dimension of the space in which the bodies move."""
         return len(self.positions[0])
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The coordinates of all bodies, positions first."""
+        """The names of all coordinates: the positions of all bodies, then the momenta of all bodies."""
         return tuple(name for names in (self.positions, self.momenta) for body in names for name in body)
 
     @property
@@ -52,22 +56,24 @@ class AttractingBodies:
         return total(square(p) * power(m, -1) / 2 for p, m in zip(map(_vector, self.momenta), self.masses, strict=True))
 
     def attraction(self, i: int, j: int) -> Expression:
-        """Return −k_ij/|q_i − q_j|; 0 for bodies that do not attract each other."""
+        """Return the energy −k_ij/|q_i − q_j| of the bodies i and j; 0 if they do not attract each other."""
         strength = self.strengths.get((i, j), ZERO)
         return ZERO if strength.is_zero else -strength * inverse_length(self.between(i, j))
 
     def between(self, i: int, j: int) -> list[Expression]:
-        """Return q_i − q_j."""
+        """Return the vector q_i − q_j from body j to body i."""
         return _difference(_vector(self.positions[i]), _vector(self.positions[j]))
 
 
 @dataclass(frozen=True)
 class RelativeMotions:
-    """The motion of A: ``kepler`` motions in linear forms of the coordinates, and the motion of the centre of mass.
+    """The flow of A for attracting bodies: Kepler motions of relative coordinates, and the motion of the centre of
+    mass.
 
-    ``hamiltonian`` is A in the coordinates. ``total_momentum`` and ``inverse_mass`` belong to all bodies together.
-    ``spread`` maps each coordinate to its change, in symbols for the changes of the Q_i, the P_i and the centre of
-    mass. ``masses`` are pairs of an expression, a mass m_i or a sum M_i, and a symbol for proofs.
+    ``hamiltonian`` is A in Cartesian coordinates. ``kepler`` has the Kepler motions; their positions Q_i and momenta
+    P_i are linear forms. ``total_momentum`` and ``inverse_mass`` are those of the centre of mass. ``spread`` maps each
+    Cartesian coordinate to its change, as a linear form of symbols for the changes of the Q_i, of the P_i and of the
+    centre of mass. ``masses`` has pairs for proofs: a mass m_i or a sum M_i, and the expression that replaces it.
     """
 
     hamiltonian: Expression
@@ -79,7 +85,7 @@ class RelativeMotions:
 
     @property
     def manner(self) -> str:
-        """Description of the motion, for reports."""
+        """The motion in words, for reports."""
         return f"{len(self.kepler)} relative positions moved along conic sections, the centre of mass shifted"
 
     def field(self, names: Sequence[str]) -> list[Expression]:
@@ -92,18 +98,21 @@ class RelativeMotions:
         return self._spread(names, [motion.changes() for motion in self.kepler], shift)
 
     def opaque(self, roots: Sequence[Expression]) -> list[Expression]:
-        """Return the expressions with symbols for each |Q_i|⁻³ and M_i, and with M_i − M_{i−1} for m_i.
+        """Return the expressions for a proof: with symbols in place of each |Q_i|⁻³ and M_i, and M_i − M_{i−1} in place
+        of m_i.
 
-        An expression that vanishes with these symbols vanishes for all bodies.
+        If an expression vanishes in this form, it vanishes for all masses and positions.
         """
         cubes = [(motion.cube, symbol(Symbol("cube", i))) for i, motion in enumerate(self.kepler, 1)]
         by_node = {id(node): value for node, value in (*cubes, *self.masses)}
         return fold(roots, lambda e, args: by_node.get(id(e)) or rebuild(e, args))
 
     def residuals(self) -> Iterator[tuple[str, Expression]]:
-        """Yield the residuals of the change of coordinates, and the identities of Kepler motions.
+        """Yield pairs of a label and an expression; all expressions vanish if the increments solve the equations of
+        motion.
 
-        They vanish if the changes ``spread`` of the coordinates change the forms Q_i and P_i as their symbols say.
+        The first ones vanish if the changes ``spread`` change the forms Q_i and P_i by the changes that their symbols
+        denote. The others are the identities of Kepler motions.
         """
         for i, motion in enumerate(self.kepler, 1):
             forms = substitute([*motion.position, *motion.momentum], self.spread)
@@ -122,7 +131,7 @@ class RelativeMotions:
     def _spread(
         self, names: Sequence[str], values: Sequence[tuple[list[Expression], list[Expression]]], of_centre: Vector
     ) -> list[Expression]:
-        """Return the changes of all coordinates ``names`` from those of relative coordinates and of the centre of
+        """Return the changes of the coordinates ``names`` from the changes of all Q_i, all P_i and the centre of
         mass."""
         axes = len(of_centre)
         changes: dict[str, Expression] = dict(zip(_names("R", 0, axes), of_centre, strict=True))
@@ -134,7 +143,7 @@ class RelativeMotions:
 
 
 def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
-    """Return the motion of A in Jacobi coordinates, and the expression B."""
+    """Return the motion of A in Jacobi coordinates, and B as an expression in Cartesian coordinates."""
     masses = bodies.masses
     q, p = (list(map(_vector, names)) for names in (bodies.positions, bodies.momenta))
     mass = list(accumulate(masses, add))
@@ -162,8 +171,11 @@ def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
 
 
 def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> Iterator[tuple[Expression, Expression]]:
-    """Yield the masses with expressions for proofs: M_i with a symbol, m_i with a difference of symbols unless it is
-    a number."""
+    """Yield pairs for proofs: each sum of masses M_i with a symbol, and each mass m_i with a difference of such
+    symbols.
+
+    Masses that are numbers are left as they are.
+    """
     previous = ZERO
     for i, (m, sum_of_masses) in enumerate(zip(masses, mass, strict=True)):
         if m.is_number:
@@ -175,7 +187,8 @@ def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> It
 
 
 def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
-    """Return the motion of A in democratic heliocentric coordinates, and the expression B."""
+    """Return the motion of A in democratic heliocentric coordinates, and B as an expression in Cartesian
+    coordinates."""
     axes, masses = range(bodies.axes), bodies.masses
     q, p = (list(map(_vector, names)) for names in (bodies.positions, bodies.momenta))
     inverse = power(total(masses), -1)
@@ -200,14 +213,15 @@ def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, 
 
 
 def _spread_from_jacobi(bodies: AttractingBodies, mass: Sequence[Expression]) -> dict[str, Expression]:
-    """Return the changes of the coordinates in terms of those of Jacobi coordinates, from the last body to the first.
+    """Return the changes of Cartesian coordinates as linear forms of the changes of Jacobi coordinates.
 
-    With the centre of mass R_i and the momentum T_i of the bodies up to i, and s_i = m_i/M_i: R_{i−1} = R_i − s_i Q_i,
-    q_i = R_{i−1} + Q_i, p_i = P_i + s_i T_i, T_{i−1} = T_i − p_i. The total momentum T_N does not change.
+    Let R_i be the centre of mass and T_i the total momentum of the bodies 0, …, i, and s_i = m_i/M_i. From the last
+    body to the first, R_{i−1} = R_i − s_i Q_i, q_i = R_{i−1} + Q_i, p_i = P_i + s_i T_i and T_{i−1} = T_i − p_i. The
+    total momentum T_N does not change.
 
-    As in the forms Q_i and P_i, the masses occur as s_i only. So the change is canonical, and exactly inverse to the
-    forms, even if the s_i are rounded. With several different quotients of masses, rounding errors would cause a drift
-    of the energy.
+    The masses occur as s_i only, here and in the forms Q_i and P_i. So this map is exactly inverse to the forms, and
+    canonical, even if the s_i are rounded. With several different quotients of masses, rounding errors would cause a
+    drift of the energy.
     """
     spread = dict[str, Expression]()
     centre: list[Expression] = changes_of("R", 0, bodies.axes)
@@ -224,7 +238,11 @@ def _spread_from_jacobi(bodies: AttractingBodies, mass: Sequence[Expression]) ->
 
 
 def _spread_from_star(bodies: AttractingBodies, shares: Sequence[Expression]) -> dict[str, Expression]:
-    """Return the changes of the coordinates in terms of those of democratic heliocentric coordinates."""
+    """Return the changes of Cartesian coordinates as linear forms of the changes of democratic heliocentric
+    coordinates.
+
+    ``shares`` are the m_i/M; body 0 is the star.
+    """
     axes, spread, planets = bodies.axes, dict[str, Expression](), range(1, len(shares))
     of_q, of_p = ([changes_of(kind, i, axes) for i in planets] for kind in "QP")
     weighted = [total(m * d[axis] for m, d in zip(shares[1:], of_q, strict=True)) for axis in range(axes)]
@@ -238,7 +256,10 @@ def _spread_from_star(bodies: AttractingBodies, shares: Sequence[Expression]) ->
 
 
 def changes_of(kind: str, body: int, axes: int) -> list[Expression]:
-    """Return the symbols of the change of Q_i, of P_i, or of the centre of mass R, by ``kind``."""
+    """Return the symbols of a change, one for each axis.
+
+    ``kind`` says of what: Q_i or P_i of the ``body`` i, or the centre of mass R.
+    """
     return [symbol(name) for name in _names(kind, body, axes)]
 
 
@@ -246,7 +267,7 @@ def _names(kind: str, body: int, axes: int) -> list[Symbol]:
     return [Symbol("change", kind, body, axis) for axis in range(axes)]
 
 
-#: The changes of coordinates, by their names in specs.
+#: The functions that divide H by relative coordinates, by the names of these coordinates in specs.
 CHANGES: Mapping[str, Callable[[AttractingBodies], tuple[RelativeMotions, Expression]]] = {
     "jacobi": jacobi,
     "democratic_heliocentric": democratic_heliocentric,

@@ -1,8 +1,8 @@
-"""The ring for the splitting of a Hamiltonian: H, π and all derivatives as polynomials in one tower.
+"""The ring for the division of a Hamiltonian into parts: H, π and all their derivatives as polynomials.
 
-A *variable* is a generator of the ring: a coordinate, a parameter, the time t, or a function value such as cos(q) or
-1/r. Variables that do not depend on coordinates are *static*. Along the flow of a part G a variable that depends on
-coordinates is *frozen* if its derivative X_G(v) = Σ_j (π∇G)_j ∂_j v vanishes, else *moving*.
+A *variable* of the ring is a coordinate, a parameter, the time t, or a function value such as cos(q) or 1/r. Variables
+that do not depend on coordinates are *static*. Along the flow of a part G, a variable v that depends on coordinates is
+*frozen* if its derivative Σ_j (π∇G)_j ∂_j v vanishes; otherwise it is *moving*.
 """
 
 from __future__ import annotations
@@ -20,53 +20,59 @@ from phigen.symbolic.horner import horner
 from phigen.symbolic.symbols import STEP, Symbol
 from phigen.symbolic.tower import Poly, Tower, rational
 
-#: Symbol of the duration of a flow: the step size of the solver.
+#: Symbol of the duration of a flow; it is the symbol of the step size in the solver.
 TIME = STEP
 
-#: Symbol of the multiple κ of {V, {V, T}} in a kick with modified potential; see `phigen.splitting.kicks`.
+#: Symbol of κ in a kick with modified potential, V + κ{V, {V, T}}; see `phigen.splitting.kicks`.
 KICK = Symbol("κ")
 
-#: Exponents of some of the ring's variables.
+#: A monomial: the exponents of all variables of the ring.
 Monomial = tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Ring:
-    """A tower that contains the functions of a system, with its bracket; ``brackets`` is π as elements of the tower."""
+    """A polynomial ring that contains the functions of a system and their derivatives, with the Poisson bracket.
+
+    ``poisson`` is π as polynomials of the ``tower``, which is the ring with its derivatives; ``brackets`` is π as
+    expressions.
+    """
 
     tower: Tower
     coordinates: tuple[str, ...]
     poisson: tuple[tuple[Poly, ...], ...]
     brackets: Matrix
-    #: Symbols that are constant along all flows but change from step to step: the time, and neighbours on lattices.
+    #: Symbols that are constant along all flows but change from step to step: the time, and on lattices the values of
+    #: neighbours.
     still: tuple[str, ...] = ()
 
     @cached_property
     def state(self) -> tuple[int, ...]:
-        """The indices of the variables that depend on coordinates."""
+        """The indices of the variables of the ring that depend on coordinates."""
         tower = self.tower
         return tuple(i for i, g in enumerate(tower.gens[: len(tower.names)]) if tower.depends_on(g, self.coordinates))
 
     @cached_property
     def changing(self) -> tuple[int, ...]:
-        """The indices of the variables that are not known before the steps."""
+        """The indices of the variables of the ring that change during a run, so that they are not known before the
+        steps."""
         tower, names = self.tower, [*self.coordinates, *self.still]
         return tuple(i for i, g in enumerate(tower.gens[: len(tower.names)]) if tower.depends_on(g, names))
 
     @cached_property
     def values(self) -> list[Expression]:
-        """The expression that each variable stands for."""
+        """The expressions for which the variables of the ring stand."""
         return [symbol(n) for n in self.tower.symbols] + [g.expression for g in self.tower.generators]
 
     @cached_property
     def zero_pairs(self) -> frozenset[tuple[int, int]]:
-        """The pairs of coordinates whose bracket is 0."""
+        """The pairs (i, j) of coordinates with {x_i, x_j} = 0."""
         n = len(self.coordinates)
         return frozenset((i, j) for i in range(n) for j in range(n) if self.tower.is_zero(self.poisson[i][j]))
 
     @cached_property
     def brackets_of(self) -> list[list[int]]:
-        """For each coordinate, the coordinates with which it has a nonzero bracket."""
+        """For each coordinate, the indices of the coordinates with which it has a nonzero bracket."""
         n = range(len(self.coordinates))
         return [[j for j in n if (i, j) not in self.zero_pairs] for i in n]
 
@@ -76,7 +82,7 @@ class Ring:
         return tuple(i for i, c in enumerate(self.coordinates) if c in names)
 
     def field(self, g: Poly) -> list[Poly]:
-        """Return π∇g."""
+        """Return the vector field π∇g of a function g in the ring."""
         sums: dict[int, list[Poly]] = {}
         for i in self.support(g):
             slope = self.tower.derivative(g, self.coordinates[i])
@@ -86,7 +92,8 @@ class Ring:
         return [self.lowest(self.tower.combine(sums[j])) if j in sums else zero for j in range(len(self.poisson))]
 
     def lowest(self, element: Poly) -> Poly:
-        """Return the element with q·(1/q) cancelled if the polynomial q divides the cofactor of 1/q."""
+        """Return the element with products q·(1/q) replaced by 1, wherever a polynomial q divides the factor of its
+        reciprocal 1/q."""
         for g in self.tower.generators:
             if g.kind != "reciprocal" or element == 0:
                 continue
@@ -107,7 +114,8 @@ class Ring:
         return element
 
     def rate(self, element: Poly, field: Sequence[Poly]) -> Poly:
-        """Return the derivative of an element along a vector field; it is the polynomial 0 if it vanishes."""
+        """Return the derivative of an element along a vector field; if it vanishes by a relation of the ring, it is
+        literally 0."""
         derivative = self.tower.combine(
             field[j] * self.tower.derivative(element, self.coordinates[j])
             for j in self.support(element)
@@ -122,7 +130,10 @@ class Ring:
         return bool(self.rate(f, self.field(g)) == 0)
 
     def terms(self, element: Poly, variables: Collection[int]) -> dict[Monomial, Poly]:
-        """Return the element as a polynomial in ``variables``: coefficients in the other variables, by exponents."""
+        """Return an element as a polynomial in some ``variables``, given by index: exponents → coefficient.
+
+        The coefficients are polynomials in all other variables.
+        """
         groups: dict[Monomial, dict[Monomial, Any]] = {}
         chosen_variables = frozenset(variables)
         mask = [int(i in chosen_variables) for i in range(len(self.tower.gens))]
@@ -134,12 +145,14 @@ class Ring:
         return {m: self.tower.context.from_dict(part) for m, part in groups.items()}
 
     def monomial(self, exponents: Monomial) -> Poly:
-        """Return the product of the variables of the ring with these exponents."""
+        """Return the product of powers of the variables of the ring with the given exponents."""
         return self.tower.context.from_dict({exponents: 1})
 
     def expression(self, element: Poly) -> Expression:
-        """Return the element as an expression; static factors are collected, so that they are computed before the
-        steps."""
+        """Return the element as an expression, in which factors that do not depend on the state are collected.
+
+        These factors are then computed before the steps.
+        """
         names = len(self.tower.names)
         state = set(self.state)
         static = [i for i in range(names) if i not in state]
@@ -153,7 +166,10 @@ class Ring:
 
 
 def ring_of(system: System, further: Iterable[Expression] = (), symbols: Sequence[str] = ()) -> Ring:
-    """Return the ring of a system, with the time, additional static ``symbols``, and the functions in ``further``."""
+    """Return the ring of a system with H, π and the functions in ``further``.
+
+    It also has the time, and ``symbols`` as additional static variables.
+    """
     further_expressions = list(further)
     roots = [system.hamiltonian, *further_expressions, *(e for row in system.poisson for e in row)]
     tower = Tower([*system.coordinates, *system.parameter_names, *symbols, TIME], roots, system.coordinates)

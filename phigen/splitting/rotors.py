@@ -1,4 +1,4 @@
-"""Free rigid bodies among the terms of H: sums of squares of three coordinates with the brackets of so(3)."""
+"""Free rigid bodies in H: sums of squares of three coordinates with the brackets of so(3)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from phigen.symbolic.tower import Poly, rational
 
 
 def rotors(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[EulerMotion, Poly]]:
-    """Yield the free rigid bodies in H, each with its element of the ring.
+    """Yield the free rigid bodies in H, each with its Hamiltonian as an element of the ring.
 
-    A body is a sum of squares of three coordinates that have the brackets of so(3), up to positive factors, and no
-    brackets with other coordinates. At least two of its moments must be able to differ.
+    A body is a sum of squares of three coordinates. These have the brackets of so(3), up to positive factors, and no
+    brackets with other coordinates. No two of the three moments of inertia may be equal for all values of the
+    parameters.
     """
     supports = [{*ring.support(t.element)} for t in terms]
     for triple in combinations(range(len(ring.coordinates)), 3):
@@ -36,8 +37,10 @@ def rotors(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[EulerMotion, Pol
 
 
 def _rotates(ring: Ring, triple: tuple[int, ...]) -> bool:
-    """Whether three coordinates have the brackets {x_i, x_j} = β_k x_k, with numbers β of one sign, and no other
-    brackets."""
+    """Whether three coordinates have the brackets of so(3), up to factors, and no brackets with other coordinates.
+
+    The brackets are {x_i, x_j} = β_k x_k for cyclic i, j, k, with numbers β_k of the same sign.
+    """
     if any({*ring.brackets_of[i]} != {*triple} - {i} for i in triple):
         return False
     numbers = []
@@ -51,7 +54,7 @@ def _rotates(ring: Ring, triple: tuple[int, ...]) -> bool:
 
 
 def _factor(ring: Ring, rate: Poly, j: int, k: int) -> Poly | None:
-    """Return the factor α of a rate α x_j x_k, or None if it is 0 or the rate has another form."""
+    """Return the factor α of a rate α x_j x_k; None if α is 0 or the rate has another form."""
     product = tuple(a + b for a, b in zip(_power(ring, j, 1), _power(ring, k, 1), strict=True))
     terms = ring.terms(rate, ring.state)
     return terms.get(product) if len(terms) == 1 else None

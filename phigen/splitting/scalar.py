@@ -1,10 +1,13 @@
-"""Flows of a single coordinate: ż = r(z) with frozen coefficients, where r is not linear.
+"""Flows of a single coordinate in closed form: ż = r(z) with a nonlinear function r, whose coefficients are constant.
 
-- r = az² + bz + c: z + r T/(1 − (az + b/2)T), T = tanh(wt)/w with w² = b²/4 − ac, written with cosroot and sinroot
+For each form of r, this is the coordinate after the time t:
+
+- r = az² + bz + c: z + r T/(1 − (az + b/2)T) with T = tanh(wt)/w and w² = b²/4 − ac, written by the entire functions
+  cosroot and sinroot
 - r' = kr: z − log(1 − krt)/k
 - zr' = nr: z(1 + (1 − n) t r/z)^{1/(1 − n)}
 
-Each flow ends where the solution becomes infinite. Beyond this time the increment is NaN, and the step fails.
+If the solution becomes infinite within the time t, the increment is NaN, and the step fails.
 """
 
 from __future__ import annotations
@@ -19,9 +22,9 @@ from phigen.symbolic.tower import Poly, rational
 
 
 def solve(ring: Ring, i: int, rate: Poly, moving: Collection[int]) -> Solution | None:
-    """Return the increment of coordinate i, or None.
+    """Return the increment of coordinate number i along ż = ``rate``; None if the equation has no known closed form.
 
-    The rate may depend on no moving variables other than the coordinate and functions of it.
+    The rate may depend on no variables that change along the flow, except the coordinate and functions of it.
     """
     name = ring.coordinates[i]
     other_names = [ring.coordinates[j] for j in range(len(ring.coordinates)) if j != i]

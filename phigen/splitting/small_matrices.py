@@ -1,9 +1,9 @@
-"""exp(tA)w − w for matrices with at most four rows, by the theorem of Cayley and Hamilton.
+"""The solution exp(tA)w − w of linear equations with at most four rows, by the theorem of Cayley and Hamilton.
 
 It is used if no shorter closed form is known. The entries of A may depend on coordinates that are constant along the
-flow. With A⁴ = Σ a_j A^j for j < 4 the increments are Σ F_k A^k w, where the F_k are the functions of t and the a_j in
-`phigen.symbolic.remainders`. A matrix with three rows is extended by zeros. With two rows and B = A − τ/2, where τ is
-the trace, B² is a number −d, and exp(tA) = e^{τt/2}(cos √(dt²) + B sin(√(dt²))/√d).
+flow. If A⁴ = Σ_{j<4} a_j A^j, the increments are Σ F_k A^k w, where the F_k are the functions of t and the a_j in
+`phigen.symbolic.remainders`. A matrix with three rows is extended by zeros. For two rows, let τ be the trace of A and B
+= A − τ/2. Then B² is a number −d, and exp(tA) = e^{τt/2}(cos √(dt²) + B sin(√(dt²))/√d).
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from phigen.symbolic.expression import call, symbol, total
 from phigen.symbolic.remainders import REMAINDERS
 from phigen.symbolic.tower import Poly
 
-#: Largest number of rows of a matrix.
+#: Largest number of rows of A.
 MOST_ROWS = 4
 
-#: Description of the motion.
+#: Words for reports that describe the motion.
 BY_CAYLEY_HAMILTON = "moved by exp(tA), by the theorem of Cayley and Hamilton"
 
 Matrix = Sequence[Sequence[Poly]]
 
 
 def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
-    """Return the increments of the coordinates of the motion, or None if the matrix is too large."""
+    """Return the increments of the coordinates of a linear motion, or None if A has more than `MOST_ROWS` rows."""
     rows = len(motion.basis)
     if rows > MOST_ROWS:
         return None
@@ -42,7 +42,7 @@ def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
     while len(images) < MOST_ROWS:
         image = [ring.tower.combine(e * v for e, v in zip(row, image, strict=True)) for row in motion.matrix]
         images.append(image)
-    first = int(coefficients[0] == 0)  # F_0 is 0 in this case
+    first = int(coefficients[0] == 0)  # with a_0 = 0 the term of F_0 vanishes
     increments = [
         total(f * ring.expression(w[i]) for f, w in zip(functions[first:], images[first:], strict=True))
         for i in range(len(motion.coordinates))
@@ -51,7 +51,7 @@ def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
 
 
 def _of_two_rows(ring: Ring, motion: LinearMotion) -> Solution:
-    """Return the solution for two rows, by functions of s = dt²; 1 − cos √s is s sinroot(s/4)²/2."""
+    """Return the solution for two rows by functions of s = dt²; 1 − cos √s is computed as s sinroot(s/4)²/2."""
     (a, b), (c, d) = motion.matrix
     half_trace = ring.tower.constant(Fraction(1, 2)) * (a + d)
     w = [ring.monomial(m) for m in motion.basis]
@@ -67,12 +67,12 @@ def _of_two_rows(ring: Ring, motion: LinearMotion) -> Solution:
 
 
 def _relation(ring: Ring, a: Matrix) -> Iterator[Poly]:
-    """Yield the coefficients c_0 … c_{n−1} of Aⁿ = Σ c_j A^j, by the method of Faddeev and Leverrier."""
+    """Yield the coefficients c_0 … c_{n−1} in Aⁿ = Σ c_j A^j, by the method of Faddeev and Leverrier."""
     n = range(len(a))
     zero, traces = ring.tower.zero, list[Poly]()
     power = [[zero] * len(a) for _ in n]
     for k in n:
-        # M ← AM − c_{n−k} with the last c; then c_{n−k−1} = tr(AM)/(k + 1)
+        # Faddeev and Leverrier: M ← A(M − c_{n−k}) with the coefficient found last; then c_{n−k−1} = tr M/(k + 1).
         last = -ring.tower.constant(1) if k == 0 else traces[-1]
         power = [[power[i][j] - last if i == j else power[i][j] for j in n] for i in n]
         power = [[ring.tower.combine(a[i][m] * power[m][j] for m in n) for j in n] for i in n]

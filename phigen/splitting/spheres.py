@@ -1,13 +1,14 @@
-"""Motions on spheres: ẋ = (β·x)x − |x|²β for some of the coordinates, such as double-bracket damping of spins.
+"""Motions on spheres in closed form: ẋ = (β·x)x − |x|²β for some of the coordinates x, such as double-bracket damping
+of spins.
 
-The end point is the reflection of x in the line of y = x − e, where e is chosen below. The reflection preserves |x| for
-any rounding of e, and is accurate for small e: it is x + 2(y(y·e)/|y|² − e).
+The state after the flow is the reflection of x at the line of y = x − e, where e is chosen below. The reflection is x +
+2(y(y·e)/|y|² − e), which is accurate for small e. It preserves |x| for any rounding of e.
 
-If β is constant, the flow is the projective action of a Lorentz boost: e = |x|β tanh(θ/2)/|β| with θ = t|x||β|.
+If β is constant, the flow is that of a Lorentz boost on the sphere: e = |x|β tanh(θ/2)/|β| with θ = t|x||β|.
 
-If β = (v·x)w with w along v, the cotangent of the angle between x and v decays exponentially. Then x moves to the
-direction of u = x + T(x − 2x_v), with x_v the component along v and T = tanh(t|x|²(v·w)/2), and e = −|x|T(x −
-2x_v)/(|x| + |u|).
+If β = (v·x)w with w parallel to v, the cotangent of the angle between x and v decays exponentially. Let x_v be the
+component of x along v, and T = tanh(t|x|²(v·w)/2). Then x moves to the direction of u = x + T(x − 2x_v), and e =
+−|x|T(x − 2x_v)/(|x| + |u|).
 """
 
 from __future__ import annotations
@@ -19,12 +20,16 @@ from phigen.splitting.ring import TIME, Monomial, Ring
 from phigen.symbolic.expression import Expression, call, sqrt, symbol, total
 from phigen.symbolic.tower import Poly
 
-#: Descriptions of the motion.
+#: Words for reports that describe the two motions.
 BOOSTED, DRAWN = "moved on a sphere, as by a boost", "moved on a sphere along meridians"
 
 
 def solve(ring: Ring, field: Sequence[Poly]) -> tuple[dict[int, Expression], str] | None:
-    """Return the increments by index of the coordinate, and a description; None for other motions."""
+    """Return the increments along a vector field on spheres, by the index of the coordinate, and a description in
+    words.
+
+    Returns None for any other vector field.
+    """
     moving = [i for i, f in enumerate(field) if f != 0]
     if len(moving) < 2:
         return None
@@ -40,7 +45,7 @@ def solve(ring: Ring, field: Sequence[Poly]) -> tuple[dict[int, Expression], str
 
 
 class _Sphere:
-    """Coordinates on a sphere; ``variables`` are their indices among the variables of the ring."""
+    """The coordinates that move on a sphere; ``variables`` are their indices among the variables of the ring."""
 
     def __init__(self, ring: Ring, variables: Sequence[int]) -> None:
         self.ring, self.variables, self.size = ring, variables, len(variables)
@@ -48,7 +53,8 @@ class _Sphere:
         self.t, self.square = symbol(TIME), dot(self.x, self.x)
 
     def boosted(self, rates: Sequence[dict[Monomial, Poly]]) -> list[Expression] | None:
-        """Return the increments if β is constant, else None."""
+        """Return the increments of a field ẋ = (β·x)x − |x|²β with constant β; None for other fields. ``rates`` is the
+        field."""
         beta = [rates[k - 1].get(self._monomial(k, k - 1), self.ring.tower.zero) for k in range(self.size)]
         if not self._moves(rates, [[b] for b in beta], [()]):
             return None
@@ -58,13 +64,13 @@ class _Sphere:
         return self._mirrored([scale * e for e in b])
 
     def drawn(self, rates: Sequence[dict[Monomial, Poly]]) -> list[Expression] | None:
-        """Return the increments if β = (v·x)w, else None.
+        """Return the increments of a field ẋ = (β·x)x − |x|²β with β = (v·x)w, w parallel to v; None for other fields.
 
         Then β = Ax with A = M + g, where M = v wᵀ has rank 1. The number g has no effect on the motion.
         """
         zero, n = self.ring.tower.zero, range(self.size)
         a = [[zero if i == j else zero - rates[i].get(self._monomial(j, j, j), zero) for j in n] for i in n]
-        for i in n[1:]:  # diagonal entries are relative to the first one, which is set to 0
+        for i in n[1:]:  # the field determines the diagonal of A up to g only, so a[0][0] is 0
             a[i][i] = rates[0].get(self._monomial(0, i, i), zero)
         if any(a[i][j] != a[j][i] for i in n for j in n) or not self._moves(rates, a, [(j,) for j in n]):
             return None
@@ -73,7 +79,7 @@ class _Sphere:
             minors = (m[i][j] * m[k][h] - m[i][h] * m[k][j] for i in n for k in n[:i] for j in n for h in n[:j])
             pivot = next((k for k in n if m[k][k] != 0), None)
             if pivot is not None and all(e == 0 for e in minors):
-                common = reduce(lambda p, q: p.gcd(q), m[pivot])  # a common factor, such as a strength, may be 0
+                common = reduce(lambda p, q: p.gcd(q), m[pivot])  # its gcd, such as a strength, may be 0
                 v = [self.ring.expression(e / common) for e in m[pivot]]
                 return self._drawn(v, total(self.ring.expression(m[i][i]) for i in n))
         return None
@@ -89,16 +95,16 @@ class _Sphere:
         return self._mirrored([scale * e for e in reflected])
 
     def _mirrored(self, e: Sequence[Expression]) -> list[Expression]:
-        """Return the increment 2(y(y·e)/|y|² − e); it is −2x where y = 0.
+        """Return the increment 2(y(y·e)/|y|² − e) of the reflection of x at the line of y = x − e.
 
-        At y = 0, x is opposite to β, and its direction is lost by rounding.
+        If y = 0, x moves to −x, and rounding has left no information on the direction; the increment is then −2x.
         """
         y = [c - d for c, d in zip(self.x, e, strict=True)]
         projection = dot(y, e) * call("inv0", dot(y, y))
         return [2 * (c * projection - d) for c, d in zip(y, e, strict=True)]
 
     def _shifts(self, a: Sequence[Sequence[Poly]]) -> Iterator[Poly]:
-        """Yield the candidates for the number g on the diagonal of A = M + g, where M has rank 1."""
+        """Yield candidates for the number g in A = M + g, where M has rank 1."""
         yield from (a[i][i] for i in range(self.size))
         for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)) if self.size == 3 else ():
             quotient, remainder = divmod(a[i][j] * a[i][k], a[j][k]) if a[j][k] != 0 else (0, 1)
@@ -106,8 +112,10 @@ class _Sphere:
                 yield a[i][i] - quotient
 
     def _monomial(self, *factors: int) -> Monomial:
-        """Return the product of the coordinates with these places in ``variables``; negative places count from the
-        end."""
+        """Return the product of the coordinates with the given places in ``variables``.
+
+        Negative places count from the end, as for Python lists.
+        """
         exponents = [0] * len(self.ring.tower.gens)
         for k in factors:
             exponents[self.variables[k]] += 1
@@ -116,7 +124,8 @@ class _Sphere:
     def _moves(
         self, rates: Sequence[dict[Monomial, Poly]], beta: Sequence[Sequence[Poly]], factors: Sequence[tuple[int, ...]]
     ) -> bool:
-        """Whether the rates are those of β_i = Σ_j beta[i][j] times the product of the coordinates ``factors[j]``."""
+        """Whether the field ``rates`` is (β·x)x − |x|²β with β_i = Σ_j beta[i][j] times the product of the coordinates
+        ``factors[j]``."""
         ring, n = self.ring, range(self.size)
         product = [
             ring.tower.combine(c * ring.monomial(self._monomial(*f)) for c, f in zip(row, factors, strict=True))
@@ -130,5 +139,5 @@ class _Sphere:
 
 
 def dot(a: Sequence[Expression], b: Sequence[Expression]) -> Expression:
-    """Return a·b."""
+    """Return the scalar product a·b."""
     return total(x * y for x, y in zip(a, b, strict=True))

@@ -1,7 +1,7 @@
-"""Proofs that a splitting is correct, repeated for each build: the parts sum to H, and each flow solves its equation.
+"""Proofs that a splitting is correct, made anew for each system: the parts sum to H, and each flow solves its equation.
 
-With exact flows, composed as in `phigen.scheme.alternation`, a step is a Poisson map, preserves all Casimirs, and has
-the order of the composition, for any parts.
+If the flows are exact and composed as in `phigen.scheme.alternation`, a step is a Poisson map, preserves all Casimirs,
+and has the order of the composition, whatever the parts are.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 
 def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str, Flow]] = ()) -> Iterator[Statement]:
-    """Yield the statements on a splitting; statements on single flows follow the order of the parts. H includes the
-    gauge.
+    """Yield the statements about a splitting; those about single flows are in the order of the parts.
 
-    ``noise`` are pairs of the name of a source and its flow.
+    H is the Hamiltonian from which the Casimirs of the gauge have been subtracted. ``noise`` has pairs of the name of a
+    noise source and its flow.
     """
     flows = splitting.flows
     hamiltonians = substitute([f.hamiltonian for f in flows], {KICK: ZERO})
@@ -58,18 +58,19 @@ def check(system: System, splitting: SplitHamiltonian, noise: Sequence[tuple[str
 
 
 def _exponential_statements(system: System, splitting: SplitHamiltonian) -> Iterator[Statement]:
-    """Yield the statements that compare matrix exponentials with enclosures of the exact values."""
+    """Yield statements that the matrix exponentials of the flows agree with rigorous enclosures, for default
+    parameters."""
     values = {p.name: float(p.value) for p in system.parameters}
     for k, flow in enumerate(splitting.flows, 1):
         for exponential in flow.exponentials:
-            from phigen.splitting.enclosures import enclosed  # imports NumPy
+            from phigen.splitting.enclosures import enclosed  # imported here, since it needs NumPy
 
             name = f"exp(tA) of {flow.letter}_{k} to round-off, A with {exponential.size} rows"
             yield enclosed(name, exponential, values)
 
 
 def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> Statement:
-    """Return the statement that the force parts sum to πζ + f."""
+    """Return the statement that the vector fields of the parts for forces sum to πζ + f."""
     slope = gradient(system.hamiltonian, system.coordinates)
     force_field = [
         a - b for a, b in zip(system.vector_field(), hamiltonian_vector_field(system.poisson, slope), strict=True)
@@ -81,7 +82,10 @@ def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> St
 
 
 def _kick_statements(system: System, splitting: SplitHamiltonian, plain: Sequence[Expression]) -> Iterator[Statement]:
-    """Yield the statements {V, {V, {V, T}}} = 0, and that {V, {V, T}} is the factor of κ in the modified potential."""
+    """Yield the statement {V, {V, {V, T}}} = 0 and, for modified kicks, that the flow of V is that of V + κ{V, {V, T}}.
+
+    ``plain`` are the Hamiltonians of the two parts at κ = 0.
+    """
     assert splitting.kick is not None
     v, t = plain[splitting.kick], plain[1 - splitting.kick]
     name_v, name_t = f"H_{1 + splitting.kick}", f"H_{2 - splitting.kick}"
@@ -102,9 +106,9 @@ def bracket(system: System, f: Expression, g: Expression) -> Expression:
 
 
 def angles_added(e: Expression) -> Expression:
-    """Return an expression with the addition theorems applied to sin, cos, 1 − cos and exp of sums.
+    """Return an expression in which sin, cos, 1 − cos and exp of sums are expanded by the addition theorems.
 
-    The ring does not contain these relations.
+    Proofs need this, since the ring does not contain these relations.
     """
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
@@ -135,14 +139,18 @@ def _sine_and_cosine_of_sum(e: Expression) -> tuple[Expression, Expression]:
 
 
 def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
-    """Return the statement Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t; for a force, its field replaces π∇H_k."""
+    """Return the statement that the flow Φ of part k satisfies Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t.
+
+    If the part is a force, its vector field takes the place of π∇H_k.
+    """
     part, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
     name = f"the flow Φ of {part}: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t" + ", for exp(tA)" * bool(flow.exponentials)
     return decide_zero(name, list(_residuals(system, flow)), system.positive, flow.manner)
 
 
 def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals, with labels, that vanish if a flow is that of its vector field."""
+    """Yield pairs of a label and an expression; all expressions vanish if a flow is the exact flow of its vector
+    field."""
     if any(part_flow.motion for part_flow in flow.pieces):
         yield from _composition_residuals(system, flow)
     elif flow.motion:
@@ -152,9 +160,10 @@ def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
 
 
 def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of a composition.
+    """Yield pairs of a label and an expression for a flow that is composed of pieces.
 
-    They vanish if the pieces are flows, sum to the whole, commute, and are composed in the increments.
+    All expressions vanish under four conditions: each piece is an exact flow, the Hamiltonians of the pieces sum to
+    that of the flow, the pieces commute, and the increments are those of their composition.
     """
     part_flows = flow.pieces
     for part_flow in part_flows:
@@ -169,9 +178,10 @@ def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Ex
 
 
 def _motion_residuals(system: System, flow: Flow, motion: Motion) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of Kepler motions or of a rigid body.
+    """Yield pairs of a label and an expression for the flow of Kepler motions or of a rigid body.
 
-    They vanish if π∇H is the field of the motion, and the increments are those that are proved by identities.
+    All expressions vanish under three conditions: π∇H is the vector field of the motion, the increments are those of
+    its formula, and the identities hold that prove this formula.
     """
     names = system.coordinates
     field = flow.vector_field(system)
@@ -183,7 +193,7 @@ def _motion_residuals(system: System, flow: Flow, motion: Motion) -> Iterator[tu
 
 
 def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t."""
+    """Yield pairs of a label and an expression; all expressions vanish if Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t."""
     names = system.coordinates
     slopes = {name: slope for e in flow.exponentials for name, slope in e.slopes().items()}
     start = substitute(flow.increment, {TIME: ZERO, **dict.fromkeys(slopes, ZERO)})
@@ -197,7 +207,8 @@ def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expre
 
 
 def _rates(increments: Sequence[Expression], slopes: Mapping[str, Expression]) -> list[Expression]:
-    """Return the time derivatives of the increments, including those of the entries of matrix exponentials."""
+    """Return the time derivatives of the increments; ``slopes`` are those of the entries of matrix exponentials, by
+    symbol."""
     rates = derivatives(increments, TIME)
     if not slopes:
         return rates

@@ -1,4 +1,4 @@
-"""The terms of H: summands as written, and expanded products where coordinates do not commute."""
+"""The terms of H that a splitting distributes to parts: the summands as the user wrote them, or single monomials."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from phigen.symbolic.tower import Poly
 
 
 def summands(e: Expression, coordinates: Collection[str], factor: Expression = ONE) -> Iterator[Expression]:
-    """Yield the additive terms of an expression; a constant factor of a sum is multiplied into each term."""
+    """Yield the additive terms of an expression times ``factor``; constant factors of sums are multiplied into the
+    terms."""
     if e.op in ("add", "sub"):
         yield from summands(e.args[0], coordinates, factor)
         yield from summands(e.args[1], coordinates, factor if e.op == "add" else neg(factor))
@@ -30,14 +31,15 @@ def _static(e: Expression, coordinates: Collection[str]) -> bool:
 
 
 def hamiltonian_terms(system: System) -> list[Expression]:
-    """Return the summands of H."""
+    """Return the additive terms of H, as the user wrote them."""
     return list(summands(system.hamiltonian, system.coordinates))
 
 
 def terms_of(ring: Ring, listed: Iterable[Expression]) -> list[Term]:
-    """Return the terms of H; terms that depend on the same set of coordinates are summed.
+    """Return the terms of H for a splitting, from a list of summands.
 
-    A summand whose coordinates do not commute is expanded in the ring, and its monomials are separate terms.
+    A summand is one term if its coordinates commute; otherwise each of its monomials is a term. Terms that depend on
+    the same set of coordinates are then summed.
     """
     terms: list[Term] = []
     for e in listed:
@@ -51,14 +53,16 @@ def terms_of(ring: Ring, listed: Iterable[Expression]) -> list[Term]:
 
 
 def monomial_terms(ring: Ring, element: Poly) -> list[Term]:
-    """Return the monomials of an element, each as a term."""
+    """Return the monomials of an element of the ring, each as a term."""
     parts = [c * ring.monomial(m) for m, c in ring.terms(element, ring.state).items()]
     return [Term(ring.expression(part), part) for part in parts if not ring.tower.is_zero(part)]
 
 
 def joined(ring: Ring, terms: Iterable[Term]) -> list[Term]:
-    """Return the terms with those summed that depend on the same set of coordinates; constants are added to the
-    first."""
+    """Return the terms, in which those that depend on the same set of coordinates are summed.
+
+    Constants are added to the first of the sums.
+    """
     groups: dict[tuple[int, ...], list[Term]] = {}
     for term in terms:
         groups.setdefault(ring.support(term.element), []).append(term)
