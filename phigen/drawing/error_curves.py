@@ -23,7 +23,7 @@ WINDOWS = 400
 HAMILTONIAN = "H(t)"
 #: Height of a row of panels in inches.
 ROW = 2.3
-#: Rounding unit, drawn as the smallest error that can be expected.
+#: Spacing of doubles at 1, drawn as a line: relative errors of this size are rounding errors.
 ROUNDING = 2.0**-52
 
 LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2, 1.2)), (0, (8, 2)), (0, (2.5, 1)))

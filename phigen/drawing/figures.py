@@ -129,10 +129,10 @@ def run_figure(
     spectrum: Spectrum | None = None,
     units: Mapping[str, Unit] | None = None,
 ) -> Figure:
-    """Return a page with all figures of a run.
+    """Return one figure with all plots of a run.
 
-    The page shows the trajectory of the first method with its sections and observables, the errors of all methods, and
-    the Lyapunov exponents if there is a ``spectrum``.
+    It has the trajectory of the first method with its sections and observables, the errors of all methods, and the
+    Lyapunov exponents if there is a ``spectrum``.
     """
     first = next(iter(methods.values()))
 
@@ -145,7 +145,7 @@ def run_figure(
     rows: list[tuple[float, list[Callable[[FigureBase], None]]]]
     rows = [(phase_space.height(first.coordinates), [draw_trajectory])]
     if sections and phase_space.grid(first.coordinates) == (1, 1):
-        rows[0][1].append(draw_section)  # a trajectory of one panel leaves space for the section beside it
+        rows[0][1].append(draw_section)  # a trajectory in a single panel leaves space for the section beside it
     elif sections:
         rows.append((_SECTION, [draw_section]))
     errors: Callable[[FigureBase], None] = partial(error_curves.draw_errors, methods=methods, units=units)

@@ -70,8 +70,8 @@ def _commented(gif: bytes, comment: bytes) -> bytes:
 
 
 def _flat(values: Floats) -> Floats:
-    """Return values (sizes) of a chain or a plane unchanged; of a three-dimensional lattice the middle plane of the
-    first axis."""
+    """Return the values (sizes) of a chain or a plane unchanged; of a three-dimensional lattice, return the plane in
+    the middle of the first axis."""
     return values if values.ndim < 3 else values[values.shape[0] // 2]
 
 

@@ -9,7 +9,7 @@ Group = tuple[str, ...]
 
 
 def groups(coordinates: Sequence[str]) -> list[Group]:
-    """Return the coordinates in groups of up to three, in order; a group of one is drawn over time.
+    """Return the coordinates in groups of up to three, in order. Single coordinates are drawn over time.
 
     Up to three coordinates are one group. Otherwise each position is paired with its momentum, by names such as q and
     p, q1 and p1, x and px. If there are exactly two positions, they form one group, the orbit in a plane, and the
@@ -47,7 +47,7 @@ def _momentum(q: str, names: Group) -> str | None:
 
 
 def _runs(names: Group) -> list[Group]:
-    """Return groups of neighbours with equal letters, or of neighbours with equal numbers, whichever are fewer."""
+    """Return groups of neighbouring names with equal letters, or with equal numbers, whichever gives fewer groups."""
     by_letters = _split(names, lambda name: re.sub(r"[\d_]+$", "", name))
     by_number = _split(names, lambda name: name[len(re.sub(r"\d+$", "", name)) :])
     return min(by_number, by_letters, key=len)
@@ -64,9 +64,10 @@ def _split(names: Group, kind: Callable[[str], str]) -> list[Group]:
 
 
 def _parts(run: Group) -> list[Group]:
-    """Return a run of names in threes if it begins with x, y, z or its length is divisible by 3, else in pairs.
+    """Return a long group split into groups of three or two names.
 
-    If the length is odd, the first part has three names.
+    The groups have three names if the long group begins with x, y, z or its length is divisible by 3, else two. If the
+    length is odd, the first group has three names.
     """
     if run[:3] == ("x", "y", "z") or len(run) % 3 == 0:
         return [run[i : i + 3] for i in range(0, len(run), 3)]

@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 
     from phigen.study.lyapunov import Spectrum
 
-#: Largest number of panels of coordinates, of times in a diagram, and of snapshots in a row.
+#: Largest number of coordinates that get a panel; largest number of times in a diagram; number of snapshots in a row.
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
-#: Largest number of sites of a graph that is drawn with its bonds; drawings of larger graphs, at several times, make
-#: large files.
+#: Largest number of sites of a graph that is drawn with its bonds; files with larger graphs at several times would be
+#: too large.
 MOST_DRAWN = 100
 #: Number of colours of diagrams and of snapshots, limited to keep files small.
 LEVELS = 48
@@ -114,8 +114,11 @@ def series_figure(run: LatticeSeries, title: str) -> Figure:
 
 @styled
 def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
-    """Return a figure of the ``energies`` (frames, *sizes) of the sites, and of the changes of the Casimirs of the
-    sites."""
+    """Return a figure of the ``energies`` (frames, *sizes) of the sites.
+
+    If sites have Casimirs, a second panel shows how much these change: the largest change of all sites, and its
+    standard deviation.
+    """
     from matplotlib.figure import Figure
 
     local = {name: values for name, values in run.casimirs.items() if values.ndim > 1}
@@ -181,8 +184,8 @@ def _draw_diagram(
 
 
 def _shown_frames(run: LatticeTrajectory, dots: int) -> Any:
-    """Return the numbers of at most ``dots`` frames at about equal intervals of time."""
-    apart = np.diff(run.t[:-1])  # The last interval is ignored, since it may be shorter.
+    """Return the indices of at most ``dots`` frames at about equal intervals of time."""
+    apart = np.diff(run.t[:-1])  # without the last interval, which may be shorter
     if len(apart) < 2 or np.ptp(apart) <= 1e-6 * abs(apart[0]):
         return np.linspace(0, len(run) - 1, min(len(run), dots)).astype(int)
     order = np.argsort(run.t)
@@ -233,13 +236,13 @@ def draw_sites(axes: Any, bonds: Any, positions: Floats, values: Floats, shades:
 
 
 def _snapshots(run: LatticeTrajectory) -> Any:
-    """Return the numbers of `SNAPSHOTS` frames at about equal intervals, from the first to the last."""
+    """Return the indices of `SNAPSHOTS` frames at about equal intervals, from the first to the last frame."""
     return np.unique(np.linspace(0, len(run) - 1, min(len(run), SNAPSHOTS)).astype(int))
 
 
 def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
-    """Draw one coordinate of a plane at several times; of a three-dimensional lattice the middle plane of the first
-    axis."""
+    """Draw one coordinate of a plane at several times. Of a three-dimensional lattice, the plane in the middle of
+    the first axis is drawn."""
     frames = _snapshots(run)
     planes = values if values.ndim == 3 else values[:, values.shape[1] // 2]
     shades = shades_of(planes, LEVELS)

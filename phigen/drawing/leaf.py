@@ -10,8 +10,8 @@ import numpy as np
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient, symbols_of
 
-#: Numbers of planes per axis, of grid points along a side of a plane, and of Newton steps that move lines onto the
-#: surface.
+#: Number of planes perpendicular to each axis; number of grid points along a side of a plane; number of Newton steps
+#: that move the lines in a plane onto the surface.
 CUTS, GRID, NEWTON_STEPS = 9, 41, 8
 
 
@@ -51,7 +51,10 @@ def leaf_of(
 
 
 def around(leaf: Leaf, box: Floats) -> Floats:
-    """Return the box (2, 3) around a closed leaf if it is not much larger than the given box, else the given box."""
+    """Return the box (2, 3) of lower and upper bounds, enlarged so that it contains the whole leaf.
+
+    It is returned unchanged if the leaf is not a closed surface, or much larger than the box.
+    """
     middle, half_width = box.mean(axis=0), float(np.max(box[1] - box[0]))
     large_box = np.stack([middle - half_width, middle + half_width])
     lines = net(leaf, large_box)
@@ -88,9 +91,10 @@ def _lines_in_plane(leaf: Leaf, box: Floats, axis: int, level: float) -> list[Fl
 
 
 def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Floats]:
-    """Return the line after Newton steps within its plane towards the surface.
+    """Return the line (points, 3) after Newton steps that move its points onto the surface C = level.
 
-    The line is split into several where Newton's method fails, as at a pole of C.
+    The points stay in the plane of the line, which is perpendicular to ``axis``. Points at which Newton's method fails,
+    as at a pole of C, are left out, so the line may fall into several.
     """
     points = line.copy()
     with np.errstate(all="ignore"):

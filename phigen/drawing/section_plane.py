@@ -21,14 +21,14 @@ _CONSTANT = 1e-8
 def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     """Return the indices of the two columns of ``points`` (rows, names) to draw.
 
-    These are a pair of conjugate coordinates without a constant one, if there is such a pair.
+    These are the first pair of conjugate coordinates of which neither is constant, if there is such a pair.
     """
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
     varying = [name for name, is_constant in zip(names, constant, strict=True) if not is_constant]
     pairs = [moving for group in phase_planes(names) if len(moving := [n for n in group if n in varying]) >= 2]
-    # A closed orbit gives a single point, where all coordinates are constant. The section then probably fixes a
-    # coordinate that is 0.
+    # A closed orbit crosses at a single point, so all coordinates are constant. The coordinate that the section fixes
+    # is probably 0, so the largest coordinates are drawn.
     sizes = np.max(np.abs(points), axis=0, initial=0.0)
     by_size = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
     columns = (pairs[0] if pairs else [*varying, *by_size])[:2]

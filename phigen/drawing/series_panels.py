@@ -10,7 +10,7 @@ import numpy as np
 from phigen.drawing.palette import SERIES
 from phigen.symbolic.arrays import Floats
 
-#: Largest number of panels of observables in a figure of a run, and height of each in inches.
+#: Largest number of panels of observables in a figure of a run; height of a panel in inches.
 MAX_PANELS, HEIGHT = 4, 1.4
 
 
@@ -27,7 +27,7 @@ def height(observables: Mapping[str, Floats]) -> float:
 
 
 def draw_observables(part: Any, t: Floats, observables: Mapping[str, Floats]) -> None:
-    """Draw the first `MAX_PANELS` observables over time, one panel each, in a figure or a part of one."""
+    """Draw the first `MAX_PANELS` observables over time, one panel each, in a figure or subfigure ``part``."""
     names = [*observables][:MAX_PANELS]
     panels = np.atleast_1d(part.subplots(len(names), 1, sharex=True))
     for axes, name in zip(panels, names, strict=True):

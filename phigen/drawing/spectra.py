@@ -38,7 +38,7 @@ def draw_correlation(axes: Any, correlation: Correlation) -> None:
 
 
 def draw_spectrum(figure: Any, spectrum: DynamicSpectrum, title: str = "") -> None:
-    """Draw S(q, ω) in a figure or a part of one, as in `spectrum_figure`."""
+    """Draw log S(q, ω) in a figure or subfigure, over ω ≥ 0 and q along the first axis."""
     from matplotlib.colors import LogNorm
 
     values = spectrum.values

@@ -161,7 +161,8 @@ def _edges(values: Any, *, logarithmic: bool) -> Any:
 
 
 def _scatter(figure: Any, axes: Any, data: Any, panel: Any, names: Sequence[str]) -> None:
-    """Draw members without a grid as points, over the first two quantities ``names`` in which they differ."""
+    """Draw members whose settings do not form a grid as points, over the first two quantities ``names`` in which
+    they differ."""
     if len(names) < 2:
         axes.scatter(data[names[0]] if names else np.arange(panel.size), panel, s=4, color=SERIES[0])
         axes.set(xlabel=names[0] if names else "member")

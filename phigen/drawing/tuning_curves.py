@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from phigen.tuning.search import Curve
     from phigen.tuning.study import Tuning
 
-#: Largest error that is drawn.
+#: Largest relative error that is drawn; at larger errors the solution is useless.
 _LARGEST_ERROR = 1.0
 _MARKERS = "osD^vX"
 
@@ -55,7 +55,7 @@ def _coordinates(curve: Curve, horizon: float) -> tuple[list[float], list[float]
 def _basis(tuning: Tuning) -> str:
     """Return a sentence on the part of the run over which the errors were measured."""
     if tuning.piece > 0.99 * tuning.horizon:
-        return "measured over all of it"
+        return "measured over this whole time"
     best = tuning.winner
     farther = best is not None and best.point.time > 1.01 * tuning.piece
     star_note = f"; stars: measured to {tuning.clock} = {best.point.time:.4g}" if best and farther else ""

@@ -22,15 +22,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, START = "poisson_not_hamiltonian", (1.0, 1.0, 2.0)
-#: K is the exponent k of the map, PAPER_STEP the step of the paper. STEP is a larger one, whose effect is visible after
-#: TURNS turns.
+#: K is the exponent k of the map, PAPER_STEP the step size in the paper. STEP is a larger step size, with which the
+#: change of the leaf is visible after TURNS periods of the orbit.
 K, PAPER_STEP, STEP, TURNS = 2, 1e-4, 0.05, 3
 PERIOD, ELSEWHERE = 2 * math.pi, (1.0, 2.0, 4.0)
 
 
 def printed_map(state: Floats, h: float) -> Floats:
-    """Return the images of states (…, 3) under the map of the paper: the flow, and a dilation by exp(h^k) across
-    leaves."""
+    """Return the images of states (…, 3) under the map of the paper.
+
+    The map is the exact flow over the time h, followed by a dilation by exp(h^k) that changes the leaf.
+    """
     x, y, z = np.moveaxis(state, -1, 0)
     u, v, w = x - y + z, x + y - z, -x + y + z
     angle, stretched = h * (u**2 + v**2) / 4, w * np.exp(h**K)

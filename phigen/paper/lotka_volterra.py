@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "lotka_volterra", "blow_up"
-#: Labels of the curves, with orders of phigen's methods and names of classical methods. PHI is the method of the paper.
+#: Labels of the curves: OWN with the orders of phigen's methods, CLASSICAL with the names of classical methods. PHI is
+#: the label of the method of the paper.
 OWN = {"phigen, order 2": 2, "phigen, order 8": 8}
 CLASSICAL = {"RK2": "rk2", "RK4": "rk4"}
 PHI, RK2, RK4 = "phigen, order 2", "RK2", "RK4"
@@ -150,7 +151,8 @@ def _left(course: Approach, t: float) -> float:
 
 
 def _until_it_fails(solver: Solver, x0: list[float], h: float, steps: int) -> tuple[Trajectory, float]:
-    """Return the trajectory and the time of its last successful step."""
+    """Return the trajectory up to the step at which the solver fails, if it does, and the time of the last
+    successful step."""
     try:
         trajectory = solver.integrate(x0, h, steps)
     except StepError as error:

@@ -25,13 +25,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "rigid_body_paper", "paper"
-#: Number of steps of the long run, number of steps after which early findings are taken, and rows of each run.
+#: Number of steps of the long run; number of steps of the short runs, which give the first findings; number of rows
+#: that each run stores.
 LONG, EARLY, ROWS = 10**8, 10**6, 20_000
 #: Labels. The method PHI-2 of the paper is the Cayley bi-realisation at order 2.
 PHI, RK4, BETTER = "phigen, order 2, Cayley", "RK4", "phigen, order 4"
 #: Step size of the Poincaré section, at which RK4 drifts visibly, and its number of steps.
 COARSE, SECTION_STEPS = 0.004, 75_000
-#: Number of further steps after which RK4 has stopped moving, and number of drawn crossings.
+#: Number of further steps after which RK4 has come to rest at an equilibrium; number of crossings that are drawn.
 _REST, _DOTS = 10**6, 500
 
 
@@ -48,7 +49,10 @@ class Bodies:
 
 
 def bodies() -> Bodies:
-    """Return the solvers: PHI-2 of the paper, and order 4 with the bi-realisation that phigen chooses."""
+    """Return the solvers of the figures, with their data.
+
+    They are the method PHI-2 of the paper, and order 4 with the bi-realisation that phigen chooses.
+    """
     compilation, solver = compiled(SPEC, 2, "cayley")
     run = compilation.spec.runs[RUN]
     parameters = compilation.spec.parameters_of(run)
@@ -76,7 +80,7 @@ def errors_plate(steps: int = LONG) -> Plate:
 
 
 def _early_findings(body: Bodies) -> tuple[Finding, ...]:
-    """Return the findings from the first million steps."""
+    """Return the findings from runs of `EARLY` steps."""
     stride = EARLY // ROWS
     poisson, double, better = (
         solver.integrate(body.x0, factor * body.h, EARLY // factor, stride)

@@ -13,9 +13,10 @@ from phigen.scheme.lowering import operation_counts
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import SHOWN, Formula
 
-#: Numbers of names and numbers in a group of formulas above which the group is folded, or left out.
+#: Size of a group of formulas, counted as the names and numbers in it, above which the page shows the group folded, and
+#: above which the page leaves it out.
 FOLDED, LEFT_OUT = 160, 4_000
-#: Largest number of terms of a polynomial that can be unfolded.
+#: Largest number of terms of a polynomial that the page contains; longer ones are abbreviated.
 MOST_TERMS = 150
 
 
@@ -26,9 +27,9 @@ def equation(left: str, form: Formula | Expression, sign: str = "=") -> list[str
 
 
 def group(left: Sequence[str], expressions: Sequence[Expression], subject: str, sign: str = "=") -> Markup:
-    """Return equations with these left sides; common subexpressions get names.
+    """Return equations as HTML, with ``left`` sides as MathML; common subexpressions get names.
 
-    ``subject`` is the title of the group, for long groups, which are folded or left out.
+    Long groups are folded, or left out. ``subject`` is their title.
     """
     formulas = named_parts.readable(expressions)
     if formulas.size > LEFT_OUT:

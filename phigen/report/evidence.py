@@ -19,7 +19,7 @@ from phigen.study.summary import Drift, Summary
 from phigen.study.verification import Check, Verification
 from phigen.symbolic.verdict import PROVED, REFUTED, UNDECIDED, Statement
 
-#: Tile of the summary: CSS class, value, label, note.
+#: Tile of the summary, a large number with a label: CSS class, value, label, note.
 Tile = tuple[str, str, str, str]
 
 _GOOD, _BAD, _UNSURE = "good", "bad", "unsure"

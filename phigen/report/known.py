@@ -35,7 +35,8 @@ _HALF_ROOT = f"<mfrac><msqrt>{_s}</msqrt><mn>2</mn></mfrac>"
 #: The equations of motion.
 MOTION = [math(f'<mover accent="true">{_x}<mo>˙</mo></mover>{_o("=")}{_of(_i("π"), _x)}<mi>∇</mi>{_of(_i("H"), _x)}')]
 
-#: One step from x_n to x_{n+1}: by α and β, and for bi-realisations by paths.
+#: Equations of a step from x_n to x_{n+1}: STEP by α and β; PATH_STEP for bi-realisations that are defined by the path
+#: ṁ = π(m)p.
 STEP = [
     [math(f"{_of(_i('α'), _y, _SLOPE)}{_o('=')}{_x_n}"), " solved for ", math(_y) + ", "],
     [math(f"{_x_next}{_o('=')}{_of(_i('β'), _y, _SLOPE)}")],

@@ -128,7 +128,7 @@ def _run(material: LatticeMaterial, trajectory: LatticeTrajectory) -> Iterator[M
         yield lyapunov_picture(material.spectrum)
 
     flat = trajectory.x.ndim == 3
-    caption = "The fields over space, upwards, and time" if flat else "The fields at some times"
+    caption = "The fields over time, with the sites upwards" if flat else "The fields at some times"
     if places_of(trajectory) is not None:
         caption = "The fields at some times; distances are close to the number of bonds between sites"
     caption += ", and errors of conserved quantities, on a logarithmic scale."
@@ -146,7 +146,7 @@ def _run(material: LatticeMaterial, trajectory: LatticeTrajectory) -> Iterator[M
     if energies is not None:
         mean = float(np.mean(energies[-1]))
         summary = f"Energy per site at the end: mean {mean:.6g}, standard deviation {np.std(energies[-1]):.2g}."
-        caption = f"{summary} Below: the largest Casimir error of all sites, and the spread."
+        caption = f"{summary} Below: changes of Casimirs, the largest of all sites and the standard deviation."
         yield picture(
             "sites", sites_figure(trajectory, energies), "Energies and Casimirs of the sites", summary, caption
         )

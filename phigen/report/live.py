@@ -22,19 +22,20 @@ from phigen.targets.js.emitter import emit
 from phigen.targets.js.printing import LANGUAGE
 from phigen.targets.names import Scope
 
-#: Orders offered in addition to that of the page, and largest total number of characters of all solvers.
+#: Orders that the panel offers in addition to the order of the page; largest number of characters that the JavaScript
+#: of all orders may have.
 ORDERS, MOST = (2, 4), 200_000
-#: FEW is the largest number of sliders of a group that is shown unfolded, COORDINATES the largest number of coordinates
-#: with sliders. The others are the largest factors by which sliders change step, speed and parameters.
+#: FEW: largest number of sliders of a group that is shown unfolded. COORDINATES: largest number of coordinates with
+#: sliders. STEP, SPEED, PARAMETER: largest factors by which sliders change the step, the speed and a parameter.
 FEW, COORDINATES = 4, 15
 STEP, SPEED, PARAMETER = 16, 20, 8
 
-HELP = """Drag a picture of space, or use the arrow keys, to turn both; + and − zoom; 0 resets. Between steps the curves
-are interpolated. The panel begins with the {} for which the advantage of phigen at equal work is seen
-best, if it has one within ten seconds; the step is at most half of that with which phigen fails. With smaller steps
-both come closer to the exact solution, and over short times RK4 is often closer."""
+HELP = """Drag one of the pictures in space, or use the arrow keys, to turn both; + and − zoom; 0 resets. Between steps
+the curves are interpolated. The panel begins with the {} at which the errors of RK4 at equal work become visibly larger
+than those of phigen within ten seconds, if there is such a setting; phigen also works with twice this step. With
+smaller steps both methods come closer to the exact solution, and over short times RK4 is often closer."""
 
-NOISE = "RK4, with which it compares the solver, does not apply to noise"
+NOISE = "it would compare the solver with RK4, which does not apply to systems with noise"
 NOTHING = "Nothing is conserved, because this system depends on the time or has forces: no errors are shown."
 
 _COMMENT = re.compile(r"^[ \t]*(/\*.*?\*/|//[^\n]*)[ \t]*\n", re.MULTILINE | re.DOTALL)
@@ -43,7 +44,10 @@ _PRIVATE = Extras(without=frozenset({"ensemble"}))
 
 @dataclass(frozen=True)
 class Live:
-    """Solvers of a panel in JavaScript by order, with the run and its parameters; or the reason ``why_not``."""
+    """Content of the live panel of a run: solvers in JavaScript by order, parameters, and functions of the invariants.
+
+    If there is no panel, ``why_not`` is the reason.
+    """
 
     solvers: Mapping[int, str]
     run: Run | None = None
@@ -54,7 +58,11 @@ class Live:
 
 @dataclass(frozen=True)
 class Slider:
-    """Slider of the panel: the setting that it changes, and the distance of its ends from the default value."""
+    """Slider of the panel: the setting that it changes, and how far.
+
+    On the scale "log" the ends are the default value times and divided by ``reach``; on the scale "linear" they differ
+    from the default value by ``reach``. ``low`` and ``high`` are the positions of the ends.
+    """
 
     label: Markup | str
     kind: str
@@ -82,10 +90,10 @@ def gathered(
 def solvers(
     compilation: Compilation, scheme: str | None, orders: Sequence[int], spec: Spec | None = None
 ) -> tuple[dict[int, str], str]:
-    """Return the solvers in JavaScript, by order, for the order of the page and for ``orders``, and "".
+    """Return the solvers in JavaScript (order → text) for the order of the page and for ``orders``, and "".
 
-    If there are none, return no solvers and the reason. ``spec`` replaces the spec of the compilation; it may differ by
-    observables only.
+    If there are none, the mapping is empty, and the text is the reason. ``spec`` replaces the spec of the compilation;
+    it may only have other observables.
     """
     page_order, is_own = compilation.order.order, spec is None
     spec = replace(spec or compilation.spec, reconstruct="", extras=_PRIVATE)
@@ -203,7 +211,8 @@ def slid(slider: Slider) -> Markup:
 
 
 def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
-    """Return the labels of both methods of the panel, phigen's and RK4."""
+    """Return for phigen and for RK4: number of the colour, id of the canvas, name, id of the label, text of the
+    label."""
     return [
         (1, "ours", "phigen", "id=live-order", f"order {compilation.order.order}"),
         (2, "theirs", "RK4", "id=live-cost", ""),
@@ -213,7 +222,8 @@ def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
 def quantity(
     name: str, casimirs: Sequence[int] | None = None, invariants: Sequence[int] | None = None
 ) -> dict[str, object]:
-    """Return a conserved quantity as data for the page: Casimirs or invariants by number, or else the energy."""
+    """Return a conserved quantity as data for the page: some Casimirs or invariants, given by their indices, else
+    the energy."""
     return {"name": name, "casimirs": casimirs, "invariants": invariants}
 
 
@@ -234,7 +244,7 @@ def _quantities(system: System) -> list[dict[str, object]]:
 
 
 def _casimir_label(system: System, casimirs: Mapping[str, int]) -> str:
-    """Return the label of the errors of Casimirs, given by name and number."""
+    """Return the label of the errors of some Casimirs, given as a mapping from names to indices."""
     names = ", ".join(casimirs)
     if len(casimirs) > 1:
         return f"Casimir errors ({names})" if len(casimirs) <= 3 else f"error of {len(casimirs)} Casimirs"
@@ -249,9 +259,10 @@ def _groups(system: System) -> list[Group]:
 
 
 def _leaf(system: System, group: Group) -> int | None:
-    """Return the index of a Casimir that depends only on the three coordinates of the group.
+    """Return the index of the Casimir whose level surface is drawn, or None if none is drawn.
 
-    −1 stands for the energy, in a group of two coordinates. None if there is no leaf to draw.
+    The Casimir depends only on the three coordinates of the group. For systems of two coordinates the result is −1: the
+    level curve of the energy is drawn.
     """
     if len(group) == 2:
         return -1 if system.dimension == 2 and ENERGY not in moving(system) else None

@@ -35,10 +35,10 @@ from phigen.report.live import (
 from phigen.spec.model import LieAlgebraForm, Parameter, Reduction, Run, Spec, Values
 from phigen.symbolic.expression import Expression, call, total
 
-#: FEWEST is the least size of an axis that is offered by halving. The others are the largest numbers of sites that are
-#: offered by doubling: of pairs, of chains, of other lattices.
+#: Limits of the sizes that the panel offers, which are those of the run halved and doubled several times: least number
+#: of sites along an axis; largest number of sites of systems of pairs, of chains, and of other lattices.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
-#: Largest number of list entries in a page.
+#: Largest number of values in lists of a page, such as listed initial values, parameters and bonds.
 MOST_NUMBERS = 20_000
 
 HELP = {
@@ -53,7 +53,10 @@ _DIRECTION = " The hue is the direction in the plane of {}, {}; lighter colours 
 
 @dataclass(frozen=True)
 class LatticeLive(Live):
-    """Panel of a run of a lattice: its ``start``, and ``formulas`` in JavaScript for starts of any size."""
+    """Content of the live panel of a lattice: also the ``start`` of the run, and ``formulas`` of starts as JavaScript.
+
+    The formulas are functions of site indices and sizes, so the panel can start with other sizes.
+    """
 
     start: Start | None = None
     formulas: str = ""
@@ -78,7 +81,7 @@ def _with_invariants(compilation: CompiledLattice) -> Spec | None:
     assert spec.lattice is not None
     densities: dict[str, Expression] = {}
     for name, density in cell.invariants.items():
-        apart = "_" * (1 + max(map(len, spec.observables), default=0))  # longer than any name of the spec, hence unique
+        apart = "_" * (1 + max(map(len, spec.observables), default=0))  # makes names longer than those of the spec
         densities[f"{name}{apart}"] = density
         densities[f"terms_{name}{apart}"] = total(call("abs", term) for term in cell.additive_terms(density))
     if not densities:
@@ -156,7 +159,7 @@ def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Mar
 
 
 def _picture(compilation: CompiledLattice, start: Start) -> str:
-    """Return the kind of picture of a lattice, one of those in fields.js."""
+    """Return the kind of picture for a lattice: "diagram", "plane", "graph" or "moving", as in fields.js."""
     cell = compilation.cell
     if start.graph and start.sizes[0] <= MOST_PLACED:
         return "graph"
@@ -180,8 +183,10 @@ def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, 
 
 
 def _sizes(compilation: CompiledLattice, run: Run, start: Start) -> list[list[int]]:
-    """Return the sizes that the panel offers. If the start of the run is a list, only the sizes of the run are
-    offered."""
+    """Return the sizes that the panel offers, in ascending order.
+
+    If an initial value or a parameter of the run is a list, only the sizes of the run are offered.
+    """
     choices, cell = [list(start.sizes)], compilation.cell
     arrays = (*_initial(compilation.spec, run).values(), *(_source(run, p) for p in compilation.spec.parameters))
     if start.graph or any(v and (v.listed or v.file) for v in arrays):
@@ -230,9 +235,9 @@ def _values(spec: Spec, run: Run, start: Start, name: str) -> float | None:
 
 
 def _array(spec: Spec, run: Run, start: Start, p: Parameter) -> dict[str, Any]:
-    """Return the description of a parameter at sites or bonds for the page, as plain data."""
+    """Return a parameter with values at sites or bonds as data for the page: a list, a formula, or random values."""
     source = _source(run, p)
-    if source is None:  # the values are a column of the file with the bonds
+    if source is None:  # the values come from a column of the file of bonds
         return {"at": p.at, "listed": _listed(start.parameters[p.name])}
     return {"at": p.at, **_given(source, start, p.name, spec)}
 
@@ -252,7 +257,7 @@ def _listed(array: Any) -> list[float]:
 
 
 def _numbers(spec: Spec, run: Run, start: Start) -> int:
-    """Return the number of list entries that the page needs for the run."""
+    """Return how many values in lists the page would contain for the run."""
     arrays = [_given(v, start, name, spec) for name, v in _initial(spec, run).items()]
     arrays += [_array(spec, run, start, p) for p in spec.parameters if _values(spec, run, start, p.name) is None]
     return sum(len(g.get("listed", ())) for g in arrays) + start.bonds.size
@@ -271,7 +276,10 @@ def _formulas(spec: Spec, run: Run) -> str:
 
 
 def _sign(spec: Spec, start: Start) -> str:
-    """Return the name of a parameter at sites whose values have both signs; "" if there is none."""
+    """Return the name of a parameter whose values at the sites have both signs; "" if there is none.
+
+    Sites with negative values are drawn as rings.
+    """
     arrays = {p.name: np.asarray(start.parameters[p.name]) for p in spec.parameters if p.at == "sites"}
     return next((name for name, a in arrays.items() if a.size and a.min() < 0 < a.max()), "")
 

@@ -28,7 +28,8 @@ Cell = tuple[str, str]
 MANY, SHORT = 6, 420
 
 _STYLES, _SCRIPTS = ("report.css",), ("theme.js", "space.js", "viewer.js")
-#: Scripts of the live panel for a system. They follow its solvers; other kinds of panels have other scripts.
+#: Scripts of the live panel, which follow the JavaScript of its solvers: CURVES for ordinary systems, FIELDS for
+#: lattices.
 CURVES = ("race.js", "start.js", "curves.js", "live.js")
 FIELDS = ("race.js", "start.js", "fields.js", "live.js")
 
@@ -80,8 +81,10 @@ def fold(summary: str, body: Markup) -> Markup:
 
 
 def equations(listed: Sequence[Sequence[str]]) -> Markup:
-    """Return equations, each as pieces of MathML between which lines may break. Many short equations are set in
-    columns."""
+    """Return equations as HTML. Each is a sequence of pieces of MathML, between which lines may break.
+
+    Many short equations are set in columns.
+    """
     are_short = len(listed) > MANY and all(sum(map(len, parts)) < SHORT for parts in listed)
     return block(
         "equations",
@@ -106,8 +109,10 @@ def page(
     solvers: str = "",
     panel: Sequence[str] = CURVES,
 ) -> str:
-    """Return the page from sections (id, title, body). ``solvers`` is the JavaScript of the solvers of the live
-    ``panel``."""
+    """Return the page from its introduction ``lead`` and its sections (id, title, body).
+
+    ``solvers`` is the JavaScript of the solvers of the live panel, ``panel`` the names of its scripts.
+    """
     live = [solvers, *map(_asset, panel)] if solvers else []
     return _complete(
         "page",
@@ -120,7 +125,7 @@ def page(
 
 
 def alone(title: str, body: Markup, solvers: str, panel: Sequence[str]) -> str:
-    """Return a page with only a live panel."""
+    """Return a page that consists of the live panel alone."""
     scripts = [_asset("space.js"), solvers, *map(_asset, (*panel, "alone.js"))]
     return _complete("alone", [_minified(script) for script in scripts], title=title, body=body)
 

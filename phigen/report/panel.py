@@ -16,7 +16,7 @@ class NoPanelError(CheckError):
 
 
 def panel_page(compilation: Compilation, run: Run) -> str:
-    """Return the HTML of the panel of a run, with one solver, of the order of the spec.
+    """Return the HTML of a page with only the live panel of a run; the panel has one solver, of the order of the spec.
 
     Raises `NoPanelError`, and `SpecError` for a start that cannot be read.
     """

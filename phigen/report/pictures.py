@@ -32,7 +32,7 @@ def trajectory_picture(compilation: Compilation, trajectory: Trajectory) -> Mark
     names = ", ".join(trajectory.coordinates)
     figure = figures.trajectory_figure(_thinned(trajectory), compilation.system.casimirs)
     caption = f"The trajectory of {names}, from the dot at t = {trajectory.t[0]:.9g} to t = {trajectory.t[-1]:.9g}."
-    # The viewer shows three coordinates. This figure replaces it in print and without scripts.
+    # For three coordinates, this figure appears only in print and without scripts, instead of the interactive viewer.
     instead = "instead" if len(trajectory.coordinates) == 3 else ""
     return picture("trajectory", figure, "Trajectory in phase space", caption, caption, instead)
 

@@ -15,9 +15,9 @@ TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
 def precision_section(study: Study) -> Markup:
     """Return the section on convergence, work and precision, with the conditions of the measurement."""
     conditions = (
-        f"All methods solve the same problem up to {study.clock} = {study.time:.9g}, {study.steps} steps of the run, "
-        "with steps up to 64 times larger and 128 times smaller. Errors are relative, against "
-        f"{study.reference}, which is good to {page.scientific(study.floor)}."
+        f"All methods solve the same problem up to {study.clock} = {study.time:.9g}. This is the time of {study.steps} "
+        "steps of the run; other steps are up to 64 times larger and 128 times smaller. Errors are relative, against "
+        f"{study.reference}, whose own error is about {page.scientific(study.floor)}."
     )
     blocks = [page.paragraph(conditions)]
     if drawable():
@@ -32,15 +32,15 @@ def precision_section(study: Study) -> Markup:
 
 def _conditions(study: Study) -> str:
     note = (
-        "All methods are one C file, compiled with the same flags, with the vector field where it can be inlined"
+        "All methods and the vector field are compiled in one C file with the same flags, so calls can be inlined"
         if study.language == "C"
         else "There was no C compiler: all methods ran in Python with NumPy, so times are mostly the interpreter's"
     )
     return (
-        f"{note}. Each time is the fastest of {study.rounds} repetitions, the methods taken in turn. Setting up the "
-        f"solver, once per trajectory, took {page.scientific(study.set_up)} s, which the others do not contain. Over a "
-        "short time, explicit methods of high order often need less time for the same error of the solution; they keep "
-        "Casimirs and energy no better than they solve."
+        f"{note}. Each time is the fastest of {study.rounds} repetitions, in which the methods take turns. The set-up "
+        f"of the solver, once per trajectory, took {page.scientific(study.set_up)} s, not counted in the times. Over "
+        "a short time, explicit methods of high order often need less time for the same error of the solution, but "
+        "their errors of Casimirs and energy are not smaller than that error."
     )
 
 
@@ -51,7 +51,7 @@ def _to_reach(study: Study) -> Markup:
         for t in TOLERANCES
         if t > study.floor
     ]
-    return page.table("Seconds until the error is no larger than this (measured)", columns, rows)
+    return page.table("Seconds of a run with at most this error (measured)", columns, rows)
 
 
 def _all(study: Study) -> Markup:

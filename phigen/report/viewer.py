@@ -17,12 +17,12 @@ from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
-#: MOST_NUMBERS is the largest number of values of all curves, MOST_ROWS the largest number of rows of a curve, STEPS
-#: the number of levels of a rounded coordinate.
+#: MOST_NUMBERS: largest number of values in all curves. MOST_ROWS: largest number of rows of a curve. STEPS: largest of
+#: the integers from 0 on to which coordinates are rounded.
 MOST_NUMBERS, MOST_ROWS, STEPS = 90_000, 4_000, 9_999
 #: Largest number of curves in the viewer.
 CURVES = 2
-#: Number of characters to which names of coordinates are cut in narrow places.
+#: Number of characters to which names of coordinates are cut, since menus and axes are narrow.
 LETTERS = 24
 
 
@@ -68,8 +68,10 @@ def _joined(methods: Mapping[str, Trajectory], axes: list[int]) -> bool:
 
 
 def _leaf(casimirs: Mapping[str, Expression], curve: Trajectory, axes: list[int]) -> Floats | None:
-    """Return curves (points, 3) on the leaf, in the space of the axes and separated by rows of NaN; None if there is
-    no leaf."""
+    """Return curves (points, 3) on the leaf of the trajectory, separated by rows of NaN; None if there is no leaf.
+
+    The three columns are the coordinates on the ``axes``.
+    """
     if not drawable() or len(curve.coordinates) in axes:
         return None
     start = dict(zip(curve.coordinates, curve.x[0].tolist(), strict=True))
@@ -104,12 +106,12 @@ def _data(methods: Mapping[str, Trajectory], names: list[str], axes: list[int], 
 
 
 def _integer_columns(points: Floats) -> list[list[int | None]]:
-    """Return columns of integers, with None for NaN."""
+    """Return the columns of an array as lists of rounded integers, with None for NaN."""
     return [[None if v != v else round(v) for v in column] for column in points.T.tolist()]
 
 
 def _finite(trajectory: Trajectory) -> Any:
-    """Return the rows of coordinates and time before the first row that is not finite."""
+    """Return coordinates and time, as columns, of the rows before the first state that is not finite."""
     nonfinite_rows = np.flatnonzero(~np.isfinite(trajectory.x).all(axis=1))
     end = int(nonfinite_rows[0]) if len(nonfinite_rows) else len(trajectory)
     return np.column_stack([trajectory.x[:end], trajectory.t[:end]])

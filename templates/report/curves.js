@@ -83,8 +83,8 @@ function makeView(panel) {
     return { trial, low, high };
   }
 
-  // A speed in steps per second at which the motion is easy to follow, with the longest step and the length of the
-  // motion in a second, both relative to the picture.
+  // A speed in steps per second at which the motion is easy to follow, with the largest distance between successive
+  // states and the length of the motion in a second, both relative to the size of the picture.
   function pace(given) {
     const { trial, low, high } = bounded(given, 60, 100), { axes } = data.groups[0];
     const chords = trial.ours.trail.slice(1).map(({ x }, k) => {

@@ -98,7 +98,7 @@ if (document.getElementById("live-panel")) {
       const allowed = only ? positive : nonnegative ? (v) => v >= 0 : () => true;
       number(`p.${name}`, allowed, (v) => { found.params[name] = v; });
     }
-    // A link has the number of steps of RK4 that its sender saw, which is not measured again.
+    // A link contains the number of steps of RK4 for one step of the solver, so that it shows what its sender saw.
     number("rk4", (v) => v >= 1 && v <= MOST_PARTS && Number.isInteger(v), (v) => { start.remember(found, v); });
     found.start.forEach((_, i) => number(`x.${data.coordinates[i]}`, () => true, (v) => { found.start[i] = v; }));
     return { found, refused: [...refused, ...[...unknown].map((key) => `${key}=${parts.get(key)}`)] };

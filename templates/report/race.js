@@ -2,8 +2,10 @@
 // the solver. For both, the errors of conserved quantities are measured.
 const MOST = 400; // largest number of intervals in a history, and of steps in a trail
 const MOST_PARTS = 64; // largest number of steps of RK4 for one step of the solver
-const ROUNDING = 1e-13; // errors below this are not compared
-const STEADY = 1.2, GROWING = 1.5; // ratio of the errors in the halves of a run, at most or at least, for errors that stay and that grow
+const ROUNDING = 1e-13; // smaller errors are rounding errors, and not compared
+// Ratio of the largest errors in the second and in the first half of a run: errors are constant if it is at most STEADY,
+// and grow if it is more than GROWING.
+const STEADY = 1.2, GROWING = 1.5;
 
 // The largest error in each of several equal intervals of a run. If there are too many intervals, pairs are joined.
 class History {

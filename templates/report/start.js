@@ -4,11 +4,11 @@ const SHOWN = 10; // seconds of the motion after which the methods are compared
 const TRIED = 1200; // largest number of steps in a trial run
 const MILLISECONDS = { ours: 200, all: 2400 }; // largest durations of a trial, and of all trials
 const VISIBLE = 3e-3, FAR = 0.3; // smaller errors than VISIBLE cannot be seen, and all larger ones than FAR look alike
-const MARGIN = 0.03; // largest error of the solver in the initial settings
-const CHORD = 0.8; // greatest length of a step, relative to the picture
-const MOVED = 0.1; // least length of the motion in a second, relative to the picture, if a step allows it
-const DOUBLED = 14; // number of times that the step of the run is doubled
-const BETTER = 1.2, CLEAR = 4; // factor by which another setting must be better, and score at which the search ends
+const MARGIN = 0.03; // largest error of phigen's solver with the initial settings
+const CHORD = 0.8; // largest distance between successive states, relative to the size of the picture
+const MOVED = 0.1; // least length of the motion in a second, relative to the picture, if some step allows it
+const DOUBLED = 14; // largest number of steps that are tried; each is twice the one before
+const BETTER = 1.2, CLEAR = 4; // factor by which the score of a new setting must be larger; score that ends the search
 
 function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, costOf = (race) => equalWork(race, 1) }) {
   // The number of steps of RK4 for one step of the solver: one, or as many as take the same time in this browser. This
@@ -36,16 +36,17 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
   const hasMargin = (given) => worst(tried({ ...given, h: 2 * given.h }, 100, 60).ours) < 0.5;
 
   // A score for the visible advantage of the solver: the share of the groups in which RK4 does not have smaller errors,
-  // plus the ratio of the largest errors, limited to visible ones. The second term is negative if those of RK4 are
-  // smaller.
+  // plus the ratio of the largest errors of RK4 and of the solver, limited to visible errors. This second term is
+  // negative if the errors of RK4 are smaller.
   function advantage(race) {
     const [ours, theirs] = [worst(race.ours), worst(race.theirs)], closer = groupsOfRk4(race).length;
     const seen = theirs > ours ? Math.min(theirs, FAR) / Math.max(ours, VISIBLE) : -Math.min(1, ours / MARGIN) / 2;
     return 1 - closer / race.groups.length + seen;
   }
 
-  // Settings of an order for which the errors of the solver are small, even with twice the step. Steps begin with that
-  // of the run, and end with the first for which RK4 fails at once. There is at least one.
+  // Settings of an order for which the errors of the solver are small, even with twice the step. The steps are that of
+  // the run, or less if necessary, and its multiples by 2, 4, 8, … up to the first at which RK4 fails. There is at
+  // least one setting.
   function stepsOf(given, end) {
     let h = data.step;
     const at = (step) => ({ ...given, h: step }), steps = [];
@@ -75,7 +76,7 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
     return best;
   }
 
-  // The initial order, step and speed. Other orders than that of the page are tried if the advantage is not clear.
+  // The initial order, step and speed. If the order of the page shows no clear advantage, other orders are tried.
   function showing(standard) {
     const given = view.rehearsed({ ...standard, parts: 1 }), begun = performance.now();
     if (!data.quantities.length) return { order: data.order, h: data.step, speed: view.pace(given).speed };

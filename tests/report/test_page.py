@@ -302,7 +302,7 @@ def test_every_lattice_of_the_corpus_without_noise_has_a_panel():
     for compilation in pages.values():
         run = next(iter(compilation.spec.runs.values()))
         if compilation.spec.noise:
-            with pytest.raises(NoPanelError, match="does not apply to noise"):
+            with pytest.raises(NoPanelError, match="does not apply to systems with noise"):
                 panel_page(compilation, run)
         else:
             assert len(panel_page(compilation, run)) < 120_000
