@@ -120,5 +120,5 @@ def test_panel_alone_is_a_page_for_a_frame(phigen):
 def test_system_with_noise_has_no_panel_and_the_reason_is_said(phigen):
     result = phigen("thermal_spin", "--panel")
     assert result.exit_code == 5
-    assert "no live panel: it would compare the solver with RK4, which does not apply to systems with noise" in result.stderr
+    assert "no live panel: it would compare the solver with RK4, which does not apply" in result.stderr
     assert list(Path().glob("*.html")) == []
