@@ -199,7 +199,7 @@ def _of_lattice(
     if problem.sizes != problem.whole:
         reduced_text, full_text = ("×".join(map(str, sizes)) for sizes in (problem.sizes, problem.whole))
         console.note(
-            f"measured on {reduced_text} of the {full_text} sites: errors are relative, and times in proportion"
+            f"measured on {reduced_text} instead of {full_text} sites; times grow in proportion to the number of sites"
         )
     if measure == "orbit" and len(problem.start) > MOST_COMPARED:
         message = (
