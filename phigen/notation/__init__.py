@@ -1,1 +1,1 @@
-"""Formulas for readers: in text, LaTeX and MathML."""
+"""Formulas of systems and methods for display, as text, LaTeX, MathML or sympy."""

@@ -1,4 +1,7 @@
-"""Formulas of a cell: brackets at a site, the density of H, Casimirs, invariants, and the vector field at a site."""
+"""Formulas of a lattice, for display: those of one site (a cell) and its relations to other sites.
+
+They are brackets, the density of H, Casimirs, invariants, and the vector field at a site.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +15,14 @@ from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.neighbours import Offset, steps
 from phigen.symbolic.readable import SHOWN, readable
 
-#: Formula of a cell: its left side as text, its left side as markup, and its right side.
+#: An equation of a lattice: its left side as text, its left side as markup, and its right side.
 Named = tuple[str, str, Expression]
 
 KINDS = {"sites": "", "sum": "Σ ", "product": "Π "}
 
 
 def described(cell: Cell) -> str:
-    """Return a description in words of the relation between sites."""
+    """Return a description in words of the relation between the sites of a lattice, such as its grid or graph."""
     if cell.relation == GRID:
         axes = ", ".join(f"{a} ({b})" for a, b in zip(cell.axes, cell.boundary, strict=True))
         return f"grid with the axes {axes}" if len(cell.axes) > 1 else f"chain along {axes}"
@@ -27,9 +30,9 @@ def described(cell: Cell) -> str:
 
 
 def brackets(cell: Cell) -> list[tuple[str, Expression]]:
-    """Return the nonzero brackets with their left sides as text, one of {a, b} and {b, a}.
+    """Return the nonzero brackets as pairs of the left side as text, ``{a, b}``, and the expression.
 
-    Brackets of fields of one site come first, then brackets with neighbours.
+    Of {a, b} and {b, a} only one is listed. Brackets of fields at one site come first, then brackets with neighbours.
     """
     entries: list[tuple[str, Expression]] = []
     printed_pairs: set[tuple[str, str]] = set()
@@ -48,10 +51,9 @@ def _mirrored(cell: Cell, f: str, second_field: str) -> tuple[str, str]:
 
 
 def sections(cell: Cell, max_terms: int | None = SHOWN) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Return the sections of a description of the cell: titles, each with lines of text as pairs (left side, right
-    side).
+    """Return the formulas of a lattice as text: titles of sections, each with its lines, pairs (left side, right side).
 
-    ``max_terms`` bounds the terms shown of an expression.
+    ``max_terms`` is the largest number of terms of an expression that are displayed; None displays all.
     """
     contents = [
         ("Poisson tensor of a site" if cell.is_local else "Poisson tensor", brackets(cell)),
@@ -86,9 +88,9 @@ def _densities(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def rates(cell: Cell) -> list[tuple[str, Expression]]:
-    """Return the right sides of the equations of motion at a site of a grid, with their left sides as text.
+    """Return the equations of motion at a site of a grid, as pairs of the left side as text and the right side.
 
-    For graphs and pairs, return the derivatives of the densities of a site and of a bond.
+    For graphs and pairs, the pairs are the derivatives of the densities of H of a site and of a bond or pair.
     """
     if cell.relation == GRID:
         return [(f"d{f}/dt", e) for f, e in vector_field(cell).items()]
@@ -97,14 +99,14 @@ def rates(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def document(cell: Cell) -> str:
-    """Return the formulas as LaTeX, with all indices: {x_i, y_{i+1}}."""
+    """Return the formulas of a lattice as LaTeX, with the indices of all sites, as in {x_i, y_{i+1}}."""
     blocks = [aligned(equations) for _, equations in formulas(cell)]
     head = f"% {cell.name}, {described(cell)}; needs amsmath"
     return "\n".join([head, "\\begingroup\\allowdisplaybreaks", *blocks, "\\endgroup"])
 
 
 def formulas(cell: Cell) -> Iterator[tuple[str, list[Equation]]]:
-    """Yield titles with equations, in MathML with all indices: {x_i, y_{i+1}}."""
+    """Yield pairs of a title and its equations in MathML, with the indices of all sites, as in {x_i, y_{i+1}}."""
     if left := [(_bracket(cell, name), e) for name, e in brackets(cell)]:
         yield "Poisson tensor", _equations(cell, left)
     sums = {"sites": cell.axes or ("i",), "bonds": ("a", "b"), "pairs": ("a", "b")}
@@ -138,7 +140,7 @@ def _equations(cell: Cell, formulas: Sequence[tuple[str, Expression]]) -> list[E
 
 
 def _indexed(cell: Cell, e: Expression) -> Expression:
-    """Return an expression in which every symbol has explicit indices, also the symbols of the site itself."""
+    """Return an expression in which values at the site itself have an index too: x becomes x[i]."""
     indexed = {name: symbol(_site(cell, *site)) for name, site in cell.places(e).items()}
     return substitute([e], indexed)[0]
 

@@ -1,4 +1,4 @@
-"""Formulas of Gauss collocation: the order, the equations of a step, and its unknowns."""
+"""Formulas of Gauss collocation, for display: the order, the equations of a step, and the unknowns of its stages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from phigen.symbolic.readable import readable
 
 
 def method(compilation: CompiledGauss) -> str:
-    """Return the description of a method, such as ``order 8, 4 stages, exact``."""
+    """Return the description of a method, such as ``order 8, 4 stages, structure exact``."""
     stages, note = compilation.order.terms, compilation.order.note
     description = (
         f"order {compilation.order.order}, {stages} stage{'s' * (stages > 1)}, structure {compilation.structure}"
@@ -17,7 +17,7 @@ def method(compilation: CompiledGauss) -> str:
 
 
 def equations() -> list[tuple[str, str]]:
-    """Return the equations of a step, as pairs (left side, right side)."""
+    """Return the equations of a step as text, in pairs (left side, right side); Z_i are the states of the stages."""
     return [
         ("Z_i", "z + Σ_j μ_ij L_j"),
         ("L_j", "h b_j f(Z_j)"),
@@ -27,7 +27,8 @@ def equations() -> list[tuple[str, str]]:
 
 
 def lines(compilation: CompiledGauss) -> list[str]:
-    """Return lines of text on the unknowns, one line for each part of the state, and on the step."""
+    """Return lines of text: for each part of the state, the unknowns of its stages; last, whether the step is
+    Poisson."""
     listed_lines, names = [], compilation.system.coordinates
     for part in compilation.gauss.parts:
         unknowns = ", ".join(names[i] for i in part.indices)

@@ -1,4 +1,4 @@
-"""Formulas of a splitting: its parts and their flows."""
+"""Formulas of a splitting, for display: the parts of H and their exact flows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.readable import readable
 from phigen.symbolic.symbols import Symbol, plain
 
-#: Letters for a matrix A and for E = exp(hA) − 1. A number follows if there are several matrices.
+#: Letters in formulas for a constant matrix A, and for E = exp(hA) − 1. A number follows if there are several matrices.
 RATES, EXPONENTIAL = "A", "E"
 
 
@@ -25,9 +25,9 @@ def method(compilation: CompiledSplitting) -> str:
 
 
 def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
-    """Return the images of the coordinates that a flow changes, after the time h.
+    """Return the values, after the time h, of the coordinates that a flow changes, by coordinate.
 
-    The keys are the coordinates. Entries of matrix exponentials have the names of `matrices`.
+    Entries of a matrix exponential have the letter E, the number of the matrix from `matrices`, row and column.
     """
     entries: dict[str, Expression] = {}
     for number, matrix in matrices(compilation):
@@ -41,32 +41,34 @@ def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
 
 
 def matrices(compilation: CompiledSplitting) -> list[tuple[str, MatrixExponential]]:
-    """Return the distinct matrix exponentials of all flows, each with its number as text; "" if there is only one."""
+    """Return the distinct matrix exponentials of all flows, each with its number as text, "" if there is only one."""
     distinct = list(dict.fromkeys(e for flow in compilation.splitting.flows for e in flow.exponentials))
     return [(str(k) if len(distinct) > 1 else "", e) for k, e in enumerate(distinct, 1)]
 
 
 def rates(number: str, matrix: MatrixExponential) -> dict[Symbol, Expression]:
-    """Return the non-zero entries of A in exp(hA) − 1, by name."""
+    """Return the nonzero entries of the matrix A of an exponential exp(hA) − 1, by their symbols, such as A12."""
     return {Symbol(f"{RATES}{number}", _place(matrix, k)): e for k, e in enumerate(matrix.rates) if not e.is_zero}
 
 
 def _place(matrix: MatrixExponential, k: int) -> str:
-    """Return row and column of an entry, from 1: ``12``, or ``1_12`` for matrices of ten rows or more."""
+    """Return row and column, counted from 1, of entry ``k``: ``12``, or ``1_12`` if the matrix has ten rows or more."""
     return ("_" * (matrix.size > 9)).join(str(i + 1) for i in divmod(k, matrix.size))
 
 
 def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expression]]:
-    """Return the generator of a flow: its Hamiltonian, or the non-zero components of a force by coordinate."""
+    """Return the generator of a flow: its Hamiltonian, with the name "", or the nonzero components of a force by
+    name."""
     if not flow.force:
         return [("", flow.hamiltonian)]
     return [(c, f) for c, f in zip(coordinates, flow.force, strict=True) if not f.is_zero]
 
 
 def formulas(compilation: CompiledSplitting, max_terms: int | None) -> list[tuple[str, str]]:
-    """Return the parts of H and the images of the coordinates under their flows, as pairs of a name and a text.
+    """Return the parts of H, and the coordinates after the time h of each flow, as pairs of a name and a text.
 
-    Repeated subexpressions of long formulas have names, σ with a number, and come last.
+    In long formulas, repeated subexpressions are called σ_1, σ_2, …; their definitions follow those formulas. The
+    matrices of exponentials come last.
     """
     equations: list[tuple[str, str]] = []
     for k, flow in enumerate(compilation.splitting.flows, 1):
@@ -85,8 +87,10 @@ def formulas(compilation: CompiledSplitting, max_terms: int | None) -> list[tupl
 
 
 def schedule(step: Step) -> list[tuple[int, float]]:
-    """Return the flows of a splitting in order, as pairs of a part and a fraction of the step; no pairs for other
-    steps."""
+    """Return the flows of a step in their order, as pairs of the number of the part, from 0, and the fraction of h.
+
+    If the step is no splitting, the list is empty.
+    """
     schedule = step.flow_schedule
     return [(part, schedule.times[row]) for part, row in schedule.flows] if schedule else []
 
@@ -94,8 +98,8 @@ def schedule(step: Step) -> list[tuple[int, float]]:
 def described(compilation: CompiledSplitting) -> dict[str, object]:
     """Return the parts of H and the flows of a step as plain data, for JSON.
 
-    A flow is a pair of the number of its part, from 1, and the fraction of the step. ``generators`` are the matrices A
-    of exponentials E = exp(hA) − 1, row by row.
+    ``flows`` has pairs of the number of the part, from 1, and the fraction of the step, in the order of application.
+    ``generators`` has the matrices A of exponentials E = exp(hA) − 1, row by row.
     """
     parts = []
     for flow in compilation.splitting.flows:

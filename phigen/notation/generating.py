@@ -1,4 +1,4 @@
-"""The generating function of a compilation as formulas: S_1 … S_k, and the reason for the order of the method."""
+"""Formulas of a method by series, for display: S_1 … S_k, the order with its reason, the modified Hamiltonian."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.modified import corrections, expect_modified, powers
 from phigen.symbolic.readable import Formula, of_polynomial
 
-#: Largest order for which the leading term of the modified Hamiltonian is shown: it needs one more S_i.
+#: Largest order p for which the leading correction of the modified Hamiltonian is displayed without request. It is
+#: −h^p S_{p+1}, and S_{p+1} takes long to compute for large p.
 _MODIFIED_UP_TO = 6
 
 
 def method(compilation: CompiledSeries) -> str:
-    """Return the method in words, as in ``order 6 from S_1 … S_5, symmetric: the even terms vanish``."""
+    """Return the method in words: ``order 6 from S_1 … S_5; symmetric, so the terms of even index vanish``."""
     plan, stage = compilation.order, compilation.stage
     terms = "S_1" if stage.terms == 1 else f"S_1 … S_{stage.terms}"
     system = compilation.system
@@ -30,10 +31,10 @@ def method(compilation: CompiledSeries) -> str:
 
 @dataclass(frozen=True)
 class Generating:
-    """The nonzero S_i with their indices, and −S_{p+1}, the leading term of the modified Hamiltonian.
+    """The nonzero terms S_i of the generating function as formulas, and the leading correction of the Hamiltonian.
 
-    The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series. The S_i
-    with i ≥ ``beyond`` have too many terms to be written out; the generated code has them with common subexpressions.
+    ``listed`` has pairs (i, S_i). The step is the flow, over the time h, of H − h^p S_{p+1} + …, where p is the order;
+    ``leading`` is −S_{p+1}. The S_i with i ≥ ``beyond`` have too many terms to be displayed.
     """
 
     listed: list[tuple[int, Formula]]
@@ -42,12 +43,13 @@ class Generating:
 
     @property
     def missing(self) -> str:
-        """Sentence on the S_i from ``beyond`` on, which are not listed."""
+        """Text that says from which S_i on the terms are not displayed, and why."""
         return f"from S_{self.beyond} on there are too many terms to be written out; the code shares their parts"
 
 
 def series_formulas(compilation: CompiledSeries, max_terms: int | None) -> Generating:
-    """Return the generating function of a series as formulas, with at most ``max_terms`` terms shown of each S_i."""
+    """Return the generating function as formulas; at most ``max_terms`` terms of each S_i are displayed, None for
+    all."""
     plan = compilation.stage
     pushed = compilation.system.forces or compilation.system.noise
     has_modified = not pushed and plan is compilation.order and plan.order <= _MODIFIED_UP_TO
@@ -61,15 +63,15 @@ def series_formulas(compilation: CompiledSeries, max_terms: int | None) -> Gener
         if has_modified and term_count > plan.order
         else None
     )
-    following = term_count + 1 + (compilation.symmetric and term_count % 2 == 1)  # index of the next non-zero term
+    following = term_count + 1 + (compilation.symmetric and term_count % 2 == 1)  # index i of the next S_i ≠ 0
     return Generating(polynomials, leading, following if term_count < plan.terms else None)
 
 
 def modified_formulas(compilation: Compilation, count: int, max_terms: int | None) -> list[tuple[int, Formula]]:
-    """Return the first ``count`` terms of the modified Hamiltonian H̃ = H + h^p H_p + …, as pairs (j, H_j).
+    """Return the first ``count`` corrections of the modified Hamiltonian H̃ = H + h^p H_p + …, as pairs (j, H_j).
 
-    A count of 0 returns the leading term if it is cheap to compute. Raises `SpecError` for a count above 0 if the
-    method is a splitting or a composition, or has an approximate bi-realisation.
+    For the count 0, return the first correction if it is cheap to compute, else []. Raises `SpecError` for other counts
+    if the method is no series, is a composition, or has an approximate bi-realisation.
     """
     if not count:
         leading = series_formulas(compilation.by_series(), max_terms).leading if compilation.has_series else None

@@ -14,21 +14,21 @@ from phigen.splitting.matrices import MatrixExponential
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import SHOWN, Formula
 
-#: Left side of an equation and the parts of its right side, as markup.
+#: An equation in MathML: its left side, and the parts of its right side between which a line may break.
 Equation = tuple[str, Sequence[str]]
 
 _PLUS, _EQUALS, _TIMES = "<mo>+</mo>", "<mo>=</mo>", "<mo>&#x2062;</mo>"
 _DOTS = f"{_PLUS}<mo>…</mo>"
-#: The function φ of the exponential bi-realisation, and β for a bi-realisation with β(x, p) = α(x, −p).
+#: LaTeX of the function φ of the exponential bi-realisation, and of β if the bi-realisation is symmetric.
 _PHI = "  \\varphi(s) &= \\frac{1}{s} \\left( 1 - \\frac{\\sqrt{s}}{2} \\cot \\frac{\\sqrt{s}}{2} \\right)"
 _BETA = "  \\beta(x, p) &= \\alpha(x, -p)"
-#: Width of an equals sign and of the space between columns of a matrix, in em.
+#: Width of an equals sign, and width of the space between two columns of a matrix, in em.
 _RELATION, _COLUMN = 1.4, 1.2
-#: Largest number of columns of a matrix in amsmath; wider tensors are shown as brackets.
+#: Largest number of columns of a matrix in amsmath. If π has more, it is displayed as a list of brackets.
 _COLUMNS = 10
 
 
-#: The equations of a Gauss step.
+#: LaTeX of the equations of a step of Gauss collocation.
 _COLLOCATION = r"""\begin{align*}
   Z_i &= z + \sum_j \mu_{ij} L_j, \quad L_j = h b_j f(Z_j), \quad \mu_{ij} + \mu_{ji} = 1 \\
   z' &= z + \sum_j L_j
@@ -36,12 +36,12 @@ _COLLOCATION = r"""\begin{align*}
 
 
 def document(compilation: Compilation, modified: int = 0, most: int | None = SHOWN) -> str:
-    """Return LaTeX equations for π, H and Casimirs, then for the method, and for H̃.
+    """Return LaTeX equations for π, H and Casimirs, for the method, and for the modified Hamiltonian H̃.
 
-    The method is α, β and S_1 … S_k, or the parts and flows of a splitting. Lines are broken to fit the text of an
-    article. ``most`` bounds the terms shown of each S_i and of H̃; None shows all. ``modified`` is the number of
-    corrections in H̃; with 0, the leading correction is shown if it is cheap to compute. Raises `SpecError` if
-    corrections are requested for a method without a modified Hamiltonian.
+    The method is α, β and S_1 … S_k, or the parts and flows of a splitting, or Gauss collocation. Lines are broken to
+    fit the text of an article. ``most`` is the largest number of terms displayed of each S_i and of H̃; None displays
+    all. ``modified`` is the number of corrections in H̃; for 0, the first correction is displayed if it is cheap to
+    compute. Raises `SpecError` if corrections are requested for a method without a modified Hamiltonian.
     """
     blocks = system_blocks(compilation.system)
     blocks += compilation.by_kind(
@@ -58,7 +58,7 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
 
 
 def system_blocks(system: System) -> list[str]:
-    """Return displayed equations for π, H, and for Casimirs and invariants if there are any."""
+    """Return blocks of LaTeX: displayed equations for π, for H, and for Casimirs and invariants if there are any."""
     blocks = [_tensor(system), aligned(_assigned(["H"], [system.hamiltonian]))]
     if first_integrals := {**system.casimirs, **system.invariants}:
         blocks.append(aligned(_assigned(list(first_integrals), list(first_integrals.values()))))
@@ -66,7 +66,7 @@ def system_blocks(system: System) -> list[str]:
 
 
 def _tensor(system: System) -> str:
-    """Return π as a matrix, or as brackets if the matrix is too wide."""
+    """Return π in LaTeX, as a matrix or, if this is too wide, as a list of brackets of coordinates."""
     names, n = system.coordinates, system.dimension
     cells = [[mathml.expression(e) for e in row] for row in system.poisson]
     total_width = sum(max(width(row[j]) for row in cells) + _COLUMN for j in range(n))
@@ -79,13 +79,13 @@ def _tensor(system: System) -> str:
 
 
 def _flows(compilation: CompiledSplitting) -> list[str]:
-    """Return the parts of H with their flows, then the matrices of the exponentials in the flows."""
+    """Return blocks of LaTeX: the parts of H with their flows, then the matrix exponentials that the flows contain."""
     parts = [_flow(compilation, k) for k in range(1, len(compilation.splitting.flows) + 1)]
     return [*parts, *(_exponential(number, matrix) for number, matrix in flows.matrices(compilation))]
 
 
 def _flow(compilation: CompiledSplitting, k: int) -> str:
-    """Return the equations for a part of H and for the images of the coordinates under its flow, after the time h."""
+    """Return the LaTeX equations for part ``k`` of H, and for the coordinates after the time h of its flow."""
     flow = compilation.splitting.flows[k - 1]
     new_values = flows.images(compilation, flow)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
@@ -95,15 +95,15 @@ def _flow(compilation: CompiledSplitting, k: int) -> str:
 
 
 def _exponential(number: str, matrix: MatrixExponential) -> str:
-    """Return the equations for a matrix exponential minus 1 and for the nonzero entries of its matrix."""
+    """Return the LaTeX equations for E = exp(hA) − 1, and for the nonzero entries of its matrix A."""
     entries = flows.rates(number, matrix)
     return aligned([mathml.exponential(number), *_equations([mathml.name(s) for s in entries], list(entries.values()))])
 
 
 def _maps(compilation: CompiledSeries) -> Iterator[str]:
-    """Yield the equations for α and β, and for φ if they contain φ.
+    """Yield the LaTeX equations for α and β, and for the function φ if α contains it.
 
-    For a bi-realisation by paths, the first terms of the series of α and β are shown.
+    If a bi-realisation integrates paths numerically, the first terms of the series of α and β are displayed.
     """
     realisation, names = compilation.realisation, compilation.system.coordinates
     continuation = [_DOTS] if realisation.path else []
@@ -118,7 +118,7 @@ def _maps(compilation: CompiledSeries) -> Iterator[str]:
 
 
 def _gauged(compilation: CompiledSeries) -> str:
-    """Return the markup ``H − λ C =``, which precedes the formula of S_1; "" if no Casimirs are subtracted from H."""
+    """Return the beginning ``H − λ C =`` of the formula of S_1 in MathML; "" if no Casimirs are subtracted from H."""
     gauge = compilation.gauge
     factors = [mathml.name(s) for s in gauge.multiples] + [mathml.grouped(value) for value in gauge.fixed.values()]
     parts = zip(factors, (*gauge.free, *gauge.fixed), strict=True)
@@ -142,16 +142,19 @@ def _assigned(names: Sequence[str], expressions: Sequence[Expression]) -> list[E
 def _equations(
     left: Sequence[str], expressions: Sequence[Expression], continuation: Sequence[str] = ()
 ) -> list[Equation]:
-    """Return the equations for expressions, then those that define their named common subexpressions."""
+    """Return the equations of expressions, with ``left`` as left sides, then those of their named subexpressions.
+
+    ``continuation``, such as an ellipsis, is added to each expression.
+    """
     formulas = named_parts.readable(expressions)
     equations = [(name, [*mathml.pieces(form), *continuation]) for name, form in zip(left, formulas.forms, strict=True)]
     return [*equations, *((mathml.name(name), mathml.pieces(e)) for name, e in formulas.parts)]
 
 
 def _pieces(formula: Formula) -> list[str]:
-    """Return a polynomial in parts between which a line may break, with its divisor in front.
+    """Return a polynomial in MathML, in parts between which a line may break; a common divisor d becomes a factor 1/d.
 
-    If terms are hidden, the last part is the number of all terms.
+    If not all terms are displayed, the last part says how many there are.
     """
     first, *remaining = mathml.pieces(replace(formula, divisor=1))
     all_terms = [first, *remaining]
@@ -163,7 +166,7 @@ def _pieces(formula: Formula) -> list[str]:
 
 
 def aligned(equations: Sequence[Equation] | Iterator[Equation]) -> str:
-    """Return equations below one another, with long equations broken into lines."""
+    """Return equations in LaTeX, aligned below one another; long equations are broken into several lines."""
     equation_list = list(equations)
     room = LINE - max(width(left) for left, _ in equation_list) - _RELATION
     broken_lines = []
@@ -183,6 +186,6 @@ def _indexed(letter: str, index: int | str) -> str:
 
 
 def _scaled(letter: str, i: int) -> str:
-    """Return ``h^i S_i``."""
+    """Return ``h^i S_i`` in MathML, with another letter for S if ``letter`` is one."""
     power = "<mi>h</mi>" if i == 1 else f"<msup><mi>h</mi><mn>{i}</mn></msup>"
     return f"{power}{_TIMES}{_indexed(letter, i)}"

@@ -1,8 +1,8 @@
 """Formulas as MathML Core, which browsers display without additional scripts or fonts.
 
-An expression becomes a sum of terms. A term is a coefficient with factors above and below a fraction line. Signs and
-quotients therefore look as on paper, whatever the structure of the expression tree. Each function that returns markup
-returns exactly one element unless its docstring says otherwise. All text in markup is escaped.
+An expression is first converted to a sum of terms; a term is a coefficient with factors above and below a fraction
+line. So signs and quotients look as on paper, whatever the structure of the expression tree. Each function that returns
+markup returns exactly one element, unless its docstring says otherwise. All text in markup is escaped.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.readable import Formula
 from phigen.symbolic.symbols import GAUGE, PART, Symbol
 
-#: Number of characters of markup above which a part of a formula is left out; shared subexpressions above it get names.
+#: Number of characters of markup above which a part of a formula is replaced by an ellipsis.
 LONGEST = 60_000
 
-#: Largest number of terms of a polynomial that is reordered so that it does not begin with a minus.
+#: Largest number of terms of a polynomial whose terms are reordered so that it does not begin with a minus sign.
 FEW = 4
 
 #: Number of characters of an exponent above which a power of e is written as exp(…).
@@ -36,21 +36,21 @@ _GREEK = {
     "upsilon": "υ", "phi": "φ", "chi": "χ", "psi": "ψ", "omega": "ω", "Gamma": "Γ", "Delta": "Δ", "Theta": "Θ",
     "Lambda": "Λ", "Xi": "Ξ", "Pi": "Π", "Sigma": "Σ", "Phi": "Φ", "Psi": "Ψ", "Omega": "Ω",
 }  # fmt: skip
-#: Letters for internal symbols such as ``lambda:1``; the text after the colon becomes the index.
+#: Letters for kinds of symbols that phigen adds: multipliers λ of Casimirs, and named subexpressions σ.
 _OWN = {GAUGE: "λ", PART: "σ"}
 
-# invisible multiplication, and invisible function application
+# operators that browsers do not draw: multiplication, and the application of a function to its argument
 _TIMES, _APPLY = "<mo>&#x2062;</mo>", "<mo>&#x2061;</mo>"
 _DOT, _DOTS = "<mo>·</mo>", "<mo>…</mo>"
 
 
 @dataclass(frozen=True)
 class Factor:
-    """Factor of a term: a ``base`` with ``index`` and exponents, and a ``tail`` such as the argument of a function.
+    """Factor of a term, in markup: a ``base`` with an ``index``, and a ``tail`` such as the argument of a function.
 
-    ``terms`` are the terms of a base that is a sum in parentheses. ``word`` marks a name of several letters, which
-    needs space around it; ``raised`` marks a power, which needs parentheses before a further exponent. Factors are
-    sorted by ``key``.
+    ``terms`` are the terms of a base that is a sum in parentheses. ``word`` marks a name of several letters, which is
+    separated from other factors by a dot; ``raised`` marks a power, which needs parentheses before a further exponent.
+    Factors are sorted by ``key``.
     """
 
     base: str
@@ -63,17 +63,17 @@ class Factor:
 
     @property
     def markup(self) -> str:
-        """The markup of the factor in a product."""
+        """Markup of the factor as part of a product, in which a sum has parentheses."""
         base = f"<msub>{self.base}{self.index}</msub>" if self.index else self.base
         return _row(base + self.tail) if self.tail else base
 
     @property
     def alone(self) -> str:
-        """The markup of the factor alone: a sum loses its parentheses."""
+        """Markup of the factor if it is the only one, so that a sum needs no parentheses."""
         return summed(self.terms) if self.terms else self.markup
 
     def power(self, exponent: str) -> Factor:
-        """Return the factor with an exponent."""
+        """Return this factor raised to an exponent, which is markup."""
         if self.raised:
             return Factor(_parentheses(self.markup)).power(exponent)
         kind, index = ("msubsup", self.index) if self.index else ("msup", "")
@@ -90,12 +90,12 @@ class FractionTerm:
 
     @property
     def magnitude(self) -> str:
-        """The markup without the sign."""
+        """Markup of the absolute value of the term."""
         c = abs(self.coefficient)
         top, bottom = (c, Fraction(1)) if _is_decimal(c) else (Fraction(c.numerator), Fraction(c.denominator))
         above = _product(top, self.above)
         if len(self.above) == 1 and self.above[0].terms and "<mfrac" in above and not self.below and bottom != 1:
-            return _row(number(top / bottom) + _TIMES + self.above[0].markup)  # avoids a fraction in a fraction
+            return _row(number(top / bottom) + _TIMES + self.above[0].markup)  # ½(…): no fraction in a numerator
         return f"<mfrac>{above}{_product(bottom, self.below)}</mfrac>" if self.below or bottom != 1 else above
 
 
@@ -108,7 +108,7 @@ def terms_of(e: Expression) -> Sum:
 
 
 def terms_of_formula(formula: Formula) -> Sum:
-    """Return the terms of a formula without its divisor."""
+    """Return the terms of a formula, whose divisor is ignored; if terms are hidden, the last one is an ellipsis."""
     terms: list[FractionTerm] = []
     for c, monomial in formula.terms:
         terms += _times((FractionTerm(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
@@ -122,7 +122,7 @@ def expression(e: Expression) -> str:
 
 
 def summed(terms: Sequence[FractionTerm]) -> str:
-    """Return the markup of a sum."""
+    """Return the markup of the sum of terms; 0 if there are none."""
     if not terms:
         return number(Fraction(0))
     first, *remaining = terms
@@ -133,9 +133,9 @@ def summed(terms: Sequence[FractionTerm]) -> str:
 
 
 def pieces(e: Expression | Formula) -> list[str]:
-    """Return a formula in parts between which a line may break: one for each term of its outermost sum.
+    """Return the markup of a formula in parts between which a line may break: the terms of its outermost sum.
 
-    Each part is the content of a separate element ``<math>``; the sequence of these elements shows the formula.
+    Each part becomes an element ``<math>`` of its own, and the sequence of these elements displays the formula.
     """
     if isinstance(e, Expression):
         return _pieces(terms_of(e))
@@ -144,7 +144,7 @@ def pieces(e: Expression | Formula) -> list[str]:
 
 
 def math(markup: str) -> str:
-    """Return the element that shows markup as a formula."""
+    """Return an element ``<math>`` that displays markup as a formula."""
     return f'<math displaystyle="true">{markup}</math>'
 
 
@@ -154,7 +154,7 @@ def name(identifier: str) -> str:
 
 
 def dotted(identifier: str) -> str:
-    """Return the time derivative of a name: a dot over a letter, a quotient for a word."""
+    """Return the markup of the time derivative of a name: a dot over a letter, the quotient d…/dt for a word."""
     factor = _name(identifier)
     if factor.word:
         return f"<mfrac>{_row('<mi>d</mi>' + factor.markup)}{_row('<mi>d</mi><mi>t</mi>')}</mfrac>"
@@ -162,7 +162,8 @@ def dotted(identifier: str) -> str:
 
 
 def number(value: Fraction) -> str:
-    """Return the markup of a number ≥ 0. Decimals of many digits are not written as fractions."""
+    """Return the markup of a number ≥ 0: an integer, a fraction, or a decimal if the fraction would have many
+    digits."""
     if value.denominator == 1:
         return f"<mn>{value.numerator}</mn>"
     if not _is_decimal(value):
@@ -179,7 +180,7 @@ def grouped(e: Expression) -> str:
 
 
 def matrix(rows: Sequence[Sequence[Expression]]) -> str:
-    """Return a matrix in parentheses."""
+    """Return the markup of a matrix, in parentheses."""
     body = "".join("<mtr>" + "".join(f"<mtd>{expression(e)}</mtd>" for e in row) + "</mtr>" for row in rows)
     return _parentheses(f"<mtable>{body}</mtable>")
 
@@ -190,15 +191,14 @@ def indexed(letter: str, index: str) -> str:
 
 
 def component(letter: str, k: int, c: str) -> str:
-    """Return the markup of a component: H_2 or, for a component of a vector field, F_3^{x} with the coordinate
-    ``c``."""
+    """Return the markup of a letter with the index ``k``, as H_2; with a coordinate ``c`` as exponent, as F_3^{x}."""
     if not c:
         return f"<msub><mi>{escape(letter)}</mi><mn>{k}</mn></msub>"
     return f"<msubsup><mi>{escape(letter)}</mi><mn>{k}</mn>{name(c)}</msubsup>"
 
 
 def bracket(a: str, b: str) -> str:
-    """Return the Poisson bracket of two coordinates, {a, b}."""
+    """Return the markup of the Poisson bracket {a, b} of two coordinates."""
     return _row(f'<mo stretchy="false">{{</mo>{name(a)}<mo>,</mo>{name(b)}<mo stretchy="false">}}</mo>')
 
 
@@ -237,7 +237,7 @@ def _called(function: str, args: Sequence[Sum]) -> Sum:
 def _power(base: Sum, exponent: Fraction) -> Sum:
     if exponent < 0:
         below = _single(_power(base, -exponent))
-        if below.coefficient == 0:  # 1/0 is displayed as in the spec
+        if below.coefficient == 0:  # a division by zero in the formula is displayed as 1/0
             return _one(Factor("<mfrac><mn>1</mn><mn>0</mn></mfrac>"))
         return (FractionTerm(1 / below.coefficient, below.below, below.above),)
     if exponent == 1 or not base:
@@ -261,21 +261,21 @@ def _times(*factors: Sum) -> Sum:
 
 
 def _collected(factors: Sequence[Factor]) -> tuple[Factor, ...]:
-    """Return the factors with equal ones combined into a power, except if this gives a power of a power."""
+    """Return the factors, in which equal factors are combined to a power, unless they are powers already."""
     counts = Counter(factors)
     powers = {f: f.power(f"<mn>{n}</mn>") for f, n in counts.items() if n > 1 and not f.raised}
     return tuple(powers.get(f, f) for f, n in counts.items() for _ in range(1 if f in powers else n))
 
 
 def _single(terms: Sum) -> FractionTerm:
-    """Return the sum as one term, in parentheses if it has several terms."""
+    """Return a sum as one term: a sum of several terms becomes a factor in parentheses."""
     if len(terms) == 1:
         return terms[0]
     return FractionTerm(Fraction(1), (_enclosed(terms),)) if terms else FractionTerm(Fraction(0))
 
 
 def _base(terms: Sum) -> Factor:
-    """Return an expression as the base of a power, in parentheses if necessary."""
+    """Return a sum as the base of a power, in parentheses unless it is a single factor or a positive integer."""
     if len(terms) == 1 and not terms[0].below:
         c, above = terms[0].coefficient, terms[0].above
         if len(above) == 1 and c == 1:
@@ -290,8 +290,10 @@ def _enclosed(terms: Sum) -> Factor:
 
 
 def _sorted(terms: Sum) -> Sum:
-    """Return the terms with monomials first, sorted by their names; other terms keep their order. Numbers are added
-    up."""
+    """Return the terms of a sum in the order of display, with like terms added up.
+
+    Monomials come first, sorted by their names; other terms keep their order.
+    """
     sums: dict[tuple[tuple[Factor, ...], tuple[Factor, ...]], Fraction] = {}
     for t in terms:
         sums[t.above, t.below] = sums.get((t.above, t.below), Fraction(0)) + t.coefficient
@@ -304,7 +306,7 @@ def _sorted(terms: Sum) -> Sum:
 
 
 def _positive_first(terms: list[FractionTerm]) -> Sum:
-    """Return the terms with the first positive one in front: b − a rather than −a + b."""
+    """Return the terms with the first positive term moved to the front: b − a instead of −a + b."""
     position = next((i for i, t in enumerate(terms) if t.coefficient > 0), 0)
     return (*terms[position : position + 1], *terms[:position], *terms[position + 1 :])
 
@@ -328,7 +330,10 @@ def _one(factor: Factor) -> Sum:
 
 
 def exponential(number: str) -> tuple[str, list[str]]:
-    """Return both sides of the equation E = exp(hA) − 1, with the number of the matrix as index."""
+    """Return the equation E = exp(hA) − 1 in markup: its left side, and the two parts of its right side.
+
+    The number of the matrix follows the letters E and A; "" if there is only one matrix.
+    """
     left, rates = (f"<mi>{letter}{number}</mi>" for letter in "EA")
     return left, [f"<msup><mi>e</mi><mrow><mi>h</mi>{_TIMES}{rates}</mrow></msup>", "<mo>−</mo><mn>1</mn>"]
 
@@ -350,7 +355,10 @@ def _name(identifier: str) -> Factor:
 
 
 def _at_neighbour(identifier: str, key: Any) -> Factor:
-    """Return ``x[i+1,j]`` as x with the index i+1, j after an index of the name itself."""
+    """Return the factor for a value at a neighbour: ``x[i+1,j]`` is x with the index i+1, j.
+
+    For a name that has an index, such as ``x1``, the index of the neighbour follows that of the name.
+    """
     name_, _, index = identifier[:-1].partition("[")
     base = _name(name_)
     signs = {"+": "<mo>+</mo>", "-": "<mo>−</mo>", ",": "<mo>,</mo>"}
@@ -372,8 +380,9 @@ def _product(coefficient: Fraction, factors: Sequence[Factor]) -> str:
 def _pieces(terms: Sum) -> list[str]:
     """Return the terms of a sum as markup, each with its sign.
 
-    If the sum is one term with a factor in parentheses, the parts are the terms inside; the parentheses and the other
-    factors belong to the first and last part.
+    If the sum is a single term, but contains a long sum in parentheses, its parts are the terms in the parentheses.
+    Then the first part begins with the other factors and the opening parenthesis, and the last part ends with the
+    closing one.
     """
     inner = next((f for f in terms[0].above if len(f.terms) > 3), None) if len(terms) == 1 else None
     if inner is None:
@@ -392,7 +401,7 @@ def _sign(term: FractionTerm) -> str:
 
 
 def _is_decimal(value: Fraction) -> bool:
-    """Whether the value comes from a decimal of many digits: 0.6667 is easier to read than 6667/10000."""
+    """Whether a number is displayed as a decimal: 0.6667 is easier to read than 6667/10000."""
     cofactor = value.denominator
     for prime in (2, 5):
         while cofactor % prime == 0:

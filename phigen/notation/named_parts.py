@@ -1,4 +1,4 @@
-"""Formulas with names for common subexpressions, so that large expressions are readable."""
+"""Formulas in which common subexpressions have names, σ_1, σ_2, …, so that large expressions can be displayed."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from phigen.symbolic.readable import LONGEST, Formula, expanded
 from phigen.symbolic.readable import readable as as_text
 from phigen.symbolic.symbols import MOMENTUM, PART, Symbol, kind_of, plain
 
-#: Least number of leaves of a named subexpression, and least number of leaves that a name must save.
+#: A subexpression gets a name if it has at least SMALL leaves (symbols and numbers), and if the name saves at least
+#: WORTH leaves in the whole formula.
 SMALL, WORTH = 3, 4
 
-#: Names are used if the formulas with names have at most this fraction of the original length.
+#: Names are used if they shorten the formulas, definitions included, to less than this fraction of their length.
 WORTH_NAMES = 0.75
 
-#: Expressions with at most this number of leaves get no names for common subexpressions.
+#: Expressions with at most this number of leaves (symbols and numbers) get no names for common subexpressions.
 SHORT = 40
 
-#: Pattern of a name of a common subexpression in a text.
+#: Pattern of the name of a common subexpression in a text, such as σ_1.
 _SHARED = re.compile(r"σ_\d+\b")
 
 
@@ -28,8 +29,8 @@ _SHARED = re.compile(r"σ_\d+\b")
 class Readable:
     """Formulas with named common subexpressions.
 
-    ``forms`` are the formulas in the symbols ``part:1``, ``part:2``, …, which ``parts`` defines. ``size`` is the number
-    of names and numbers in all formulas and definitions.
+    ``forms`` are the formulas. They contain symbols ``part:1``, ``part:2``, …, whose definitions are in ``parts``.
+    ``size`` is the number of symbols and numbers in all formulas and definitions.
     """
 
     parts: tuple[tuple[str, Expression], ...]
@@ -38,8 +39,10 @@ class Readable:
 
 
 def readable(expressions: Sequence[Expression]) -> Readable:
-    """Return the shortest form of expressions among three: expanded, unchanged, with names for common
-    subexpressions."""
+    """Return expressions in a form for display: multiplied out, unchanged, or with names for common subexpressions.
+
+    All expressions share the names. Names are given only to long expressions, or where they save much of the length.
+    """
     unnamed_form, named_form = _partly_named(expressions), _all_named(expressions)
     return (
         named_form if unnamed_form.size > SHORT and named_form.size < WORTH_NAMES * unnamed_form.size else unnamed_form
@@ -52,7 +55,7 @@ def _all_named(expressions: Sequence[Expression]) -> Readable:
 
 
 def _partly_named(expressions: Sequence[Expression]) -> Readable:
-    """Return short expressions expanded or unchanged, and long ones with names for common subexpressions."""
+    """Return the expressions; long ones with names for common subexpressions, short ones possibly multiplied out."""
     trees = fold(expressions, lambda e, sizes: sum(sizes) or 1)
     forms: dict[int, Formula | Expression] = {}
     for i, (e, form) in enumerate(zip(expressions, expanded(expressions, None), strict=True)):
@@ -68,10 +71,10 @@ def _partly_named(expressions: Sequence[Expression]) -> Readable:
 
 
 def texts(named_expressions: Mapping[str, Expression], max_terms: int | None) -> list[tuple[str, str]]:
-    """Return expressions as pairs of a name and a text, unchanged or expanded, whichever is shorter.
+    """Return expressions as pairs of a name and a text, unchanged or multiplied out, whichever is shorter.
 
-    A text has at most ``max_terms`` terms. Names σ_1, σ_2, … for common subexpressions are used if they shorten the
-    texts; their definitions come last.
+    At most ``max_terms`` terms of an expression are displayed; None displays all. If names for common subexpressions
+    shorten the texts, they are used, and the pairs (σ_1, its definition), … follow.
     """
     expressions = [*named_expressions.values()]
     plainly = as_text(expressions, max_terms)
@@ -86,7 +89,7 @@ def texts(named_expressions: Mapping[str, Expression], max_terms: int | None) ->
 
 
 def vanishing(subexpressions: Sequence[tuple[str, Expression]]) -> list[str]:
-    """Return the names of the subexpressions that vanish where all covectors are 0."""
+    """Return the names of those subexpressions, pairs of a name and its definition, that are 0 if all momenta are 0."""
     zeros: dict[str, Expression] = {}
     for name, part in subexpressions:
         zeros |= {s: ZERO for s in symbols_of(part) if kind_of(s) == MOMENTUM}
@@ -96,7 +99,10 @@ def vanishing(subexpressions: Sequence[tuple[str, Expression]]) -> list[str]:
 
 
 def _met(name_texts: Sequence[tuple[str, str]], count: int) -> list[tuple[str, str]]:
-    """Return the first ``count`` texts and the subexpressions that they contain, renumbered from 1."""
+    """Return the first ``count`` texts, and the definitions of the subexpressions that they contain.
+
+    Subexpressions that are not displayed are dropped, and the others are renumbered from 1.
+    """
     met = {name for _, text in name_texts[:count] for name in _SHARED.findall(text)}
     for name, text in reversed(name_texts[count:]):
         if name in met:
@@ -108,13 +114,13 @@ def _met(name_texts: Sequence[tuple[str, str]], count: int) -> list[tuple[str, s
 
 
 def short(expressions: Sequence[Expression]) -> list[Formula | Expression]:
-    """Return the expressions unchanged, or expanded where that is shorter."""
+    """Return for each expression the shorter form, unchanged or multiplied out."""
     forms = zip(expressions, expanded(expressions, None), strict=True)
     return [form if form is not None and leaves(form) < leaves(e) else e for e, form in forms]
 
 
 def leaves(form: Formula | Expression) -> int:
-    """Return the number of names and numbers in a formula."""
+    """Return the number of symbols and numbers in a formula, repetitions included."""
     if isinstance(form, Expression):
         return fold([form], lambda e, sizes: sum(sizes) or 1)[0]
     return (form.divisor != 1) + sum(
@@ -123,7 +129,7 @@ def leaves(form: Formula | Expression) -> int:
 
 
 def with_names(roots: Sequence[Expression]) -> tuple[tuple[tuple[str, Expression], ...], list[Expression]]:
-    """Return definitions of names for long common subexpressions, and the ``roots`` in terms of these names."""
+    """Return definitions of names for common subexpressions, in order of use, and the ``roots`` with these names."""
     uses: dict[int, int] = {}
     order = topological(roots)
     for e in order:

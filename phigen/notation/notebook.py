@@ -1,6 +1,6 @@
-"""Representations of systems, compilations and trajectories in notebooks: LaTeX and HTML with MathML.
+"""Display of systems, compilations and trajectories in notebooks, as LaTeX and as HTML with MathML.
 
-The HTML has no style sheet and no script, so that it adopts the style of the notebook.
+The HTML has no style sheet and no script, so that it takes the style of the notebook.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from phigen.runtime.trajectory import Trajectory
 
 
 def system_latex(system: System) -> str:
-    """Return π, H, Casimirs and invariants as displayed equations."""
+    """Return π, H, Casimirs and invariants as displayed equations in LaTeX."""
     return "\n".join(latex.system_blocks(system))
 
 
 def system_html(system: System) -> str:
-    """Return the non-zero brackets, H, Casimirs, invariants, and the parameters with their defaults."""
+    """Return HTML with H, the nonzero brackets, Casimirs, invariants, and the parameters with their defaults."""
     names, n = system.coordinates, system.dimension
     rows = [(mathml.name("H"), mathml.expression(system.hamiltonian))]
     for i in range(n):
@@ -42,7 +42,7 @@ def system_html(system: System) -> str:
 
 
 def compilation_html(compilation: Compilation) -> str:
-    """Return the system and its method."""
+    """Return HTML with the formulas of the system, and a line on the order and the kind of the method."""
     program = compilation.program
     caption = f"compiled to order {program.order}: {compilation.label}, {program.step.kind.manner}"
     body = _cell_html(compilation.by_sweeps().cell) if compilation.spec.lattice else system_html(compilation.system)
@@ -50,7 +50,7 @@ def compilation_html(compilation: Compilation) -> str:
 
 
 def _cell_html(cell: Cell) -> str:
-    """Return the brackets, the density of H, Casimirs and invariants of a lattice."""
+    """Return HTML with the brackets, the density of H, Casimirs, invariants and equations of motion of a lattice."""
     lines = [
         _formula(left, "".join(right)) for _, equations in cell_formulas.formulas(cell) for left, right in equations
     ]
@@ -58,7 +58,8 @@ def _cell_html(cell: Cell) -> str:
 
 
 def trajectory_html(trajectory: Trajectory) -> str:
-    """Return first and last state, and the largest errors of energy and Casimirs."""
+    """Return an HTML table of the first and the last state, and of the spread (maximum minus minimum) of energy and
+    Casimirs."""
     head = ["", "t", *trajectory.coordinates, "energy", *trajectory.casimirs]
     table = trajectory.rows()
     body = [["start", *map(_number, table[0])], ["end", *map(_number, table[-1])]]
@@ -70,7 +71,8 @@ def trajectory_html(trajectory: Trajectory) -> str:
 
 
 def lattice_trajectory_html(trajectory: LatticeTrajectory) -> str:
-    """Return field means and energy of the first and last frame, and the largest errors of energy and Casimirs."""
+    """Return an HTML table of field means and energy at the start and the end, and of the largest changes of energy and
+    Casimirs."""
     changes = trajectory.changes()
     head = ["", "t", *(f"mean {c}" for c in trajectory.coordinates), "energy", *[*changes][1:]]
     body = []

@@ -7,7 +7,7 @@ from phigen.symbolic.readable import readable
 
 
 def as_powers(casimir: Expression) -> str | None:
-    """Return ½ Σ u log x² as ``log|x**u*…|``; None for an expression of another form."""
+    """Return the text ``log|x1**u1*…|`` for a Casimir of the form ½ Σ u_i log x_i²; None for another form."""
     exponents = fold([casimir], _exponents)[0]
     if not exponents or None in exponents:
         return None
@@ -15,12 +15,16 @@ def as_powers(casimir: Expression) -> str | None:
     return f"log|{'*'.join(factors)}|"
 
 
-#: Coefficients of log x² by the name of x; the key None has the constant. None stands for any other expression.
+#: A linear combination of log x_i² as {name of x_i: coefficient}; the key None has the constant term. For an expression
+#: of another form, the value None instead of a dictionary.
 _Sum = dict[str | None, Expression] | None
 
 
 def _exponents(node: Expression, args: list[_Sum]) -> _Sum:
-    """Return a node as a linear combination of logarithms of squares of symbols, or None if it is not one."""
+    """Return a node as a linear combination of logarithms of squares of symbols; None if it is not one.
+
+    ``args`` are the results for the arguments of the node.
+    """
     if any(a is None for a in args) and node.op != "log":
         return None
     parts = [a for a in args if a is not None]

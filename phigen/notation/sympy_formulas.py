@@ -21,10 +21,10 @@ from phigen.symbolic.symbols import STEP, momentum
 class SympyFormulas:
     """Formulas of a method in sympy.
 
-    ``hamiltonian`` is the Hamiltonian that is discretised: H minus λ C for each Casimir C of the gauge, with the
-    multipliers λ in ``gauge``. α and β are n expressions in the coordinates of ``system`` and in ``covector``.
-    ``degree`` is their degree in the covector if they are truncated series, else None. ``series`` has S_1 … S_k, where
-    S_h = Σ h^i S_i.
+    ``hamiltonian`` is the Hamiltonian in the equation of the series: H minus λ C for each Casimir C of the gauge;
+    ``gauge`` has the symbols of the multipliers λ. ``alpha`` and ``beta`` are n expressions each, in the coordinates of
+    ``system`` and the components of ``covector``. If these expressions are truncated series, ``degree`` is the degree
+    in the covector, else None. ``series`` has S_1 … S_k, where S_h = Σ h^i S_i.
     """
 
     system: SympySystem
@@ -38,7 +38,7 @@ class SympyFormulas:
 
 
 class Dictionary:
-    """Symbols of a compilation in sympy, and the translation of its expressions."""
+    """Translator of the expressions of one compilation to sympy, with the sympy symbols of coordinates, covector, …"""
 
     def __init__(self, compilation: Compilation) -> None:
         system, gauge = compilation.system, compilation.gauge
@@ -59,14 +59,17 @@ class Dictionary:
         }
 
     def expression(self, e: Expression, special: Callable[[int, Any], Any] = closed_function) -> Any:
-        """Return an expression in sympy; ``special`` translates φ, as in `to_sympy`."""
+        """Return an expression in sympy.
+
+        ``special(k, s)`` returns the k-th derivative of the function φ of the exponential bi-realisation at s.
+        """
         return to_sympy(e, self._symbols, special)
 
 
 def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyFormulas:
-    """Return the formulas of a compilation, with S_1 … S_terms; ``terms`` is that of the method by default.
+    """Return the formulas of a method by series; ``terms`` is the number of S_i, by default that of the method.
 
-    Raises `SpecError` for a splitting, `LimitError` if the S_i have too many terms to be written out.
+    Raises `SpecError` for another method, such as a splitting, and `LimitError` if the S_i have too many terms.
     """
     if not compilation.has_series:
         raise SpecError(
@@ -99,7 +102,10 @@ def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyF
 def _ends_of_paths(
     compilation: CompiledSeries, dictionary: Dictionary, degree: int
 ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """Return the series of α and of β(x, p) = α(x, −p) up to ``degree`` in p, for a bi-realisation by paths."""
+    """Return the Taylor series in p, up to ``degree``, of α and of β(x, p) = α(x, −p).
+
+    The bi-realisation is one that integrates paths numerically, so that α has no closed form.
+    """
     formal = formal_alpha(compilation.discretised, compilation.realisation, degree + 1)
     parts = closed_form([dictionary.expression(e) for e in formal], dictionary.covector)(degree)
 

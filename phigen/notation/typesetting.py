@@ -1,7 +1,8 @@
 """Formulas in LaTeX, broken into lines: the markup of `phigen.notation.mathml`, with an estimate of its width.
 
-Widths are upper estimates in em for the fonts of TeX. A line breaks before an outer plus or minus sign if this leaves
-no large gap, else before one inside parentheses. It breaks between factors only if no other break fits.
+Widths are upper estimates in em for the fonts of TeX. A line breaks before a plus or minus sign outside parentheses if
+this leaves no large gap at its end, else before a sign inside parentheses. It breaks between factors only if there is
+no sign at which it can break.
 """
 
 from __future__ import annotations
@@ -11,15 +12,15 @@ from dataclasses import dataclass, replace
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-#: Width of a line in em: slightly less than that of the text of an article at 10, 11 and 12 points.
+#: Width of a line in em: slightly less than the text width of the LaTeX class article at 10, 11 and 12 points.
 LINE = 31.0
 #: Indentation of continued lines in LaTeX, and its width in em.
 INDENT, INDENTED = "\\quad ", 1.0
-#: Fraction of a line that may stay empty to avoid a break one level of parentheses deeper.
+#: Fraction of a line that may stay empty if this avoids a break one level deeper inside parentheses.
 _SHORTER = 0.35
-#: Number of levels that is added to the level of a break between factors.
+#: Number of levels by which a break between factors counts as deeper than one before a sign at the same place.
 _FACTORS = 4
-#: Fraction of a line above which a fraction, root or exponent is written inline, so that it can be broken.
+#: A fraction, root or exponent that is wider than this fraction of a line is written inline, so that it can be broken.
 _WIDE = 0.6
 
 _GREEK = {
@@ -43,8 +44,10 @@ _TALL = ("mfrac", "msqrt", "mroot", "mtable")
 
 @dataclass(frozen=True)
 class Atom:
-    """Unbreakable part of a formula. ``level`` is the nesting depth of the possible break before it, None if there
-    is none."""
+    """Part of a formula that is not broken, in LaTeX, with its width in em.
+
+    ``level`` is the depth in parentheses at which a line may break before the part; None if it may not.
+    """
 
     text: str
     width: float
@@ -52,18 +55,20 @@ class Atom:
 
 
 def latex(*markup: str) -> str:
-    """Return elements side by side as LaTeX on one line."""
+    """Return MathML elements, which stand side by side, as LaTeX on one line."""
     return _joined(_atoms(_elements(markup), whole=True))
 
 
 def width(*markup: str) -> float:
-    """Return the estimated width of elements on one line."""
+    """Return the estimated width in em of MathML elements side by side on one line."""
     return _width(_atoms(_elements(markup), whole=True))
 
 
 def lines(markup: Sequence[str], room: float) -> list[str]:
-    """Return elements side by side as lines of LaTeX of at most the width ``room`` in em; `INDENTED` is the
-    indentation of all lines but the first."""
+    """Return MathML elements side by side as lines of LaTeX, each of at most the width ``room`` in em if possible.
+
+    All lines except the first are indented by `INDENTED`, which counts as part of their width.
+    """
     elements = _elements(markup)
     unbroken = _atoms(elements, whole=True)
     if _width(unbroken) <= room:
@@ -78,9 +83,9 @@ def lines(markup: Sequence[str], room: float) -> list[str]:
 
 
 def _end(atoms: Sequence[Atom], begin: int, room: float) -> int:
-    """Return the index after the last atom of the line that begins at ``begin``.
+    """Return the index of the atom before which the line that begins at ``begin`` is broken.
 
-    This is the best break within the width or, if there is none, the first break after it.
+    It is the best place within the width ``room`` or, if there is none, the first possible place after it.
     """
     width_used, best, least = 0.0, len(atoms), float("inf")
     for position in range(begin, len(atoms)):
@@ -118,7 +123,10 @@ def _flattened(elements: Sequence[Element]) -> Iterator[Element]:
 
 
 def _atoms(elements: Sequence[Element], depth: int = 0, *, whole: bool) -> list[Atom]:
-    """Return elements side by side as atoms; ``whole`` forbids breaks."""
+    """Return MathML elements side by side as atoms, inside ``depth`` parentheses.
+
+    ``whole`` says that the line will not be broken, so that wide fractions and exponents need not be written inline.
+    """
     flat, listed_atoms, bars = list(_flattened(elements)), list[Atom](), 0
     tall = _tall_parentheses(flat)
     for position, element in enumerate(flat):
@@ -149,7 +157,7 @@ def _parenthesis(text: str, *, tall: bool, whole: bool) -> Atom:
 
 
 def _tall_parentheses(flat: Sequence[Element]) -> set[int]:
-    """Return the positions of parentheses with tall content."""
+    """Return the positions of those parentheses that enclose a fraction, a root or a matrix."""
     tall, open_positions = set(), list[int]()
     for position, element in enumerate(flat):
         if element.tag == "mo" and element.text == "(":
@@ -189,7 +197,7 @@ def _of_element(element: Element, depth: int, *, called: bool, whole: bool) -> l
 
 
 def _one(elements: Sequence[Element]) -> Atom:
-    """Return elements as one atom, which is never broken."""
+    """Return MathML elements side by side as one atom, which is never broken."""
     atoms = _atoms(elements, whole=True)
     return Atom(_joined(atoms), _width(atoms))
 
@@ -210,7 +218,11 @@ def _identifier(name: str, *, called: bool) -> Atom:
 
 
 def _scripts(kind: str, parts: Sequence[Element], depth: int, *, called: bool, whole: bool) -> list[Atom]:
-    """Return a base with an index or an exponent as atoms; a sum in parentheses and exp of a long sum may be broken."""
+    """Return a base with its index and exponent as atoms.
+
+    A base that is a sum in parentheses may be broken. A power of e with a long exponent becomes exp(…), for the same
+    purpose.
+    """
     base, *scripts = parts
     script_atoms = [_one([s]) for s in scripts]
     if not whole and kind == "msup" and base.text == "e" and script_atoms[0].width > 0.75 * _WIDE * LINE:
@@ -236,13 +248,13 @@ def _fraction(parts: Sequence[Element], depth: int, *, whole: bool) -> list[Atom
 
 
 def _enclosed(elements: Sequence[Element], depth: int) -> list[Atom]:
-    """Return elements in parentheses as atoms."""
+    """Return MathML elements, with parentheses around them, as atoms."""
     tall = any(part.tag in _TALL for e in elements for part in e.iter())
     left, right = (_parenthesis(sign, tall=tall, whole=False) for sign in "()")
     return [left, *_atoms(elements, depth + 1, whole=False), right]
 
 
 def _factor(elements: Sequence[Element], depth: int) -> list[Atom]:
-    """Return elements as the atoms of a factor, with parentheses around a sum."""
+    """Return MathML elements as the atoms of a factor of a product: a sum gets parentheses."""
     atoms = _atoms(elements, depth, whole=False)
     return _enclosed(elements, depth) if any(a.level == depth for a in atoms) else atoms

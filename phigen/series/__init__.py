@@ -1,1 +1,1 @@
-"""Generating functions: the Hamilton–Jacobi series of a Hamiltonian in a bi-realisation."""
+"""Generating functions of the steps: the Hamilton–Jacobi series of H, and the modified Hamiltonian of a method."""

@@ -7,12 +7,13 @@ S_t solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 0, hence S_1 = H and
 The S_i of the paper (section 4, step 1) have an additional factor i!. In a symmetric bi-realisation, β(x, p) = α(x,
 −p), every S_i of even index vanishes. The recursion uses this, and `residual` proves it on demand.
 
-For H(τ, x), the time τ and its conjugate e, {τ, e} = 1, are added in the midpoint realisation, and H is replaced by H +
-e. The generating function is t e + S_t(τ, x), where S_t does not contain e:
+If H depends on a time τ, then τ and its conjugate variable e, with {τ, e} = 1, are added to the coordinates, with the
+midpoint rule as their bi-realisation, and H(τ, x) is replaced by H(τ, x) + e. The generating function is then
+t e + S_t(τ, x), where S_t does not contain e and τ is the time in the middle of the step:
 
-    ∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t,    S_0 = 0,
+    ∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t,    S_0 = 0.
 
-where τ is the time in the middle of the step. So the time is one more variable of the series, and
+So the time is one more variable of the series, and
 
     (i+1) S_{i+1} = coefficient of t^i in H(τ − t/2, α(x, ∇(S_1 t + … + S_i t^i))) + ½ ∂_τ S_i t^i.
 """
@@ -34,17 +35,21 @@ from phigen.symbolic.symbols import momentum
 from phigen.symbolic.taylor import ExpressionRing, Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 
-#: Largest number of monomials of a gradient ∇S_i. With the Hessian, 4.3 to 10 operations were measured for each
-#: monomial.
+#: Largest number of monomials of a gradient ∇S_i. In generated code, 4.3 to 10 operations were measured for each of
+#: these monomials, those of the Hessian included.
 MOST_SLOPES = limits.OPERATIONS // 4
 
-#: Index i from which the sizes of S_1 … S_i predict those of later terms, which grow like a power of i.
+#: From S_7 on, the sizes of the terms computed so far predict the sizes of later terms, which grow like a power of the
+#: index.
 FORESEEN = 7
 
 
 @dataclass(frozen=True)
 class PolynomialSeries:
-    """S_1 … S_k as elements of a tower over coordinates and parameters; ``terms[i]`` is S_{i+1}."""
+    """S_1 … S_k as elements of a tower, a ring of polynomials in coordinates, parameters and values of functions.
+
+    ``terms[i]`` is S_{i+1}.
+    """
 
     tower: Tower
     terms: tuple[Poly, ...]
@@ -58,9 +63,10 @@ def composed(hamiltonian: Expression, coordinates: Sequence[str], alpha: Sequenc
 def series_tower(
     target: Expression, coordinates: Sequence[str], parameters: Sequence[str], times: Sequence[str] = ()
 ) -> Tower:
-    """Return the smallest tower that contains the series of H∘α, from the nodes of H∘α at p = 0.
+    """Return the smallest tower (ring) that contains all S_i, for ``target`` = H(α(x, p)).
 
-    ``times`` has the symbol of the time, if H depends on it; this symbol is also among the ``parameters``.
+    Its generators are the functions in H(α(x, p)) at p = 0. If H depends on the time, ``times`` has the symbol of the
+    time, which is also one of the ``parameters``.
     """
     at_zero = substitute(closure([target]), {momentum(c): ZERO for c in coordinates})
     return Tower([*coordinates, *parameters], at_zero, [*coordinates, *times])
@@ -76,9 +82,10 @@ def polynomial_series(
     symmetric: bool,
     times: Sequence[str] = (),
 ) -> PolynomialSeries:
-    """Return S_1 … S_terms in a tower (exact rational arithmetic, symbolic parameters).
+    """Return S_1 … S_terms as polynomials, in exact rational arithmetic with symbolic parameters.
 
-    ``times`` is as for `series_tower`. Raises `OverflowError` if a term has more than `limits.SERIES_TERMS` monomials.
+    If H depends on the time, ``times`` has the symbol of the time. Raises `OverflowError` if a term has more than
+    `limits.SERIES_TERMS` monomials.
     """
     recursion = _polynomial_recursion(hamiltonian, alpha, coordinates, parameters, symmetric, times)
     return PolynomialSeries(recursion.ring, recursion.first(terms))
@@ -92,16 +99,16 @@ def graph_series(
     *,
     symmetric: bool,
 ) -> tuple[Expression, ...]:
-    """Return S_1 … S_terms as one shared expression graph, which is never expanded."""
+    """Return S_1 … S_terms as expressions, which share subexpressions; products are not multiplied out."""
     return _graph_recursion(hamiltonian, alpha, coordinates, symmetric).first(terms)
 
 
 class HamiltonJacobi:
-    """S_1, S_2, … of one Hamiltonian in one bi-realisation, each computed once, on first use.
+    """S_1, S_2, … of one Hamiltonian in one bi-realisation. Each term is computed when it is first requested.
 
-    ``alpha`` returns the map α up to the degree in p that S_1 … S_n need, for a number n of terms; see `reach`.
-    ``static`` are the parameters and the other symbols of the tower, ``times`` the symbol of the time, if H depends on
-    it.
+    ``alpha(n)`` returns the map α(x, p), exactly or up to the degree in p that S_1 … S_n need; ``max_terms`` is the
+    first n. ``static`` are the parameters and other constants in H and α; ``times`` has the symbol of the time, if H
+    depends on it.
     """
 
     def __init__(
@@ -121,16 +128,16 @@ class HamiltonJacobi:
 
     @cached_property
     def alpha(self) -> tuple[Expression, ...]:
-        """The map α from which the terms are computed."""
+        """Components of the map α(x, p) from which the terms are computed."""
         return tuple(self._source(self._most))
 
     def polynomial(self, terms: int) -> PolynomialSeries:
-        """Return S_1 … S_terms in a tower. Raises `OverflowError` as `polynomial_series` does."""
+        """Return S_1 … S_terms as polynomials. Raises the errors of `polynomial_series`."""
         self.reach(terms)
         return PolynomialSeries(self._polynomials.ring, self._polynomials.first(terms))
 
     def written(self, terms: int) -> PolynomialSeries:
-        """Return S_1, S_2, … up to S_terms in a tower, but only those before the first term that is too large."""
+        """Return S_1, S_2, … as polynomials, up to S_terms or to the last one before a term that is too large."""
         with suppress(OverflowError):
             return self.polynomial(terms)
         with suppress(OverflowError):
@@ -138,14 +145,15 @@ class HamiltonJacobi:
         return PolynomialSeries(series_tower(ZERO, self.coordinates, self.static, self.times), ())
 
     def graph(self, terms: int) -> tuple[Expression, ...]:
-        """Return S_1 … S_terms as one shared expression graph, which is never expanded."""
+        """Return S_1 … S_terms as expressions, which share subexpressions; products are not multiplied out."""
         self.reach(terms)
         return self._graphs.first(terms)
 
     def reach(self, terms: int) -> None:
-        """Announce the number of terms before the first is computed.
+        """Prepare for the computation of S_1 … S_terms: if α is a series in p of too low a degree, extend it.
 
-        If α is a series in p of too low degree, the computation starts again.
+        Terms that were computed from the shorter series are then dropped. A call before the first term is computed
+        avoids that they are computed twice.
         """
         if terms <= self._most:
             return
@@ -189,9 +197,9 @@ def _graph_recursion(
 
 
 class _Recursion:
-    """The recursion in a ring, term by term: ``target`` is H(α(x, p)).
+    """The recursion that computes S_1, S_2, … as elements of ``ring``; ``target`` is H(α(x, p)).
 
-    ``slope`` returns the derivatives of a term with respect to some symbols.
+    ``slope(S, names)`` returns the derivatives of S with respect to the symbols ``names``.
     """
 
     def __init__(
@@ -211,13 +219,11 @@ class _Recursion:
         self._zero = ring.constant(0)
         self._found: list[Any] = []
         self._overflow: OverflowError | None = None
-        self._sizes: dict[int, int] = {}  # i → number of monomials of ∇S_i
+        self._sizes: dict[int, int] = {}  # number of monomials of ∇S_i, by i
 
     def first(self, terms: int) -> tuple[Any, ...]:
-        """Return S_1 … S_terms.
-
-        An `OverflowError` is final: later requests for terms beyond the last computed one raise it again.
-        """
+        """Return S_1 … S_terms. Raises `OverflowError` if a term is too large, then at each later call that needs
+        it."""
         while len(self._found) < terms:
             if self._overflow:
                 raise self._overflow
@@ -231,11 +237,11 @@ class _Recursion:
 
     @property
     def good(self) -> tuple[Any, ...]:
-        """The terms of the series that have been computed."""
+        """Terms S_1, S_2, … that have been computed so far."""
         return tuple(self._found)
 
     def _expect_small(self, terms: int) -> None:
-        """Raise `OverflowError` if the sizes so far predict that ∇S_terms is too large to evaluate."""
+        """Raise `OverflowError` if the sizes of the gradients so far predict more than `MOST_SLOPES` for ∇S_terms."""
         *_, previous, latest = [0, 0, *self._sizes]
         if latest < FORESEEN or previous == 0:
             return
@@ -263,7 +269,10 @@ class _Recursion:
 
 
 def beginning(ring: Any, times: Sequence[str], i: int) -> dict[str, Any]:
-    """Return the coefficient of t^i in τ − t/2, the time at the beginning of a step of size t, by the symbol of τ."""
+    """Return the coefficient of t^i in τ − t/2, the time at the beginning of a step of size t, as {symbol of τ: value}.
+
+    The dictionary is empty if ``times`` is, so that H does not depend on the time.
+    """
     values = {0: ring.variable, 1: lambda _: ring.constant(Fraction(-1, 2))}
     return {t: values.get(i, lambda _: ring.constant(0))(t) for t in times}
 
@@ -277,8 +286,8 @@ def residual(
 ) -> list[Poly]:
     """Return the coefficients of t^0 … t^(k−1) in ∂_t S_t − H(α(x, ∇S_t)).
 
-    All are 0 if S_1 … S_k solve the equation. With a time τ, they are those of ∂_t S_t − H(τ − t/2, α(x, ∇S_t)) − ½ ∂_τ
-    S_t.
+    All coefficients are 0 if S_1 … S_k are correct. If H depends on a time τ, they are the coefficients of
+    ∂_t S_t − H(τ − t/2, α(x, ∇S_t)) − ½ ∂_τ S_t.
     """
     target = composed(hamiltonian, coordinates, alpha)
     tower, momenta = series.tower, [momentum(c) for c in coordinates]

@@ -1,15 +1,16 @@
 """Backward error analysis: the modified Hamiltonian, whose exact flow is the step.
 
-The map of step h is the time-h flow of a formal series H̃_h = H_0 + h H_1 + h² H_2 + …, H_0 = H. The H_j follow from a
-condition: the full Hamilton–Jacobi transform of H̃_h at time h is the truncated S_h = h S_1 + … + h^k S_k of the
-method. With the time written σh, the transform S(σ) = Σ h^r s_r(σ) of H̃_h solves
+A step of size h is the flow, over the time h, of a formal series H̃_h = H_0 + h H_1 + h² H_2 + … with H_0 = H. The H_j
+follow from a condition: the generating function of H̃_h, the solution of the Hamilton–Jacobi equation without
+truncation, is at the time h the generating function S_h = h S_1 + … + h^k S_k of the method. At the time σh, 0 ≤ σ ≤ 1,
+the solution for H̃_h is S(σ) = Σ h^r s_r(σ) with
 
-    ∂_σ s_r = coefficient of h^(r−1) in H̃_h(α(x, ∇S(σ))) = H_{r−1} + known terms,    s_r(0) = 0,
+    ∂_σ s_r = coefficient of h^(r−1) in H̃_h(α(x, ∇S(σ))) = H_{r−1} + known terms,    s_r(0) = 0.
 
-and s_r(1) is S_r for r ≤ k and 0 for r > k: one linear equation for each H_{r−1}. The first correction is −h^k S_{k+1}.
-In a symmetric bi-realisation H̃_h is even in h. If H depends on a time τ, so does H̃_h: on the right it is evaluated at
-τ − σh/2, and ½ ∂_τ s_(r−1) is added, as in `phigen.series.hamilton_jacobi`. See section 6 of E. Hairer, C. Lubich, G.
-Wanner, Geometric Numerical Integration, chapter IX, for generating functions on canonical structures.
+The condition is s_r(1) = S_r for r ≤ k and s_r(1) = 0 for r > k, a linear equation for each H_{r−1}. The first
+correction is −h^k S_{k+1}. In a symmetric bi-realisation H̃_h is even in h. If H depends on a time τ, so does H̃_h: on
+the right it is evaluated at τ − σh/2, and ½ ∂_τ s_(r−1) is added, as in `phigen.series.hamilton_jacobi`. For canonical
+structures, see E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, chapter IX.
 """
 
 from __future__ import annotations
@@ -25,16 +26,16 @@ from phigen.symbolic.symbols import Symbol, momentum
 from phigen.symbolic.taylor import Taylor
 from phigen.symbolic.tower import Poly, Tower
 
-#: Symbol of the fraction σ of the step.
+#: Symbol of σ, the time as a fraction of the step.
 FRACTION = Symbol("sigma")
 
-#: Largest number of monomials of a correction; larger ones are not computed.
+#: Largest number of monomials of a correction H_j; if a correction has more, the computation ends with an error.
 MOST_TERMS = 5_000
 
 
 @dataclass(frozen=True)
 class ModifiedSeries:
-    """H_0, H_1, … of the modified Hamiltonian H̃_h = Σ h^j H_j, as elements of a tower; ``terms[j]`` is H_j."""
+    """H_0, H_1, … of the modified Hamiltonian H̃_h = Σ h^j H_j, as elements of a tower (ring); ``terms[j]`` is H_j."""
 
     tower: Tower
     terms: tuple[Poly, ...]
@@ -51,8 +52,9 @@ def modified_series(
     symmetric: bool,
     times: Sequence[str] = (),
 ) -> ModifiedSeries:
-    """Return H_0 … H_power of the method with S_1 … S_terms; α must be correct up to degree ``power`` in p.
+    """Return the coefficients H_0 … H_power of the modified Hamiltonian of the method whose step uses S_1 … S_terms.
 
+    ``alpha`` must be correct up to degree ``power`` in p; ``times`` has the symbol of the time, if H depends on it.
     Raises `OverflowError` if a correction has more than `MOST_TERMS` monomials.
     """
     symbols = [*parameters, FRACTION, *times]
@@ -66,7 +68,10 @@ def modified_series(
 
 
 class _ModifiedRecursion:
-    """The state of the recursion: H_0 … H_{r−1}, and the derivatives of s_1 … s_r with respect to the coordinates."""
+    """The recursion for H_0, H_1, …, with its results so far: ``terms`` are H_0 … H_{r−1}.
+
+    ``slopes`` are the derivatives of s_0 = 0, s_1, …, s_r with respect to the coordinates.
+    """
 
     def __init__(
         self,
@@ -77,7 +82,7 @@ class _ModifiedRecursion:
     ) -> None:
         self.tower, self.kept = generating.tower, generating.terms
         self.alpha, self.coordinates, self.times = alpha, coordinates, times
-        self.last = self.tower.zero  # s_(r−1)
+        self.last = self.tower.zero  # the last s_r, at first s_0 = 0
         self.momenta = [momentum(c) for c in coordinates]
         self.terms: list[Poly] = []
         self.slopes: list[list[Poly]] = [[self.tower.zero] * len(coordinates)]
@@ -114,7 +119,7 @@ class _ModifiedRecursion:
         self.composed.append((target, Taylor([target], self.tower, [*self.momenta, *self.times])))
 
     def _level(self, j: int, level: int) -> Poly:
-        """Return the coefficient of h^level in H_j(α(x, ∇S(σ)))."""
+        """Return the coefficient of h^level in H_j(α(x, ∇S(σ))), a polynomial in σ."""
         pair = self.composed[j]
         if pair is None:
             return self.tower.zero
@@ -125,12 +130,12 @@ class _ModifiedRecursion:
         return taylor.coefficients(target)[level]
 
     def _beginning(self, k: int) -> dict[str, Poly]:
-        """Return the coefficient of h^k in τ − σh/2, by the symbol of τ."""
+        """Return the coefficient of h^k in τ − σh/2 as {symbol of τ: value}; {} if H does not depend on the time."""
         shift = self.tower.variable(FRACTION) * self.tower.constant(Fraction(-1, 2))
         return {t: self.tower.variable(t) if k == 0 else shift if k == 1 else self.tower.zero for t in self.times}
 
     def _integral(self, element: Poly) -> Poly:
-        """Return the integral of an element from 0 to σ."""
+        """Return the integral of an element, a polynomial in σ, from 0 to σ."""
         integrated: dict[Any, Any] = {}
         for m, c in element.to_dict().items():
             e = int(m[self.fraction]) + 1
@@ -138,7 +143,7 @@ class _ModifiedRecursion:
         return self.tower.context.from_dict(integrated)
 
     def _at_one(self, element: Poly) -> Poly:
-        """Return the element at σ = 1."""
+        """Return the value of an element, a polynomial in σ, at σ = 1."""
         collected: dict[Any, Any] = {}
         for m, c in element.to_dict().items():
             key = (*m[: self.fraction], 0, *m[self.fraction + 1 :])

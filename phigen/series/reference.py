@@ -1,5 +1,4 @@
-"""The Hamilton–Jacobi series derived a second time, by sympy alone: a page to be read together with
-docs/mathematics.md.
+"""Second derivation of the Hamilton–Jacobi series, by sympy alone, to check the compiler.
 
 S_t(x) = t S_1 + t² S_2 + … solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 0. Taylor's formula, applied twice, yields
 
@@ -7,13 +6,14 @@ S_t(x) = t S_1 + t² S_2 + … solves ∂_t S_t(x) = H(α(x, ∇S_t(x))), S_0 = 
     Δ(t) = α(x, p(t)) − x   = Σ_μ a_μ(x) p(t)^μ,    a_μ = ∂_p^μ α(x, 0)/μ!,
     ∂_t S_t = H(x + Δ(t))   = Σ_ν H_ν(x) Δ(t)^ν,    H_ν = ∂_x^ν H(x)/ν!,
 
-with multi-indices μ ≠ 0 and ν. The coefficients of t^i are (i + 1) S_{i+1} on the left, and on the right a polynomial
-in a_μ, H_ν and ∇S_1 … ∇S_i with |μ|, |ν| ≤ i, since p(t) and Δ(t) begin with t.
+with multi-indices μ ≠ 0 and ν. The coefficient of t^i in the last equation is (i + 1) S_{i+1} on the left. On the right
+it is a polynomial in a_μ, H_ν and ∇S_1 … ∇S_i with |μ|, |ν| ≤ i, since the series p(t) and Δ(t) begin with t.
 
-If H depends on a time τ, ∂_t S_t(τ, x) = H(τ − t/2, x + Δ(t)) + ½ ∂_τ S_t: the time is one more variable of Taylor's
-formula, with Δ_τ(t) = −t/2.
+If H depends on a time τ, the equation is ∂_t S_t(τ, x) = H(τ − t/2, x + Δ(t)) + ½ ∂_τ S_t. The time is then one more
+variable of Taylor's formula, with Δ_τ(t) = −t/2.
 
-This derivation shares no code with the compiler: neither the ring, nor derivatives, nor the arithmetic of series.
+This derivation shares no code with the compiler: it has its own ring, derivatives and arithmetic of series. The
+notation is that of docs/mathematics.md.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ import sympy
 
 from phigen.series.reference_functions import Functions, derivative, expanded
 
-#: A multi-index, one exponent for each variable.
+#: A multi-index, a tuple with one exponent for each variable.
 Index = tuple[int, ...]
 
-#: The coefficients of Taylor's formula.
+#: Coefficients of a polynomial or a Taylor expansion in several variables, by multi-index.
 Coefficients = Mapping[Index, Any]
 
-#: Function that returns the a_μ of α_1 … α_n with 0 < |μ| ≤ a degree.
+#: Function of a degree d that returns, for each component of α, the coefficients a_μ with 0 < |μ| ≤ d.
 Source = Callable[[int], Sequence[Coefficients]]
 
 
 def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], times: Sequence[Any] = ()) -> Iterator[Any]:
     """Yield S_1, S_2, … without end, as sympy expressions in x and the parameters.
 
-    ``hamiltonian`` is H. ``source`` returns the a_μ, as those of `closed_form` and `phigen.series.reference_paths`.
-    ``times`` contains the time, if H depends on it.
+    ``source`` returns the Taylor coefficients a_μ of α in p; `closed_form` and `phigen.series.reference_paths` make
+    such functions. ``times`` has the symbol of the time, if H depends on it.
     """
     terms: list[Any] = []
     while True:
@@ -50,7 +50,10 @@ def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], time
 
 
 def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
-    """Return the a_μ of expressions in x and p that are regular at p = 0 as they are written."""
+    """Return the source of the Taylor coefficients a_μ of α, given by expressions in x and p.
+
+    The expressions must be defined at p = 0 as they are written: they may contain no quotient such as sin(p)/p.
+    """
 
     @cache
     def source(degree: int) -> list[dict[Index, Any]]:
@@ -60,7 +63,7 @@ def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
 
 
 def _at_origin(f: Any, p: Sequence[Any], degree: int) -> dict[Index, Any]:
-    """Return ∂_p^μ f/μ! at p = 0; for a polynomial in p, these are its coefficients."""
+    """Return the Taylor coefficients ∂_p^μ f/μ! at p = 0 for |μ| ≤ degree; all coefficients of a polynomial in p."""
     functions = Functions([f, *p])
     if not any(g.has(*p) for g in functions if g not in p):
         return {m: functions.expression(c) for m, c in functions.split(functions.element(f), p).items()}
@@ -68,7 +71,7 @@ def _at_origin(f: Any, p: Sequence[Any], degree: int) -> dict[Index, Any]:
 
 
 def taylor(f: Any, variables: Sequence[Any], degree: int) -> dict[Index, Any]:
-    """Return ∂^μ f/μ! for |μ| ≤ degree, by μ; zeros are left out."""
+    """Return the Taylor coefficients ∂^μ f/μ! for |μ| ≤ degree, as expressions, by μ; zeros are left out."""
     n = len(variables)
     level: dict[Index, Any] = {(0,) * n: f}
     result = dict(level)
@@ -76,7 +79,7 @@ def taylor(f: Any, variables: Sequence[Any], degree: int) -> dict[Index, Any]:
         raised = {}
         for index, g in level.items():
             last = max((k for k in range(n) if index[k]), default=0)
-            for k in range(last, n):  # each multi-index is reached once, along its variables in order
+            for k in range(last, n):  # only variables from the last one on: so each multi-index occurs once
                 slope = derivative(g, variables[k]) / (index[k] + 1)
                 if slope != 0:
                     raised[_raised(index, k, 1)] = slope
@@ -95,7 +98,8 @@ def _coefficient(
 ) -> Any:
     """Return the coefficient of t^i in Σ_ν H_ν Δ(t)^ν + ½ ∂_τ S_t.
 
-    Here Δ(t) = Σ_μ a_μ p(t)^μ, p(t) = Σ_j t^j ∇S_j, and Δ_τ(t) = −t/2.
+    Here Δ(t) = Σ_μ a_μ p(t)^μ, p(t) = Σ_j t^j ∇S_j, and Δ_τ(t) = −t/2. ``energy`` has the H_ν, ``source`` the a_μ of
+    each component, ``terms`` S_1 … S_i.
     """
     slopes = [[derivative(s, c) for s in terms] for c in x]
     operands = [*energy.values(), *(a for d in source for a in d.values()), *(g for row in slopes for g in row)]
@@ -110,12 +114,15 @@ def _coefficient(
     coefficient = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
     zero = functions.seems_zero(coefficient) and functions.vanishes(
         coefficient
-    )  # terms of even index vanish in a symmetric bi-realisation
+    )  # the test is for symmetric bi-realisations, in which S_i = 0 for even i
     return sympy.Integer(0) if zero else functions.expression(coefficient)
 
 
 class Series:
-    """Power series u_1, …, u_n that begin with t; ``coefficient(k, j)`` is the coefficient of t^j in u_k."""
+    """Power series u_1(t), …, u_n(t) without constant term, with coefficients in the ring ``functions``.
+
+    ``coefficient(k, j)`` returns the coefficient of t^j in the series number k, from 0.
+    """
 
     def __init__(self, functions: Functions, coefficient: Callable[[int, int], Any]) -> None:
         self._functions = functions
@@ -123,12 +130,15 @@ class Series:
         self._power = cache(self._product)
 
     def combined(self, coefficients: Coefficients, j: int) -> Any:
-        """Return the coefficient of t^j in Σ_μ c_μ u(t)^μ."""
+        """Return the coefficient of t^j in Σ_μ c_μ u(t)^μ, where ``coefficients`` has the c_μ."""
         element = self._functions.element
         return self._functions.total(element(c) * self._power(mu, j) for mu, c in coefficients.items() if sum(mu) <= j)
 
     def _product(self, mu: Index, j: int) -> Any:
-        """Return the coefficient of t^j in u(t)^μ: a sum over the power of t that one factor contributes."""
+        """Return the coefficient of t^j in u(t)^μ.
+
+        One factor u_k is split off: the sum is over the power of t that this factor contributes.
+        """
         if not any(mu):
             return self._functions.ring(int(j == 0))
         k = next(k for k, e in enumerate(mu) if e)

@@ -1,10 +1,12 @@
 """The axioms of a bi-realisation, up to a degree in p, proved a second time by sympy.
 
-With α = x + Σ_μ a_μ(x) p^μ, β likewise, and {x_i, p_j} = δ_ij, the parts of degree m < d of
+Let α = x + Σ_μ a_μ(x) p^μ and β = x + Σ_μ b_μ(x) p^μ, with the canonical brackets {x_i, p_j} = δ_ij. The parts of
+degree m < d in p of
 
     {α_i, α_j} − π_ij∘α,    {β_i, β_j} + π_ij∘β,    {α_i, β_j}
 
-are polynomials in a_μ, b_μ and their derivatives with |μ| ≤ d, and in the π_ν of Taylor's formula for π.
+must vanish. They are polynomials in the a_μ and b_μ with |μ| ≤ d, in their derivatives, and in the Taylor coefficients
+∂^ν π/ν! of π.
 """
 
 from __future__ import annotations
@@ -25,9 +27,9 @@ def defects(
     p: Sequence[Any],
     d: int,
 ) -> Iterator[tuple[str, Any]]:
-    """Yield the parts that do not reduce to 0, each with its name; ``poisson`` is the matrix π(x).
+    """Yield the parts of the axioms that do not reduce to 0, as pairs of a name and an expression.
 
-    ``alpha`` and ``beta`` are the a_μ and b_μ with 0 < |μ| ≤ d.
+    ``poisson`` is the matrix π(x). ``alpha`` and ``beta`` have for each component the a_μ and b_μ with 0 < |μ| ≤ d.
     """
     n = len(x)
     tensor = {(i, j): taylor(poisson[i, j], x, d - 1) for i in range(n) for j in range(i)}
@@ -45,7 +47,7 @@ def defects(
 
 
 class _Parts:
-    """The maps α and β by degree in p, with their derivatives, as elements of one ring."""
+    """The components of α and β, split into parts by degree in p, and their derivatives, as elements of one ring."""
 
     def __init__(
         self, maps: Sequence[Coefficients], parameters: Sequence[Any], x: Sequence[Any], p: Sequence[Any]
@@ -59,7 +61,7 @@ class _Parts:
         self._known: dict[tuple[int, int, int | None], Any] = {}
 
     def deviation(self, first: int) -> Series:
-        """Return α − x or β − α as a series in the degree in p; ``first`` is the index of the first component."""
+        """Return α − x for ``first`` = 0, or β − x for ``first`` = n, as power series whose powers are degrees in p."""
         return Series(self.functions, lambda k, m: self._part(first + k, m))
 
     def bracket(self, f: int, g: int, degree: int) -> Any:
@@ -73,7 +75,7 @@ class _Parts:
         return self.functions.total(terms)
 
     def _part(self, f: int, degree: int, c: int | None = None) -> Any:
-        """Return the part of a given degree in p of a map, or of its derivative with respect to x_c."""
+        """Return the part of a given degree in p of component ``f`` or, with ``c``, of its derivative by x_c."""
         key = (f, degree, c)
         if key not in self._known:
             series_of_component = self._maps[f] if c is None else self._slopes[f][c]
@@ -87,5 +89,5 @@ class _Parts:
         return prod(powers, start=self.functions.ring(1))
 
     def _covector_slope(self, f: int, degree: int, c: int) -> Any:
-        """Return ∂f/∂p_c of the part of a given degree of a map."""
+        """Return the derivative by p_c of the part of a given degree in p of component ``f``."""
         return self._part(f, degree).diff(self.functions.element(self._p[c]))

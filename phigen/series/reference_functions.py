@@ -1,7 +1,8 @@
-"""Polynomials in functions, by sympy: the arithmetic of the second derivation, and its proofs that an expression is 0.
+"""Arithmetic of polynomials in functions, by sympy, for the second derivation of the series, which checks the compiler.
 
-A *function* is a factor of monomials: x, a parameter, exp(x), sin(x), π, and the powers 1/b, b^{1/q} and b^{cx}. Powers
-whose exponent is a sum become products, as do tan u = sin u/cos u, tanh u = sinh u/cosh u and |u| = u sign u.
+A *function* is a variable of these polynomials: x, a parameter, exp(x), sin(x), π, or a power 1/b, b^{1/q} or b^{cx}. A
+power whose exponent is a sum becomes a product of powers. Likewise tan u becomes sin u/cos u, tanh u becomes sinh
+u/cosh u, and |u| becomes u sign u.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import mpmath
 import sympy
 from sympy.polys.rings import ring
 
-#: Largest number of terms of a polynomial; above it the derivation ends, since the next product would take minutes.
+#: Largest number of terms of a polynomial. If it is exceeded, the derivation ends with an error, since the next product
+#: would take minutes.
 MOST_TERMS = 200_000
 
 _DIGITS = 50
@@ -28,11 +30,11 @@ _QUOTIENTS = {
 
 
 class Sign(sympy.Function):  # type: ignore[misc]
-    """The sign of u, whose derivative is 0. The derivative of sympy's own function has a Dirac delta."""
+    """The function sign(u), with derivative 0. The derivative of the function sign of sympy has a Dirac delta."""
 
     @classmethod
     def eval(cls, u: Any) -> Any:
-        """Simplify: sign(−u) = −sign(u), and the sign of a number is a number."""
+        """Return sign(u) if u is a number, −sign(−u) if u has a minus sign; None leaves sign(u) as it is."""
         if u.is_number:
             return sympy.sign(u)
         return -cls(-u) if u.could_extract_minus_sign() else None
@@ -43,7 +45,7 @@ class Sign(sympy.Function):  # type: ignore[misc]
 
 
 def derivative(f: Any, variable: Any) -> Any:
-    """Return ∂f/∂x."""
+    """Return the partial derivative of a sympy expression, with the function `Sign` in place of |u| and sign u."""
     if f.has(sympy.Abs, sympy.sign):
         f = f.replace(sympy.Abs, lambda u: u * Sign(u)).replace(sympy.sign, Sign)
     return sympy.diff(f, variable)
@@ -65,7 +67,7 @@ class Functions:
         return iter(self._generators)
 
     def element(self, e: Any) -> Any:
-        """Return an expression as a polynomial in the functions."""
+        """Return a sympy expression as an element of the ring, a polynomial in the functions."""
         if e not in self._known:
             self._known[e] = self._element(e)
         return self._known[e]
@@ -80,7 +82,7 @@ class Functions:
         return prod((self.element(f) ** n for f, n in _factors(e)), start=self.ring.one)
 
     def expression(self, element: Any) -> Any:
-        """Return a polynomial as an expression, in which sympy cancels x · (1/x)."""
+        """Return an element of the ring as a sympy expression; sympy cancels products such as x · (1/x)."""
         return element.as_expr().xreplace(self._written)
 
     def total(self, elements: Iterable[Any]) -> Any:
@@ -94,7 +96,7 @@ class Functions:
         return self.ring.from_dict({monomial: c for monomial, c in result.items() if c})
 
     def split(self, element: Any, variables: Sequence[Any]) -> dict[tuple[int, ...], Any]:
-        """Return the coefficients of the monomials in some of the functions, by their exponents."""
+        """Return an element as a polynomial in some of the functions: {exponents: coefficient, an element}."""
         positions = [self.ring.gens.index(self._generators[f]) for f in variables]
         parts: dict[tuple[int, ...], dict[Any, Any]] = {}
         for m, c in element.items():
@@ -103,11 +105,13 @@ class Functions:
         return {mu: self.ring.from_dict(part) for mu, part in parts.items()}
 
     def vanishes(self, element: Any) -> bool:
-        """Return whether the element is proved to be 0 where it is defined.
+        """Return whether the element is proved to be 0 wherever it is defined.
 
-        False says only that the relations between the functions do not reduce it to 0.
+        False is no proof of the contrary: the relations between the functions did not reduce the element to 0.
         """
-        for f in reversed(self._generators):  # a relation refers to earlier generators only
+        for f in reversed(
+            self._generators
+        ):  # in reverse order, since the relation of f contains earlier functions only
             relation = _relation(f)
             if relation is None:
                 continue
@@ -116,15 +120,15 @@ class Functions:
             if set(parts) <= {0}:
                 continue
             generator, g = self._generators[f], self.element(value)
-            if power < 0:  # f g = 1, so a multiple of g has no f
+            if power < 0:  # f = 1/g: multiplication of the element by a power of g removes f
                 top = max(parts)
                 element = self.total(c * g ** (top - e) for e, c in parts.items())
-            else:  # f^power = g
+            else:  # f^power = g: higher powers of f are replaced by powers of g
                 element = self.total(c * generator ** (e % power) * g ** (e // power) for e, c in parts.items())
         return bool(element == 0)
 
     def seems_zero(self, element: Any) -> bool:
-        """Whether the element is 0 at one point: a fast test that proves nothing."""
+        """Whether the value of the element at one point is 0 up to rounding: a fast test, which proves nothing."""
         symbols = sorted(set().union(*(f.free_symbols for f in self._generators)), key=str)
         point = [sympy.Rational(7 + 3 * k, 5 + 2 * k) for k in range(len(symbols))]
         with mpmath.workdps(_DIGITS):
@@ -145,7 +149,7 @@ def _monomial(values: Sequence[Any], exponents: Sequence[int]) -> Any:
 
 @lru_cache(maxsize=4096)
 def expanded(e: Any) -> Any:
-    """Return an expression as a sum of products of functions."""
+    """Return a sympy expression, multiplied out as a sum of products of functions."""
     if e.is_Atom:
         return e
     functions = Functions([e])
@@ -153,7 +157,7 @@ def expanded(e: Any) -> Any:
 
 
 def _list_functions(expressions: Iterable[Any], functions: dict[Any, None]) -> None:
-    """Add the functions that occur, each after those that its relation refers to."""
+    """Add the functions that occur in the expressions to ``functions``, each after the functions in its relation."""
     for e in expressions:
         if e in functions or e.is_Rational:
             continue
@@ -181,7 +185,7 @@ def _relation(f: Any) -> tuple[int, Any] | None:
 
 
 def _factors(e: Any) -> list[tuple[Any, int]]:
-    """Return the factors of an expression, as pairs of an expression and its power; a function is its only factor."""
+    """Return the factors of an expression as pairs (factor, exponent). For a function f, the result is [(f, 1)]."""
     if e.is_Mul:
         return [(a, 1) for a in e.args]
     if isinstance(e, sympy.Abs | sympy.sign):
@@ -198,7 +202,10 @@ def _factors(e: Any) -> list[tuple[Any, int]]:
 
 
 def _powers(base: Any, exponent: Any) -> list[tuple[Any, int]]:
-    """Return the factors of base^exponent; the bases of functions have coprime coefficients."""
+    """Return the factors of base^exponent as pairs (factor, exponent).
+
+    A common factor of the coefficients of the base is split off, so that equal powers have equal bases.
+    """
     c, m = exponent.as_coeff_Mul(rational=True)
     if m != 1:
         return [(base ** (sympy.sign(c) * m / c.q), abs(int(c.p)))]

@@ -1,11 +1,12 @@
-"""α and β of Karasev's construction, derived a second time by sympy: the path ṁ = π(m)p about its mean.
+"""Second derivation, by sympy, of the maps α and β of Karasev's bi-realisation, to check the compiler.
 
-For 0 ≤ s ≤ 1 and constant p, let x be the mean of the path, and m(s) = x + m_1(s) + m_2(s) + …, m_k of degree k in p:
+For constant p, a path m(s), 0 ≤ s ≤ 1, solves dm/ds = π(m)p. Let x be its mean, and m(s) = x + m_1(s) + m_2(s) + … with
+m_k of degree k in p. Then
 
-    dm_k/ds = part of degree k of π(m)p = Σ_ν π_ν(x)p (m_1 + … + m_{k−1})^ν,    π_ν = ∂^ν π(x)/ν!,
+    dm_k/ds = part of degree k of Σ_ν π_ν(x)p (m_1 + … + m_{k−1})^ν,    π_ν = ∂^ν π(x)/ν!,
     ∫₀¹ m_k ds = 0.
 
-The solution begins with m_1 = (s − ½) πp. Then α = m(0) and β = m(1). No map has to be inverted.
+The first solution is m_1 = (s − ½) πp. The maps are the ends of the path, α = m(0) and β = m(1).
 """
 
 from __future__ import annotations
@@ -20,7 +21,10 @@ from phigen.series.reference_functions import Functions
 
 
 def paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], s: Any) -> Iterator[list[Any]]:
-    """Yield m_1(s), m_2(s), … without end, each as n expressions in x, p and s; ``poisson`` is the matrix π(x)."""
+    """Yield the terms m_1(s), m_2(s), … of the path without end, each as n expressions in x, p and s.
+
+    ``poisson`` is the matrix π(x).
+    """
     path_terms: list[list[Any]] = []
     while True:
         path_terms.append(_part(poisson, path_terms, x, p, s))
@@ -28,7 +32,7 @@ def paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], s: Any) -> Iterator[
 
 
 def _part(poisson: Any, lower_terms: Sequence[Sequence[Any]], x: Sequence[Any], p: Sequence[Any], s: Any) -> list[Any]:
-    """Return m_k from m_1 … m_{k−1}."""
+    """Return the term m_k of the path; ``lower_terms`` are m_1 … m_{k−1}."""
     degree, n = len(lower_terms), len(x)
     tensor = [[taylor(poisson[a, b], x, degree) for b in range(n)] for a in range(n)]
     operands = [c for row in tensor for entry in row for c in entry.values()]
@@ -38,14 +42,17 @@ def _part(poisson: Any, lower_terms: Sequence[Sequence[Any]], x: Sequence[Any], 
 
 
 def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Sequence[Any], degree: int) -> Any:
-    """Return the part of degree k of one component of π(m)p, with π(m) in degree k − 1."""
+    """Return the part of degree ``degree`` + 1 in p of one component of π(m)p: π(m) in ``degree``, times p.
+
+    ``deviation`` is m − x. ``row`` has the Taylor coefficients of the entries of π in the row of this component.
+    """
     return functions.total(
         deviation.combined(entry, degree) * functions.element(pb) for entry, pb in zip(row, p, strict=True)
     )
 
 
 def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
-    """Return the integral over s whose mean from 0 to 1 is 0."""
+    """Return the antiderivative of ``velocity`` with respect to s whose mean over 0 ≤ s ≤ 1 is 0."""
     time, rational = functions.element(s), sympy.QQ
     return functions.expression(
         functions.total(
@@ -56,7 +63,7 @@ def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
 
 
 def source_of_paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], time: int = 0) -> Source:
-    """Return the a_μ of α = m(0), or those of β = m(1), as a `Source`; ``time`` is 0 or 1."""
+    """Return the source of the Taylor coefficients of α = m(0), for ``time`` 0, or of β = m(1), for ``time`` 1."""
     s = sympy.Dummy("s")
     following = paths(poisson, x, p, s)
     parts: list[list[Any]] = []
