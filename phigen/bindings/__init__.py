@@ -1,1 +1,1 @@
-"""Bindings: modules in other languages that call the generated C, printed from the `Interface` of a solver."""
+"""Bindings: modules in other languages, such as Rust, that call the generated C of a solver."""

@@ -24,11 +24,12 @@ import let local macro module quote return struct true try using while"""
 
 @dataclass(frozen=True)
 class BindingLanguage:
-    """Files, comments, number types and reserved words of the bindings for one language.
+    """A language for which there are bindings: files, comments, number types, and reserved words.
 
-    ``files`` maps file names, with NAME in place of the solver's name, to the templates that make up the file.
+    ``files`` maps file names, with NAME in place of the solver's name, to the templates of which a file consists.
     ``comment`` begins a comment line. ``reals`` are the language's types for C's double and float. ``words`` are
-    reserved and cannot name fields. ``caseless`` is true if the language does not distinguish a from A.
+    reserved, and cannot be names of fields. ``caseless`` is true if the language does not distinguish upper and lower
+    case.
     """
 
     files: Mapping[str, tuple[str, ...]]
@@ -62,8 +63,10 @@ LANGUAGES = {
 
 
 def binding(compilation: Compilation, language: str) -> dict[str, str]:
-    """Return the files of a binding for the language of that name (file name → text). Raises `SpecError` for
-    lattices."""
+    """Return the files (name → text) of a binding; ``language`` is a key of `LANGUAGES`.
+
+    Raises `SpecError` for lattices.
+    """
     spec, name = compilation.spec, compilation.spec.name
     if spec.lattice:
         message = f"{name} is a lattice, for which there are no bindings yet"
@@ -123,15 +126,15 @@ def _values(compilation: Compilation, language: BindingLanguage) -> dict[str, ob
 
 
 def _described(description: str, unit: str) -> str:
-    """Return a comment of one line on a parameter, with its unit in brackets."""
+    """Return the description of a parameter as one line for a comment, with its unit in brackets."""
     return (plain(description) or "parameter") + f" [{plain(unit)}]" * bool(unit)
 
 
 def _fields(names: Iterable[str], language: BindingLanguage) -> list[str]:
-    """Return the names of the fields of a struct, in the order of ``names``.
+    """Return, for each of the ``names``, a valid name of a field of a struct in the language.
 
-    A reserved name, or one that equals an earlier field, gets trailing underscores. In languages that do not
-    distinguish case, such as Fortran, a name that begins with an underscore gets the prefix "p".
+    A reserved word, or a name that equals an earlier field, gets trailing underscores. In languages that do not
+    distinguish upper and lower case, such as Fortran, a name that begins with an underscore gets the prefix "p".
     """
     fields: list[str] = []
     for name in names:

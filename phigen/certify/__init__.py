@@ -1,1 +1,2 @@
-"""Certificates: rigorous bounds for the distance between a computed step and the exact Poisson map."""
+"""Certificates: proofs of an upper bound for the distance of a computed step, with rounding, from the exact Poisson
+map."""

@@ -1,4 +1,7 @@
-"""Checker of certificates, a script without phigen: python checker.py NAME.bounds.json NAME.c. Needs python-flint."""
+"""Checker of certificates: a script that needs python-flint, but nothing of phigen.
+
+Usage: python checker.py NAME.bounds.json NAME.c. Numbers with uncertainty are balls (midpoint and radius) of flint.
+"""
 
 from __future__ import annotations
 
@@ -15,16 +18,16 @@ from typing import Any, TypeAlias
 
 from flint import arb, arb_mat, ctx, fmpq, fmpq_poly
 
-Ball: TypeAlias = Any  # flint.arb
+Ball: TypeAlias = Any  # flint.arb: an interval, given by midpoint and radius
 Balls: TypeAlias = Any  # sequences of flint.arb
 Matrix: TypeAlias = Any  # flint.arb_mat
-BITS = 80  # precision of balls in bits; doubles have 53
+BITS = 80  # precision of interval arithmetic in bits; doubles have 53
 U, TINY, BALL, ZERO, ONE, HALF = arb(2) ** -53, arb(2) ** -1074, arb(0, 1), arb(0), arb(1), arb(0.5)
-ROUNDED = arb("1.000001")  # margin for the rounding of sizes that the C computes and compares
+ROUNDED = arb("1.000001")  # safety factor for rounding errors in norms that the C computes
 KRAWCZYK = "Krawczyk's test does not show that the equation of a step has one solution"
-POINTS = (0.318309886, 0.577215665, 0.869604401)  # positions in a box, modulo 1, at which derivatives are compared
-LESS_ACCURATE = ("sinh", "cosh", "tanh")  # functions for which glibc documents twice the error of others
-# functions of libm, each with its derivative
+POINTS = (0.318309886, 0.577215665, 0.869604401)  # fractions of a box, at which derivatives are compared
+LESS_ACCURATE = ("sinh", "cosh", "tanh")  # functions of glibc with twice the documented error of other functions
+# the functions of libm that certificates cover: each with its derivative, in interval arithmetic
 LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {
     "sqrt": (arb.sqrt, lambda x: 1 / (2 * x.sqrt())), "exp": (arb.exp, arb.exp), "expm1": (arb.expm1, arb.exp),
     "log": (arb.log, lambda x: 1 / x), "log1p": (arb.log1p, lambda x: 1 / (1 + x)), "sin": (arb.sin, arb.cos),
@@ -32,15 +35,15 @@ LIBM: Mapping[str, tuple[Callable[[Ball], Ball], Callable[[Ball], Ball]]] = {
     "cosh": (arb.cosh, arb.sinh), "tanh": (arb.tanh, lambda x: 1 - square(x.tanh())),
 }  # fmt: skip
 EXACT = {"add": operator.add, "sub": operator.sub, "mul": operator.mul}
-OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # operations: value, and derivatives by the operands
+OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # name → value, and derivatives by the operands
     "add": lambda x, y: (x + y, ONE, ONE), "sub": lambda x, y: (x - y, ONE, -ONE), "neg": lambda x: (-x, -ONE),
     "mul": lambda x, y: (x * y, y, x), "square": lambda x, _: (square(x), x, x), "max": lambda x, y: (x.max(y),),
     "div": lambda x, y: (x / y, 1 / y, -x / (y * y)), "abs": lambda x: (x.abs_lower().union(x.abs_upper()),),
 }  # fmt: skip
-# number of terms of power series: coefficients are at most 2^(1-n), so for |s| < ROUNDED the rest is at most
-# 2^(3-TERMS)
+# Number of terms of the power series below. Coefficients n are at most 2^(1-n), so for |s| < ROUNDED all further terms
+# together are at most 2^(3-TERMS).
 TERMS = 90
-SERIES: Mapping[str, Callable[[int], fmpq]] = {  # coefficient n of each function that the C computes by a polynomial
+SERIES: Mapping[str, Callable[[int], fmpq]] = {  # functions that the C computes by polynomials → Taylor coefficient n
     "cosroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n)),
     "sinroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n + 1)),
     "arcroot": lambda n: fmpq((-1) ** n, math.factorial(2 * n + 3)),
@@ -56,7 +59,7 @@ COEFFICIENTS = {name: [coefficient(n) for n in range(TERMS)] for name, coefficie
 
 
 class RefusedError(Exception):
-    """Refusal of a certificate, or of a problem that cannot be certified."""
+    """Refusal of a certificate that is wrong, or of a step for which no bound can be proved."""
 
 
 def demand(condition: bool, message: str) -> None:
@@ -66,18 +69,21 @@ def demand(condition: bool, message: str) -> None:
 
 
 def mag(x: Ball) -> Ball:
-    """Return an upper bound for the absolute values in a ball."""
+    """Return an upper bound for the absolute values in a ball, as a number without radius.
+
+    Raises `RefusedError` if the ball is not bounded.
+    """
     demand(x.is_finite(), "a value is not bounded")
     return x.abs_upper()
 
 
 def square(x: Ball) -> Ball:
-    """Return the square of a ball, without negative values."""
+    """Return a ball that contains the squares of all numbers in a ball, but no negative numbers."""
     return (x.abs_lower() * x.abs_lower()).union(x.abs_upper() * x.abs_upper())
 
 
 def top(values: Iterable[Ball]) -> Ball:
-    """Return a ball that contains the maximum of numbers in the given balls."""
+    """Return a ball that contains the maximum of any numbers taken from the given balls."""
     return reduce(arb.max, values)
 
 
@@ -87,7 +93,7 @@ def middle(x: Ball) -> Ball:
 
 
 def below(a: Matrix, b: Matrix) -> bool:
-    """Return whether each entry of a matrix is below the corresponding entry of another matrix."""
+    """Return whether each entry of the matrix a is certainly less than the entry of b at the same place."""
     return all(v < w for v, w in zip(a.entries(), b.entries(), strict=True))
 
 
@@ -97,12 +103,12 @@ def interval(ends: Sequence[float]) -> Ball:
 
 
 def column(values: Iterable[Ball]) -> Matrix:
-    """Return a matrix of one column."""
+    """Return a matrix with one column, which has the given entries."""
     return arb_mat([[v] for v in values])
 
 
 def each(f: Callable[..., Ball], *matrices: Matrix) -> Matrix:
-    """Return the matrix of f(a_ij, b_ij, …) for matrices of one shape."""
+    """Return the matrix with the entries f(a_ij, b_ij, …), for matrices a, b, … of one shape."""
     entries = [f(*v) for v in zip(*(m.entries() for m in matrices), strict=True)]
     return arb_mat(matrices[0].nrows(), matrices[0].ncols(), entries)
 
@@ -113,11 +119,10 @@ def identity(n: int) -> Matrix:
 
 
 class Evaluation:
-    """Evaluation of a list of operations at balls: values, derivatives by the operands, and bounds for single rounding
-    errors.
+    """Evaluation of a list of operations in interval arithmetic, with bounds for the rounding error of each operation.
 
-    Each value is a ball that contains the exact and the computed result. ``inputs`` has the balls that input operations
-    read.
+    Each value is a ball that contains the exact and the computed result. Derivatives of each operation by its operands
+    are stored for `outputs`. ``inputs`` maps names of input operations to the balls that they read.
     """
 
     def __init__(self, c: Any, operations: Any, inputs: Mapping[str, Any], exact: bool = False) -> None:
@@ -128,11 +133,12 @@ class Evaluation:
         powers, v = set[int](), self.x
         for k, (op, *a) in enumerate(operations):
             error, slopes = ZERO, list[tuple[int, Ball]]()
-            # number: a decimal literal, which rounds if it is no double; constant: a value of the certificate
+            # "number" is a decimal literal, which is rounded if it is no double; "constant" is a value of the
+            # certificate
             if op in ("number", "exact", "constant"):
                 value = a[0] if op != "constant" else c[a[0]] if len(a) == 1 else c[a[0]][a[1]]
                 x, error = arb(value), U * abs(value) * (op == "number" and Fraction(repr(value)) != value)
-                powers |= {k} if abs(math.frexp(value)[0]) == 0.5 else set()  # multiplication by them is exact
+                powers |= {k} if abs(math.frexp(value)[0]) == 0.5 else set()  # multiplication by a power of 2 is exact
             elif op in inputs:
                 demand((op, a[0]) not in self.inputs, "an input is read twice")
                 x, self.inputs[op, a[0]] = inputs[op][a[0]], k
@@ -141,8 +147,8 @@ class Evaluation:
                 x, *by = OPERATIONS["square" if op == "mul" and a[0] == a[1] else op](*(v[i] for i in a))
                 rounds = op in ("add", "sub", "mul", "div") and not (op == "mul" and powers & set(a))
                 error, slopes = U * mag(x) * rounds + TINY, [*zip(a, by, strict=False)]
-            # Remainder of a Taylor series, bounded by three times its next terms, since the bound also covers
-            # derivatives.
+            # The omitted terms of a Taylor series are bounded by three times the next terms. The factor 3 covers
+            # derivatives too.
             elif op == "rest":
                 x, slopes = v[a[0]], [(a[0], ONE)]
                 error = 3 * (inputs["tail"][a[1]] + 2 * sum((mag(v[i]) for i in a[3:]), ZERO)) / a[2]
@@ -158,10 +164,13 @@ class Evaluation:
             v.append(x if exact else x + BALL * error)
 
     def outputs(self, indices: Sequence[int], by: Mapping[str, int]) -> tuple[Matrix, ...]:
-        """Return the balls of some outputs, error bounds by the mean value theorem, and Jacobians by the inputs named
-        in ``by``."""
+        """Return the values of some operations, bounds for their rounding errors, and Jacobians, as matrices of balls.
+
+        The error bounds use the mean value theorem. ``by`` names the inputs by which Jacobians are computed, with their
+        sizes.
+        """
         errors, rows = list[Ball](), list[list[Ball]]()
-        for output in indices:  # reverse-mode differentiation
+        for output in indices:  # reverse-mode differentiation from this output back to all operations
             row = [ZERO] * output + [arb(1)] + [ZERO] * (len(self.x) - output)
             for k in range(output, -1, -1):
                 for i, slope in self.slopes[k] if not row[k].is_zero() else ():
@@ -175,10 +184,12 @@ class Evaluation:
 
 
 def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
-    """Return value and derivative of the function that a polynomial approximates, and a bound for rounding and
-    truncation."""
+    """Return value and derivative of a function that the C computes by a polynomial, and a bound for the error.
+
+    The error is that of the polynomial and of its rounding. ``series`` describes the polynomial; s is the argument.
+    """
     name, beyond = series["name"], series["beyond"]
-    if beyond and mag(s) >= series["radius"]:  # for such arguments the C calls the function of libm
+    if beyond and mag(s) >= series["radius"]:  # such large arguments go to the function of libm
         x, slope, ulps = LIBM[name][0](s), LIBM[name][1](s), c["ulps"] * (1 + 9 * U)
         inside = s.intersection(BALL * arb(series["radius"])) if s.overlaps(BALL * arb(series["radius"])) else None
         error = polynomial(c, {**series, "beyond": False, "inside": True}, inside)[2] if inside is not None else ZERO
@@ -198,19 +209,19 @@ def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
 
 
 def carries(c: Any, X: Iterable[Ball]) -> list[Ball]:
-    """Return upper bounds for the compensation terms of states in X."""
+    """Return upper bounds for the compensation terms of the coordinates, for states in the balls X."""
     return [c["carry"] * U * mag(x) for x in X]
 
 
 def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exact: bool = False) -> Evaluation:
-    """Evaluate the operations of a stage for states in X, times in T and unknowns u.
+    """Evaluate the operations of a stage of the step, for all states in X, times in T and unknowns in u.
 
-    Remainders of Taylor series are bounded along the paths of the stage, unless the evaluation is ``exact``.
+    Omitted terms of Taylor series are bounded along the paths that the stage follows, unless ``exact`` is true.
     """
     rests = [op[3] for op in stage["operations"] if op[0] == "rest"]
     demand("path" in stage or not rests, "a Taylor series has no path")
     carry, tail, along = [BALL * r for r in carries(c, X)], [ZERO] * len(X), "path" in stage and not exact
-    if along:  # paths dm/dt = field that start in X must stay in the box P
+    if along:  # all paths of dm/dt = field from X must stay in the box P
         P, path = [interval(p) for p in leaf["path"]], stage["path"]
         run = Evaluation(c, path["operations"], {"m": P, "u": u, "t": [T]})
         reached = [x + r + ZERO.union(run.x[k]) for x, r, k in zip(X, carry, path["field"], strict=True)]
@@ -218,7 +229,7 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
         tail = [mag(run.x[k]) for k in path["next"]]
     inputs = {"x": X, "start": X, "carry": carry, "t": [T], "u": u, "tail": tail}
     run = Evaluation(c, stage["operations"], inputs, exact)
-    if along:  # the C stops a series after two terms that are below rounding
+    if along:  # the C ends a series after two terms below rounding
         demand(bool(stage["seen"]) or max(rests) <= 4, "a Taylor series may end early")
         hidden = [mag(run.x[a]) < run.x[b].abs_lower() / ROUNDED for a, b in stage["hidden"]]
         demand(len(hidden) == 2 * len(X) and all(hidden), "a Taylor series may end late")
@@ -226,9 +237,10 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
 
 
 def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
-    """Return balls for the outputs named ``of`` of a stage, by the mean value theorem, with rounding errors.
+    """Return balls for the outputs of a stage that its entry ``of`` lists, with their rounding errors.
 
-    For small boxes they are narrower than the balls of `run_of`.
+    They are computed by the mean value theorem about the midpoints of X and of ``box``. For small boxes these balls are
+    narrower than those of `run_of`.
     """
     _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
     x, u = ([arb(v.mid()) for v in values] for values in (X, box))
@@ -238,8 +250,7 @@ def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: E
 
 
 def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls) -> None:
-    """Refuse the certificate unless the Jacobians printed in the C agree with exact ones to 20 digits at some
-    points."""
+    """Raise `RefusedError` unless the Jacobians in the C agree with exact derivatives to 20 digits at three points."""
     precision, ctx.prec = ctx.prec, 300
     for point in POINTS:
         *at, t = (
@@ -254,10 +265,10 @@ def expect_derivatives(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Ba
 
 
 def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ...]:
-    """Return change, error and derivative of an implicit stage, whose unknowns solve u - base + d(u) = 0.
+    """Return change, error bound and derivative of an implicit stage, whose unknowns u solve u - base + d(u) = 0.
 
-    The C solves it by corrections M^-1 residual. The fourth result bounds the part of the change that the C adds to the
-    compensation term.
+    The C solves the equation by repeated corrections: M^-1 times the residual. The fourth result bounds that part of
+    the change which the C adds to the compensation term.
     """
     box = [interval(v) for v in leaf["u"]]
     m, n, Y, centre = len(box), len(X), column(map(mag, box)), column(arb(v.mid()) for v in box)
@@ -269,12 +280,12 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     bends, reach, low = arb_mat(m * m, m), column(map(arb, leaf["reach"])), each(arb.abs_lower, scale)
     if solves:
         J, errors, bends = run.outputs(matrix, {"u": m})
-        # rounding errors of the elimination
+        # bound for the rounding errors when the C solves linear equations with the matrix by elimination
         pivots = top(map(mag, (*J.entries(), *A.entries()))) * 4 * m * m * 2 ** (m - 1) * U
         M, M_error = arb_mat(m, m, J.entries()), each(lambda e: e + pivots, arb_mat(m, m, errors.entries()))
     if derived:
         expect_derivatives(c, stage, X, T, leaf, box)
-    elif solves:  # the C may use differences of residuals instead of the printed matrix
+    elif solves:  # instead of the printed matrix the C may use finite differences
         least = -top(-v for v in low.entries())
         demand(least > 0, "the unknowns, in whose sizes residuals are measured, may be 0")
         noise = (d_error + U * Y) * (2 / (stage["difference"] * least))
@@ -283,17 +294,18 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inverse, measured = each(mag, M.inv()), each(mag, M) * high if derived else high
 
     def residual_error(e: Matrix) -> Matrix:
-        """Return bounds for the rounding errors of the residual at a distance e from the solution."""
+        """Return bounds for the rounding errors of the residual, if u is at the distance e from the solution."""
         first = d_error + U * (size + e + c["carry"] * U * Y) * based
         return first + 2 * U * (A_size * e + first + U * size + c["carry"] * U * Y * based) if solves else first
 
     def missed(e: Matrix) -> Matrix:
-        """Return a bound for the error of u after a correction, from the error e before it."""
+        """Return a bound for the error of u after a correction, if its error before the correction is at most e."""
         bent = arb_mat(m, m, (each(mag, bends) * e * HALF).entries()) + M_error if derived else each(mag, M - A)
         return inverse * (bent * e + residual_error(e))
 
     def worst_of(size: Ball) -> Matrix:
-        """Return the largest error for which corrections or residuals, as the C measures them, are at most ``size``."""
+        """Return the largest error of u that is possible if the C has measured a correction or residual of at most
+        ``size``."""
         return each(mag, A.inv()) * (measured * (size * ROUNDED) + residual_error(reach))
 
     C = each(middle, each(middle, A).inv())
@@ -307,14 +319,14 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     inside = zip(box, K.entries(), beyond.entries(), strict=True)
     demand(all(v.contains_interior(k + BALL * r) for v, k, r in inside), KRAWCZYK)
     demand(below(missed(reach) + U * Y * solves, reach), "the iteration may diverge")
-    if stage.get("seen"):  # series end after two small terms, but only once a term was larger than rounding errors
+    if stage.get("seen"):  # a series ends after two small terms, but not before a larger one
         (seen,) = centred(c, stage, X, T, leaf, box, run, "seen").entries()
         demand(seen.abs_lower() > ROUNDED * mag(run.x[stage["seen_above"]]), "a Taylor series may end early")
 
     noise = 2 * (residual_error(reach) + A_size * Y * U * solves)
     q, shaken, share = stalling(stage, each(mag, identity(m) - A * M.inv()), noise, low, high)
     e, rest = column([ZERO] * m), column([ZERO] * m)
-    for stop in stage["stops"]:  # rules to stop: by a size, by the size of the previous correction, or at stagnation
+    for stop in stage["stops"]:  # limits for a correction, for the last one, for their ratio
         errors = [worst_of(share * stop["now"] / stop.get("rate", 1))] if "now" in stop else []
         before = [share * stop["before"]] if "before" in stop else []
         before += [share * shaken / (stop["part"] - q)] if q < arb(stop.get("part", 0)) else []
@@ -333,9 +345,10 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
 
 def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matrix) -> tuple[Ball, Ball, Ball]:
-    """Return the contraction rate and the noise of the sizes that the C measures, and the weight of their norm.
+    """Return contraction rate and noise of the norms that the C computes for corrections, and a factor for these norms.
 
-    The C measures the mean square over the stages of a Gauss method, or the maximum.
+    ``factor`` bounds one correction by the correction before. The norm of the C is the root mean square over the stages
+    of a Gauss method, and the maximum for other methods.
     """
     m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
     scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]
@@ -349,7 +362,10 @@ def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matri
 
 
 def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
-    """Return error bounds of a step and balls that contain its results, computed stage by stage."""
+    """Return bounds for the errors of a step from states in X, and balls that contain the states after the step.
+
+    Stages are treated one after another; ``leaf`` has their boxes of unknowns.
+    """
     total, n = column([ZERO] * len(X)), len(X)
     for stage, part in zip(c["stages"], leaf["stages"], strict=True):
         if "equation" in stage:
@@ -365,7 +381,10 @@ def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
 
 
 def check(c: Any, domain: Sequence[Sequence[float]], node: Any) -> tuple[int, list[float]]:
-    """Check all boxes below a node of the tree; return their number and the largest absolute values of coordinates."""
+    """Check the certificate on all boxes of a tree, into which the domain is divided.
+
+    Return the number of boxes, and the largest absolute value of each coordinate. Raises `RefusedError`.
+    """
     if "at" in node:
         low, high = [list(d) for d in domain], [list(d) for d in domain]
         demand(domain[node["axis"]][0] < node["at"] < domain[node["axis"]][1], "a box is divided outside")
@@ -380,13 +399,13 @@ def check(c: Any, domain: Sequence[Sequence[float]], node: Any) -> tuple[int, li
 
 
 def digest(c: Mapping[str, Any]) -> str:
-    """Return the digest of a certificate, computed without the entry that holds the digest."""
+    """Return the SHA-256 hash of a certificate without its entry "sha256", in which the hash is stored."""
     text = json.dumps({k: v for k, v in c.items() if k != "sha256"}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def replayed(c: Any, text: bytes) -> str:
-    """Check the certificate of a C file and return the statement that it proves. Raises `RefusedError`."""
+    """Check a certificate for the C file with this text, and return the proved statement. Raises `RefusedError`."""
     demand(digest(c) == c["sha256"], "the certificate was changed")
     demand(hashlib.sha256(text).hexdigest() == c["c_sha256"], "the certificate is about another C file")
     boxes, largest = check(c, [*c["domain"], c["time"]], c["tree"])

@@ -1,4 +1,4 @@
-"""Construction of the `StepProblem` of a compilation, and refusals of solvers that certificates do not cover."""
+"""Input for the search of a certificate, from a compilation; refusal of solvers that certificates do not cover."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from phigen.scheme.program import Program
     from phigen.spec.model import Spec
 
-#: Exact flows by special functions, by the name of the function, with the motion for messages.
+#: Functions that occur in exact flows and that certificates do not cover → the motion, as error messages name it.
 _FLOWS = {
     **dict.fromkeys(ELLIPTIC, "a free rigid body"),
     **dict.fromkeys((*REMAINDERS, *QUOTIENTS), "linear equations with conserved coefficients"),
     ANOMALY: "a Kepler motion",
 }
 
-#: Motions that a named composition splits into further parts.
+#: Motions that a named composition (key ``composition`` of specs) splits into parts, which certificates cover.
 _SPLIT = ("a free rigid body", "a Kepler motion")
 
 
@@ -41,8 +41,9 @@ def problem_of(
     ulps: float,
     tolerance: float,
 ) -> StepProblem:
-    """Return the problem of a solver; the gauge is that of the trajectory from ``start``.
+    """Return the problem to be certified for the C ``text`` of a solver.
 
+    Casimirs are subtracted from H with the multiples (the gauge) that the solver chooses for the state ``start``.
     Raises `SpecError` for solvers that certificates do not cover.
     """
     program, spec = compilation.program, compilation.spec
@@ -63,7 +64,8 @@ def problem_of(
 
 
 def _expect_covered(program: Program, spec: Spec) -> None:
-    """Raise `SpecError` for noise, single precision, and flows by functions for which the checker has no enclosures."""
+    """Raise `SpecError` for noise, single precision, some Gauss steps, and flows by functions that certificates do not
+    cover."""
     refusals = list[tuple[tuple[str, ...], str, str]]()
     if program.noise:
         refusals.append((("noise",), "certificates do not cover noise", "a spec without it"))
@@ -81,8 +83,10 @@ def _expect_covered(program: Program, spec: Spec) -> None:
 
 
 def _gauge(compilation: Compilation, parameters: Mapping[str, float], start: Sequence[float]) -> list[float]:
-    """Return an approximation of the gauge for the trajectory from a state: multiples of Casimirs, or the energy level
-    e."""
+    """Return the gauge that the solver chooses at the state ``start``, up to rounding.
+
+    The gauge are the multiples of Casimirs that are subtracted from H or, with a monitor, the energy level e = −H.
+    """
     program = compilation.program
     values = {**parameters, **dict(zip(compilation.spec.coordinates, start, strict=True))}
     if program.monitor and program.held:

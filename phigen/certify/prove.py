@@ -1,4 +1,4 @@
-"""Search for the enclosures of a certificate: boxes of states, of solutions and of unknowns."""
+"""Search for a certificate: division of the domain into boxes, and boxes that contain the unknowns of the step."""
 
 from __future__ import annotations
 
@@ -29,33 +29,33 @@ from phigen.certify.checker import (
 from phigen.certify.reader import read
 from phigen.certify.stages import CARRY, stages_of
 
-#: Largest number of attempts to find a box of unknowns that is proved to contain the solution.
+#: Largest number of attempts to find a box that provably contains the unknowns of an implicit step.
 PASSES = 8
 
-#: Factor by which the radii of the box of unknowns exceed their estimates. A smaller factor needs more attempts; a
-#: larger one makes contraction harder to prove.
+#: Factor by which the box of unknowns is made larger than estimated. A smaller factor needs more attempts; with a
+#: larger one it is harder to prove that the iteration contracts.
 GROWTH = 1.25
 
-#: Largest compensation term after a Gauss step, in 2^-53 of the largest value of the coordinate. It contains the
-#: rounding error of the state, and the rounding error of its change, which is at most twice as large.
+#: Largest compensation term after a Gauss step, in units of 2^-53 times the largest value of the coordinate. It
+#: contains the rounding error of the state, and that of its change, which is at most twice as large.
 GAUSS_CARRY = 3.03
 
-#: Smallest bound for the distance of iterates from the solution, for an unknown of a Gauss step, relative to the
-#: largest of these bounds, since sweeps couple all unknowns.
+#: Bounds for the distance of iterates from the solution of a Gauss step are at least this fraction of the largest
+#: bound, since each iteration couples all unknowns.
 LEAST_REACH = 0.05
 
-#: Increase of the bounds for distances of iterates in steps along paths, relative to the unknowns. The finite
-#: differences of the C are over shorter distances.
+#: Addition to the bounds for the distance of iterates from the solution, relative to the unknowns, for steps whose C
+#: uses finite differences. It exceeds the distances of these differences.
 DIFFERENCES = arb(2) ** -20
 
-#: Number of bisections after which the search fails; the volume is then 2^-40 of the volume of the domain.
+#: Largest number of bisections of a box; its volume is then 2^-40 of the volume of the domain.
 MAX_DEPTH = 40
 
 Box = Sequence[Sequence[float]]
 
 
 class NoCertificateError(RefusedError):
-    """A problem cannot be certified; ``hint`` tells the user what to change."""
+    """No certificate was found; ``hint`` tells the user what to change."""
 
     def __init__(self, message: str, hint: str) -> None:
         super().__init__(message)
@@ -66,9 +66,9 @@ class NoCertificateError(RefusedError):
 class StepProblem:
     """Problem to be certified: a solver in C, its parameters, and a domain of states and times.
 
-    ``text`` is the C; ``gauge`` are multiples of Casimirs, or e. ``ulps`` is a bound for errors of libm, and ``within``
-    the largest error bound that is accepted, both in units in the last place. ``timed`` says that steps depend on the
-    time.
+    ``text`` is the C; ``gauge`` are the multiples of Casimirs that are subtracted from H or, with a monitor, the energy
+    level e. ``ulps`` is a bound for the errors of libm, and ``within`` the largest error bound that is accepted, both
+    in units in the last place. ``timed`` says that steps depend on the time.
     """
 
     name: str
@@ -85,9 +85,10 @@ class StepProblem:
 
 
 def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
-    """Return the entries of a certificate other than boxes and bounds. Raises `RefusedError` for C that is not covered.
+    """Return the entries of a certificate other than boxes and bounds: the problem, and the operations of a step.
 
-    With ``exact``, these describe the exact map, for which paths are expanded to the largest order of the C.
+    With ``exact``, the operations are those of the exact map; its Taylor series have the largest number of terms that
+    the C allows. Raises `RefusedError` for C that certificates do not cover.
     """
     facts = read(problem.text, problem.name)
     numbers = {
@@ -116,7 +117,7 @@ def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
 
 @contextmanager
 def precise() -> Iterator[None]:
-    """Context in which balls have a precision of `BITS` bits."""
+    """Context in which interval arithmetic has a precision of `BITS` bits."""
     previous_precision, ctx.prec = ctx.prec, BITS
     try:
         yield
@@ -125,7 +126,8 @@ def precise() -> Iterator[None]:
 
 
 def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
-    """Return the certificate of a problem. Raises `RefusedError` if none with at most ``max_boxes`` boxes is found."""
+    """Return the certificate of a problem. Raises `RefusedError` if no certificate with at most ``max_boxes`` boxes is
+    found."""
     certificate = described(problem)
     with precise():
         leaves = list[tuple[list[float], list[float]]]()
@@ -141,17 +143,19 @@ def certified(problem: StepProblem, max_boxes: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Search:
-    """Search of a certificate: bisects the domain until the bounds hold in each part and are at most ``within``."""
+    """Search for a certificate, which bisects the domain until bounds are proved on each box and are at most
+    ``within``."""
 
     certificate: dict[str, Any]
     within: float
     max_boxes: int
-    # for each part, error bounds and largest absolute values of coordinates
+    # for each box with a proof: error bounds, and largest absolute values of the coordinates
     leaves: list[tuple[list[float], list[float]]]
     divided: list[int]  # depth of each box that was divided
 
     def tree(self, domain: Box, depth: int = 0) -> dict[str, Any]:
-        """Return the tree of a box and of its parts. Raises `RefusedError`."""
+        """Return the proof for a box or, if that fails, the proofs for its two halves, as a tree. Raises
+        `RefusedError`."""
         c = self.certificate
         *X, T = [interval(d) for d in domain]
         try:
@@ -189,14 +193,17 @@ def _widest(domain: Box) -> int | None:
 
 
 def _ends(x: Any) -> list[float]:
-    """Return the ends of a ball as doubles, rounded outwards."""
+    """Return the lower and the upper end of a ball as doubles, rounded outwards."""
     low, high = math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
     return [low, high]
 
 
 def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """Return for each stage the box of unknowns, bounds for the distance of iterates from the solution, and the box of
-    paths."""
+    """Return the proof data for the states in X and times in T, for each stage of the step.
+
+    For implicit stages these are a box for the unknowns, bounds for the distance of iterates from the solution and, if
+    the stage follows paths, a box for the paths.
+    """
     parts, image = list[dict[str, Any]](), X
     for stage in c["stages"]:
         parts.append(_implicit_part(c, stage, image, T) if "equation" in stage else {})
@@ -206,9 +213,10 @@ def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
 
 
 def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """Return the box of unknowns of a stage, whose equation is u = base - d(u).
+    """Return the proof data of an implicit stage, whose unknowns u solve u = base - d(u): a box that contains u, and
+    bounds.
 
-    The equation is iterated and the box enlarged until the proof holds. Raises `RefusedError` if it does not.
+    The box is enlarged until the proof succeeds. Raises `RefusedError` if `PASSES` attempts fail.
     """
     base = X if stage["based"] else [arb(0)] * len(stage["equation"])
     start = run_of(c, stage, X, T, {}, base, exact=True)
@@ -242,7 +250,7 @@ def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: An
 
 
 def _path_box(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any, u: list[Any]) -> list[list[float]]:
-    """Return a box that contains the paths from states in X for unknowns in u, by Picard's iteration."""
+    """Return a box that should contain all paths from states in X, for unknowns in u, by Picard's iteration."""
     P = X
     for _ in range(PASSES):
         run = Evaluation(c, stage["path"]["operations"], {"m": P, "u": u, "t": [T]})

@@ -1,4 +1,4 @@
-"""Reader of kernels in generated C, as lists of operations."""
+"""Reader of generated C: it converts functions to lists of operations, on which certificates are based."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from phigen.certify.checker import LIBM, SERIES, RefusedError
 
 _OPERATIONS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
 
-#: Name of the array by which the parts of a long function exchange values.
+#: Name of the array through which the parts of a long C function pass values to each other.
 _WORK = "work"
 
 #: Pattern of floating-point literals in C, with a point or an exponent; integer literals are indices and do not match.
@@ -22,7 +22,7 @@ _NUMBER = r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)"
 class GeneratedC:
     """Generated C file, without comments and without the solver's name as a prefix of names.
 
-    Where a function would then have the name of a libm function, it gets the prefix ``own_``.
+    Functions that would then have the same name as a function of libm get the prefix ``own_``.
     """
 
     def __init__(self, text: str, name: str) -> None:
@@ -31,7 +31,8 @@ class GeneratedC:
         self.text = re.sub(rf"/\*.*?\*/|{prefix}(?=[A-Za-z])", "", text, flags=re.DOTALL)
 
     def function(self, name: str) -> tuple[list[str], str] | None:
-        """Return the names of the arguments and the body of a function; None if there is none of that name."""
+        """Return the names of the arguments, and the body, of the C function ``name``; None if there is no such
+        function."""
         matched = re.search(rf"\b{name}\(([^{{}};]*)\)\s*\{{\n(.*?)\n\}}", self.text, re.DOTALL)
         if not matched:
             return None
@@ -43,7 +44,10 @@ class GeneratedC:
         return self.function(name) is not None
 
     def numbers(self, name: str, text: str | None = None) -> list[float]:
-        """Return the numbers of the static array of that name, or of the macro or enumeration constant, in order."""
+        """Return the numbers in the definition of ``name``: a static array, a macro, or an enumeration constant.
+
+        Raises `RefusedError` if there is no such definition.
+        """
         text = self.text if text is None else text
         matched = re.search(
             rf"\b{name}(?:\[\w+\])+ =\s*\{{(.*?)\}};|define {name} (.*)|\b{name} = (\d+)", text, re.DOTALL
@@ -54,15 +58,15 @@ class GeneratedC:
         return [float(v) for v in re.findall(r"-?\d[\d.]*(?:e[-+]?\d+)?", number_text)]
 
     def number(self, name: str) -> float:
-        """Return the number of the macro or enumeration constant of that name."""
+        """Return the value of the macro or enumeration constant ``name``."""
         return self.numbers(name)[0]
 
 
 class KernelReader:
-    """Operations of one C function in their order; a value that the C reuses occurs once.
+    """The operations of one C function, in their order; a value that the C uses several times occurs once.
 
-    ``outputs`` maps each array that the function writes to the indices of the operations that give its entries.
-    Functions that the C defines by polynomials are added to ``series``.
+    ``outputs`` maps each array that the function writes to the indices of the operations that give its entries. If the
+    function calls functions that the C defines by polynomials, these are added to ``series``.
     """
 
     def __init__(self, source: GeneratedC, function: str, series: dict[str, Any]) -> None:
@@ -76,7 +80,7 @@ class KernelReader:
 
     @property
     def described(self) -> dict[str, Any]:
-        """The kernel in the format of certificates."""
+        """The operations and outputs of the function, in the format of certificates."""
         described_outputs = {name: entries for name, entries in self.outputs.items() if name != _WORK}
         outputs = {name: [entries[i] for i in range(len(entries))] for name, entries in described_outputs.items()}
         return {"operations": self.operations, "outputs": outputs}
@@ -92,7 +96,7 @@ class KernelReader:
                     self._names[str(declared.arg)] = self._index(declared.value)
             elif cleared := re.fullmatch(r"(?:\(void\))?memset\((\w+), 0, (\d+) \* sizeof \w+\[0\]\)", statement):
                 self.outputs[cleared[1]] = dict.fromkeys(range(int(cleared[2])), self._operation("number", 0.0))
-            elif re.fullmatch(r"\w+_part\d+\(.*\)", statement):  # part of a divided function
+            elif re.fullmatch(r"\w+_part\d+\(.*\)", statement):  # call of a function with a part of the body
                 self._run(_expect(self._source.function(statement.split("(")[0]), statement)[1])
             elif statement and not re.fullmatch(rf"\(void\)\w+(?:, \(void\)\w+)*|double {_WORK}\[\d+\]", statement):
                 self._store(statement)
@@ -105,7 +109,7 @@ class KernelReader:
                 raise RefusedError(f"the C has the statement {statement!r}, which certificates do not cover")
 
     def _index(self, e: ast.expr) -> int:
-        """Return the index of the operation for an expression."""
+        """Append the operations of an expression, unless its value exists, and return the index of the last one."""
         match e:
             case ast.Constant(str(text)):
                 return self._operation("number", float(text))
@@ -152,9 +156,9 @@ class KernelReader:
 
 
 class PathReader(KernelReader):
-    """Operations of the Taylor series of a path, from given coefficients of the coordinates.
+    """The operations that compute the Taylor series of a path, from the coordinates at its start.
 
-    ``outputs[f"s{i}"]`` has the indices of the coefficients of series i, by order.
+    ``outputs[f"s{i}"]`` has the indices of the coefficients of coordinate i, by order.
     """
 
     def __init__(self, source: GeneratedC, series: dict[str, Any], coordinates: int, orders: int) -> None:
@@ -174,7 +178,7 @@ class PathReader(KernelReader):
 
     @property
     def described(self) -> dict[str, Any]:
-        """The series in the format of certificates."""
+        """The operations and coefficients of the series, in the format of certificates."""
         outputs = {name: list(self.outputs[name].values()) for name in self._known}
         return {"operations": self.operations, "outputs": outputs}
 
@@ -214,7 +218,7 @@ class PathReader(KernelReader):
 
 
 def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
-    """Return the polynomial for small arguments of a function, and the radius up to which the C uses it."""
+    """Return the polynomial by which the C computes a function for small arguments, and the largest such argument."""
     (argument,), body = _expect(source.function(name), name)
     branch = re.search(r"if \(fabs\(\w+\) [<>] ([\d.]+)\)", body)
     library_name = name.removeprefix("own_")
@@ -254,7 +258,8 @@ def _expect(function: tuple[list[str], str] | None, name: str) -> tuple[list[str
 
 
 def read(text: str, name: str) -> dict[str, Any]:
-    """Return the facts about the C of a solver that a certificate needs: kind of step, kernels, and tables.
+    """Return the data about the C of a solver that a certificate needs: kind of step, functions as operations, and
+    tables.
 
     Raises `RefusedError` for C that certificates do not cover.
     """
@@ -275,7 +280,7 @@ def read(text: str, name: str) -> dict[str, Any]:
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
-#: Functions that the C of each kind of step has; the last one identifies the kind.
+#: Names of C functions that are read, by kind of step. A solver is of this kind if it has the last function.
 _FUNCTIONS = {
     "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),
@@ -285,7 +290,7 @@ _FUNCTIONS = {
 }
 
 
-#: Functions of paths, which `PathReader` reads.
+#: Names of functions that compute paths; they are read by `PathReader`, not by `KernelReader`.
 _OF_PATHS = ("path_begin", "path_order")
 
 
@@ -302,7 +307,7 @@ def _newton(source: GeneratedC) -> dict[str, Any]:
 
 def _gauss(source: GeneratedC) -> dict[str, Any]:
     weights, mixing = source.numbers("weights"), source.numbers("mixing")
-    lanes = len(weights)  # rows may be padded to whole SIMD vectors
+    lanes = len(weights)  # number of entries of a row, which may be padded to whole SIMD vectors
     nodes = len(mixing) // lanes
     rows = [mixing[j * lanes : j * lanes + nodes] for j in range(nodes)]
     names = {"solved": "SOLVED", "stalled": "STALLED", "rounding": "ROUNDING", "nearly_rounding": "NEARLY_ROUNDING"}
@@ -311,7 +316,10 @@ def _gauss(source: GeneratedC) -> dict[str, Any]:
 
 
 def _splitting(source: GeneratedC) -> dict[str, Any]:
-    """Return times of flows, the flows of a step between its correctors, and the coordinates that each flow changes."""
+    """Return the tables of a splitting: times of flows, sequences of flows, and the coordinates that each flow changes.
+
+    A method with a corrector has three sequences (corrector, step, inverse corrector), other methods have one.
+    """
     row = int(source.number("ROW"))
     schedules = [_schedule(source, "flows", {"coef": 0, "ROW": row})]
     if source.has("corrector"):
@@ -323,17 +331,18 @@ def _splitting(source: GeneratedC) -> dict[str, Any]:
 
 
 def _schedule(source: GeneratedC, function: str, names: dict[str, int]) -> list[list[int]]:
-    """Return the flows that a C function calls, each as [flow, row of coefficients]."""
+    """Return the flows that a C function calls in order, each as [number of the flow, row of coefficients]."""
     _, body = _expect(source.function(function), function)
     return _called(_block(iter(map(str.strip, body.splitlines()))), names, [])
 
 
-#: Largest number of flows in a step, with each iteration of a loop counted.
+#: Largest number of flows in a step, counting each iteration of a loop.
 MOST_FLOWS = 10_000
 
 
 def _block(lines: Iterator[str]) -> list[tuple[str, Any]]:
-    """Parse the statements of a block up to its end: loops with blocks, calls of flows, and advances of ``coef``."""
+    """Parse statements up to the end of a block: loops, calls of flows, and statements that advance the pointer
+    ``coef``."""
     statements = list[tuple[str, Any]]()
     for line in itertools.takewhile(lambda line: line != "}", lines):
         loop = re.fullmatch(r"for \(int (\w+) = (\d+); \w+ < (\d+); (?:\+\+\w+|\w+ \+= (\d+))\) \{", line)
@@ -351,7 +360,10 @@ def _block(lines: Iterator[str]) -> list[tuple[str, Any]]:
 
 
 def _called(statements: list[tuple[str, Any]], names: dict[str, int], called: list[list[int]]) -> list[list[int]]:
-    """Append the flows that statements call to ``called``, each with its row of coefficients, and return ``called``."""
+    """Execute parsed statements: append the flows that they call to ``called``, and return ``called``.
+
+    Each flow is [number, row of coefficients]. ``names`` has the values of loop variables and of ``coef``.
+    """
     for kind, about in statements:
         if kind == "call":
             called.append([about[0], _integer_value(about[1], names) // names["ROW"]])
@@ -367,7 +379,8 @@ def _called(statements: list[tuple[str, Any]], names: dict[str, int], called: li
 
 
 def _integer_value(text: str, names: Mapping[str, int]) -> int:
-    """Return the value of sums and products of integers and names. Raises `RefusedError` for anything else."""
+    """Return the value of an integer expression in C with the given ``names``. Raises `RefusedError` for other
+    expressions."""
 
     def value(node: ast.expr) -> int:
         match node:
@@ -391,7 +404,7 @@ def _integer_value(text: str, names: Mapping[str, int]) -> int:
 
 
 def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
-    """Return pairs [coordinate, index]: the flow adds the increment of that index to the coordinate."""
+    """Return which coordinates a flow changes, as pairs [i, j]: it adds its increment j to coordinate i."""
     _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
     changes = re.findall(r"add\(x, displacement, start, (\d+), change\[(\d+)\]\);", body)
     if len(changes) != body.count(";") - 2:

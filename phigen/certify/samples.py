@@ -1,5 +1,7 @@
-"""Comparison of steps of the compiled C with the exact map in many digits, to measure how tight certified bounds
-are."""
+"""Measurement of rounding errors: steps of the compiled C are compared with the exact map in many digits.
+
+The measured errors show how much larger the certified bounds are.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,14 @@ from flint import arb, arb_mat, ctx
 
 from phigen.certify.checker import identity, run_of
 
-#: Precision of the exact map in bits.
+#: Precision, in bits, with which the exact map is computed.
 BITS = 300
 
-#: Largest number of corrections in the solution of a stage; each uses the inverse matrix at the centre of the box.
+#: Largest number of corrections until the equation of a stage must be solved. Corrections converge linearly, since all
+#: use the same matrix.
 CORRECTIONS = 400
 
-#: Size of a correction after which the remaining error is negligible.
+#: If all corrections of the unknowns are smaller than this, the equation of a stage counts as solved.
 SOLVED = 1e-40
 
 Numbers = Sequence[Any]
@@ -35,7 +38,8 @@ def _precise() -> Iterator[None]:
 
 
 class ExactMap:
-    """The exact map of a certificate, as a function; ``c`` is the result of `described` with ``exact``."""
+    """The exact map that a step of a solver approximates, as a function; ``c`` is the result of `described` with
+    ``exact``."""
 
     def __init__(self, c: Mapping[str, Any]) -> None:
         self._c = c
@@ -52,7 +56,7 @@ class ExactMap:
             return x
 
     def _solve_stage(self, number: int, stage: Mapping[str, Any], x: Numbers, t: Any) -> list[Any]:
-        """Return the unknowns of a stage, found by corrections with a fixed matrix."""
+        """Return the unknowns of an implicit stage, by Newton's method with a matrix that is computed once."""
         base = x if stage["based"] else [arb(0)] * len(stage["equation"])
         start = run_of(self._c, stage, x, t, {}, base, exact=True)
         u = [arb(start.x[k].mid()) for k in stage["start"]]
@@ -74,8 +78,8 @@ def observed(c: Mapping[str, Any], exact: Mapping[str, Any], library: Any, count
     """Return the largest error of each coordinate in ``count`` steps of the compiled C from random states in the
     domain.
 
-    Errors are differences from the exact map, which ``exact`` describes. ``library`` is the compiled C. Half of the
-    states also have a random compensation term. Raises `RuntimeError` if a step fails.
+    ``c`` is the certificate. Errors are differences from the exact map, which ``exact`` describes. ``library`` is the
+    compiled C. Every second state also has a random compensation term. Raises `RuntimeError` if a step fails.
     """
     exact_step = ExactMap(exact)
     draw, worst = random.Random(seed), [0.0] * len(c["domain"])
@@ -110,7 +114,7 @@ def one_step(
         status = getattr(library, f"{name}_init_gauge")(*start, gauge)
     else:
         status = getattr(library, f"{name}_init")(*start)
-    # the struct of the solver begins with state and compensation term
+    # the first members of the struct are the state and its compensation term
     solver = (ctypes.c_double * (2 * n)).from_buffer(room)
     solver[n:] = list(carry)
     if status or getattr(library, f"{name}_step")(room, ctypes.c_double(c["step"])):

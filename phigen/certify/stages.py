@@ -1,4 +1,4 @@
-"""Stages of a certified step as flat lists of operations, built from the kernels and tables of the C."""
+"""The stages of a certified step as lists of operations, which are built from functions and tables of the C."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ from phigen.certify.reader import GeneratedC, PathReader
 #: Largest compensation term after a step, in units of 2^-53 times the largest absolute value of the coordinate.
 CARRY = 1.01
 
-#: Smallest contraction rate that certificates assume in the stopping criterion of a Gauss solver, which estimates the
-#: rate from its sweeps. In runs of the corpus the rate is between 0.05 and 0.5.
+#: Smallest contraction rate that certificates assume where the C estimates it, to decide when the iteration for a Gauss
+#: step ends. In runs of the corpus the rate is between 0.05 and 0.5.
 LEAST_RATE = 0.05
 
 Stage = dict[str, Any]
 
 
 class Listing:
-    """Flat list of operations, to which kernels are appended; each input is listed once."""
+    """List of operations of a stage, to which the operations of several functions are appended.
+
+    Operations refer to operands by their indices. An input, such as a coordinate, occurs once.
+    """
 
     def __init__(self) -> None:
         self.operations: list[list[Any]] = []
@@ -34,26 +37,26 @@ class Listing:
         return len(self.operations) - 1
 
     def input(self, *operation: Any) -> int:
-        """Return the index of an input operation, which is appended if it is new."""
+        """Return the index of an operation that reads an input; it is appended if the input was not read before."""
         if operation not in self._inputs:
             self._inputs[operation] = self.add(*operation)
         return self._inputs[operation]
 
     def inputs(self, name: str, count: int) -> list[int]:
-        """Return the indices of the input operations for the first ``count`` entries of an array."""
+        """Return the indices of operations that read the first ``count`` entries of the input array ``name``."""
         return [self.input(name, i) for i in range(count)]
 
     def sum(self, terms: Sequence[int]) -> int:
-        """Append additions of the terms, from the first on, and return the index of the sum."""
+        """Append the additions of some terms, in their order, and return the index of the sum."""
         total = terms[0]
         for term in terms[1:]:
             total = self.add("add", total, term)
         return total
 
     def copy(self, kernel: Mapping[str, Any], **inputs: Any) -> dict[str, list[int]]:
-        """Append the operations of a kernel; return the indices of its outputs.
+        """Append the operations of a function, and return the indices of its outputs, by name of the array.
 
-        ``inputs`` has the indices that replace the arrays which the kernel reads.
+        ``inputs`` maps each array that the function reads to the indices of the operations that replace its entries.
         """
         operation_indices: list[int] = []
         for op, *a in kernel["operations"]:
@@ -67,7 +70,8 @@ class Listing:
 
 
 class _Parameters(dict[str, int]):
-    """Indices of the parameters in a listing; a parameter is appended when it is first read."""
+    """Indices of operations that read parameters, by name; an operation is appended when its parameter is first
+    used."""
 
     def __init__(self, listing: Listing) -> None:
         self._listing = listing
@@ -77,20 +81,23 @@ class _Parameters(dict[str, int]):
 
 
 class _Gauge(_Parameters):
-    """Indices of the multiples of Casimirs in a listing."""
+    """Indices of operations that read multiples of Casimirs, by number; an operation is appended on first use."""
 
     def __missing__(self, index: int) -> int:  # type: ignore[override]
         return self._listing.input("constant", "gauge", index)
 
 
 def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int]:
-    """Append the coefficients of a stage or row, computed from parameters, step and time; return their indices."""
+    """Append the operations that compute the coefficients of a stage or of a row of flows; return their indices.
+
+    They depend on parameters, step size and time.
+    """
     step = listing.input("constant", "step")
     h = step
     if len(facts["fractions"]) > 1:
         h = listing.add("mul", listing.input("exact", facts["fractions"][stage]), step)
     kick = []
-    if facts.get("multiples"):  # coefficient of the modified potential, in units of h² with the step h
+    if facts.get("multiples"):  # coefficient of the modified potential of a splitting: a multiple of h²
         square = listing.add("mul", step, step)
         kick = [listing.add("mul", listing.input("exact", facts["multiples"][stage]), square)]
     kernels, inputs = facts["kernels"], {"params": _Parameters(listing), "gauge": _Gauge(listing)}
@@ -105,9 +112,10 @@ def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int
 def stages_of(
     facts: Mapping[str, Any], text: str, name: str, centre: Sequence[Any], exact: bool = False
 ) -> list[Stage]:
-    """Return the stages of a step from the facts about its C.
+    """Return the stages of a step as lists of operations; ``facts`` are what `read` returns for the C of the solver.
 
-    Taylor series of paths have the number of terms that suits the box ``centre``, or the ``exact`` map.
+    Taylor series of paths have the number of terms that the C may use for states in the box ``centre``. With ``exact``,
+    they have the largest number.
     """
     source, n = GeneratedC(text, name), len(centre)
     if facts["kind"] == "path":
@@ -123,13 +131,16 @@ def _explicit(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 
 def _splitting(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Return the one stage of a splitting: its flows add changes to a sum that begins with the compensation term."""
+    """Return the stages of a step by splitting: one, or three if corrector and inverse corrector enclose it.
+
+    In a stage, the flows add their changes to a sum that begins with the compensation term.
+    """
     return [_flows(facts, schedule, n) for schedule in facts["schedules"]]
 
 
 def _flows(facts: Mapping[str, Any], schedule: Sequence[Sequence[int]], n: int) -> Stage:
     listing, rows = Listing(), dict[int, list[int]]()
-    # a monitor adds a coordinate
+    # with a monitor, the C has one more coordinate, the physical time
     extra_coordinates = max(0, 1 + max(i for pairs in facts["moves"].values() for i, _ in pairs) - n)
     zeros = [listing.input("exact", 0.0)] * extra_coordinates
     state, start = listing.inputs("x", n) + zeros, listing.inputs("start", n) + zeros
@@ -145,8 +156,10 @@ def _flows(facts: Mapping[str, Any], schedule: Sequence[Sequence[int]], n: int) 
 
 
 def _newton(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Return the stages of a Newton step; the unknowns are y, and the last correction changes the increment to first
-    order."""
+    """Return the stages of a step that is solved by Newton's method for y, the solution of the implicit equation.
+
+    The C does not evaluate the increment after the last correction of y; it corrects the increment to first order.
+    """
     stages = []
     for k in range(len(facts["fractions"])):
         listing = Listing()
@@ -176,8 +189,10 @@ def _newton(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 
 def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
-    """Return the stage of a Gauss step, which is solved by sweeps; the unknowns are the increments of all Gauss
-    stages."""
+    """Return the one stage of a Gauss step, which is solved by fixed-point iteration.
+
+    The unknowns are the increments of all stages of the Gauss method.
+    """
     listing, kernels, nodes = Listing(), facts["kernels"], len(facts["weights"])
     width = len(kernels["stage_field"]["outputs"]["move"])
     coef = prepared(facts, listing, 0)
@@ -221,16 +236,18 @@ def _gauss(facts: Mapping[str, Any], n: int) -> list[Stage]:
     ]
 
 
-#: Safety factor for the sizes of terms when the number of terms of a Taylor series is chosen, since later boxes of p
-#: are wider.
+#: Safety factor for sizes of terms, when the number of terms of a Taylor series is chosen: the boxes of unknowns that
+#: are found later may be wider.
 MARGIN = 4.0
 
 
 def _path(
     facts: Mapping[str, Any], source: GeneratedC, n: int, centre: Sequence[Any], exact: bool = False
 ) -> list[Stage]:
-    """Return the stages of a step with one path expansion; its unknowns p are the mean gradient of S_h along the
-    path."""
+    """Return the stages of a step along paths, which the C expands in Taylor series.
+
+    The unknowns are p, the mean of ∇S_h along the path, where S_h is the generating function.
+    """
     limit = int(facts["most_terms"])
     longest, stages = PathReader(source, facts["series"], n, limit).described, []
     for k in range(len(facts["fractions"])):
@@ -240,7 +257,7 @@ def _path(
 
 
 def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: Sequence[int], u: Sequence[int]) -> Any:
-    """Append the Taylor series of a path from x for p = u; return the terms of each coordinate, from order 1."""
+    """Append the Taylor series of a path from x for p = u; return, for each coordinate, its terms from order 1 on."""
     starts = {f"s{i}": [j] for i, j in enumerate(x)}
     outputs = listing.copy(kernel, coef=prepared(facts, listing, k), p=u, **starts)
     return [outputs[f"s{i}"] for i in range(len(x))]
@@ -249,7 +266,10 @@ def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: 
 def _along_path(
     facts: Mapping[str, Any], source: GeneratedC, n: int, k: int, least: int, max_terms: int, coordinate: int
 ) -> Stage:
-    """Return stage k; its series have ``least`` to ``max_terms`` terms, as the series of ``coordinate`` proves."""
+    """Return stage k of a step along paths, whose Taylor series have ``least`` to ``max_terms`` terms.
+
+    The series of ``coordinate`` has a term so large that the C cannot end it before ``least`` terms.
+    """
     listing, kernels = Listing(), facts["kernels"]
     x, u, coef = listing.inputs("x", n), listing.inputs("u", n), prepared(facts, listing, k)
     terms = _series(facts, PathReader(source, facts["series"], n, max_terms).described, listing, k, x, u)
@@ -302,7 +322,7 @@ def _largest(listing: Listing, sizes: Sequence[int]) -> int:
 def _measured(
     facts: Mapping[str, Any], listing: Listing, x: Sequence[int], terms: Sequence[Sequence[int]], orders: Sequence[int]
 ) -> list[list[int]]:
-    """Append the sizes below which terms are negligible; return pairs of a term and its size, for some orders."""
+    """Append, for some orders, the thresholds below which the C neglects a term; return pairs of term and threshold."""
     starts = [listing.add("abs", i) for i in x]
     least = listing.add("mul", listing.add("exact", facts["least_share"]), listing.sum(starts))
     negligible, pairs = listing.add("exact", facts["negligible"]), []
@@ -314,8 +334,10 @@ def _measured(
 
 
 def _orders(facts: Mapping[str, Any], kernel: Any, n: int, k: int, box: Sequence[Any]) -> tuple[int, int, int]:
-    """Return the least and the largest number of terms of series of paths from a box, and the coordinate that proves
-    the least."""
+    """Return the least and the largest number of terms of Taylor series of paths from a box of states.
+
+    The third result is the number of a coordinate whose series cannot end before the least number.
+    """
     listing = Listing()
     x = listing.inputs("x", n)
     p = listing.copy(facts["kernels"]["generate"], coef=prepared(facts, listing, k), y=x)["slope"]

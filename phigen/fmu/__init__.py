@@ -1,1 +1,1 @@
-"""Functional mock-up units: solvers for co-simulation in simulators that import FMI 2.0 or 3.0."""
+"""Functional mock-up units (FMUs): solvers as files that simulators import through the standard FMI 2.0 or 3.0."""

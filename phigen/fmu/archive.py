@@ -1,4 +1,4 @@
-"""The archive of an FMU with sources, binaries and descriptions; equal contents give equal bytes."""
+"""The zip archive of an FMU, with sources, compiled libraries and descriptions. Equal contents give equal bytes."""
 
 from __future__ import annotations
 
@@ -27,8 +27,11 @@ _FILE, _PROGRAM = 0o100644 << 16, 0o100755 << 16
 
 @dataclass(frozen=True)
 class MockupUnit:
-    """Contents of an FMU: the texts of the ``sources``, the ``descriptions`` by version of FMI, and the ``build``
-    description of FMI 3.0."""
+    """Contents of an FMU: the texts of the ``sources`` by file name, and descriptions in XML.
+
+    ``descriptions`` maps the versions 2 and 3 of FMI to ``modelDescription.xml``; ``build`` is
+    ``buildDescription.xml``, which FMI 3.0 needs.
+    """
 
     name: str
     sources: Mapping[str, str]
@@ -37,9 +40,9 @@ class MockupUnit:
 
 
 def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> MockupUnit:
-    """Return the FMU of a system; ``solver`` has the texts of its C header and source by file name.
+    """Return the contents of the FMU of a system; ``solver`` has the texts of its C header and source by file name.
 
-    Raises `SpecError` for lattices, and for a spec without runs.
+    Raises `SpecError` for lattices, and for a spec without a run that goes forward in time.
     """
     name, variables = compilation.spec.name, variables_of(compilation)
     token = token_of(compilation, dict(solver))
@@ -50,10 +53,10 @@ def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> MockupUnit:
 
 
 def binaries(unit: MockupUnit, platforms: Collection[str] = ()) -> dict[str, bytes]:
-    """Return the shared library for each platform, as bytes by the name of the platform.
+    """Compile the FMU, and return the shared libraries as bytes, by the name of the platform.
 
-    Without ``platforms``, these are all platforms with a compiler. Raises `ToolchainError` if a compilation fails, or
-    if a named platform has no compiler.
+    ``platforms`` are by default all platforms for which there is a compiler. Raises `ToolchainError` if a compilation
+    fails, or if there is no compiler for one of the ``platforms``.
     """
     available = compilers()
     unavailable = sorted(set(platforms) - set(available))
@@ -74,7 +77,7 @@ def binaries(unit: MockupUnit, platforms: Collection[str] = ()) -> dict[str, byt
 
 
 def archive(unit: MockupUnit, version: int, libraries: Mapping[str, bytes]) -> bytes:
-    """Return the FMU for version 2 or 3 of FMI as bytes of a zip file."""
+    """Return the zip file of an FMU for version 2 or 3 of FMI; ``libraries`` are compiled libraries by platform."""
     contents: dict[str, bytes] = {"modelDescription.xml": unit.descriptions[version].encode()}
     for platform, library in libraries.items():
         platform_record = PLATFORMS[platform]
@@ -88,7 +91,7 @@ def archive(unit: MockupUnit, version: int, libraries: Mapping[str, bytes]) -> b
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as file:
         for path, data in contents.items():
             entry = zipfile.ZipInfo(path, _DATE)
-            entry.create_system = 3  # Unix, so that file permissions do not depend on this machine
+            entry.create_system = 3  # Unix: the file permissions in the archive are the same on all machines
             entry.external_attr = _PROGRAM if path.startswith("binaries/") else _FILE
             entry.compress_type = zipfile.ZIP_DEFLATED
             file.writestr(entry, data)

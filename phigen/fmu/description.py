@@ -17,11 +17,11 @@ from phigen.fmu.variables import Variable, first_run
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
 
-#: Name of the vendor in annotations.
+#: Name of the vendor, under which ``modelDescription.xml`` stores annotations.
 VENDOR = "phigen"
 
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
-#: Capabilities that the solver has, as names of attributes in each version of FMI.
+#: Capabilities of the solver that ``modelDescription.xml`` states: names of attributes, by version of FMI.
 _ABILITIES = {
     2: ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate"),
     3: (
@@ -38,7 +38,11 @@ _ABILITIES = {
 def model_description(
     compilation: Compilation, variables: Sequence[Variable], token: str, version: int, sources: Sequence[str]
 ) -> str:
-    """Return the text of ``modelDescription.xml`` for version 2 or 3 of FMI; ``sources`` are the files to compile."""
+    """Return the text of ``modelDescription.xml`` for version 2 or 3 of FMI.
+
+    ``token`` identifies the solver, so that the simulator notices a wrong library; ``sources`` are the C files to
+    compile.
+    """
     spec = compilation.spec
     variables = [
         replace(v, unit=_without_control_characters(v.unit), description=_without_control_characters(v.description))
@@ -75,7 +79,7 @@ def model_description(
 
 
 def build_description(name: str, sources: Sequence[str]) -> str:
-    """Return the text of ``sources/buildDescription.xml`` for FMI 3.0."""
+    """Return the text of ``sources/buildDescription.xml`` for FMI 3.0; ``sources`` are the C files to compile."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=name)
     files = ET.SubElement(configuration, "SourceFileSet", language="C99")
@@ -98,9 +102,9 @@ def _co_simulation(root: ET.Element, compilation: Compilation, version: int, sou
 
 
 def _experiment(root: ET.Element, compilation: Compilation) -> None:
-    """Add the default experiment: start, end and step of `first_run`.
+    """Add the default experiment, with start, end and step of `first_run`, to the XML element ``root``.
 
-    With a monitor, steps are equal in τ, the end in physical time is unknown, and only the start is added.
+    With a monitor, which rescales the time, the end in physical time is unknown, so only the start is added.
     """
     run = first_run(compilation.spec)
     experiment = ET.SubElement(root, "DefaultExperiment", startTime=repr(float(run.start)))
@@ -110,7 +114,7 @@ def _experiment(root: ET.Element, compilation: Compilation) -> None:
 
 
 def _annotations(root: ET.Element, compilation: Compilation, version: int) -> None:
-    """Add annotations with the method of the solver and the checksum of its spec."""
+    """Add annotations to the XML element ``root``: the method of the solver, and the checksum of its spec."""
     spec, facts = compilation.spec, ET.Element("method")
     facts.set("order", str(compilation.order.order))
     facts.set("scheme", str(compilation.described["scheme"]))
@@ -165,7 +169,7 @@ def _structure(root: ET.Element, variables: Sequence[Variable], version: int) ->
 
 
 def _without_control_characters(text: str) -> str:
-    """Return the text with spaces in place of line breaks and of control characters, which XML forbids."""
+    """Return the text with single spaces in place of control characters, which XML forbids, and of line breaks."""
     return " ".join(
         "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Cn", "Zl", "Zp") else c for c in text).split()
     )

@@ -13,8 +13,11 @@ from phigen.runtime.toolchain import Compiler
 
 @dataclass(frozen=True)
 class Platform:
-    """Platform: its folder in FMUs of FMI 3.0 and 2.0 ("" if 2.0 defines none), its target for zig, and the suffix of
-    libraries."""
+    """Platform: names of its folder in FMUs of FMI 3.0 and 2.0, its name for the compiler zig, and the suffix of
+    libraries.
+
+    ``folder_2`` is "" for platforms that FMI 2.0 does not define.
+    """
 
     folder: str
     folder_2: str
@@ -22,8 +25,8 @@ class Platform:
     suffix: str
 
 
-#: Platforms for which zig compiles without further packages. The version of glibc is an old one, so that binaries load
-#: on older machines.
+#: Platforms for which the compiler zig needs no further packages. Libraries for Linux are linked with the old glibc
+#: 2.17, so that they load on older machines.
 PLATFORMS = {
     p.folder: p
     for p in (
@@ -36,11 +39,11 @@ PLATFORMS = {
     )
 }
 
-#: Flags of compilations. Without fused multiply-add, results on different platforms differ only by their libm. Only the
+#: Compiler flags. Without fused multiply-add, results on different platforms differ only by their libm. Only the
 #: functions of FMI are exported, and debugging symbols are removed.
 FLAGS = ("-ffp-contract=off", "-fvisibility=hidden", "-s")
 
-#: Limit of a compilation in seconds, which includes the time in which zig first builds its libraries for a platform.
+#: Time limit of a compilation in seconds. It includes the first use of zig for a platform, which builds libraries.
 TIMEOUT = 1200.0
 
 _PACKAGE = "ziglang"
@@ -54,7 +57,8 @@ def host() -> Platform | None:
 
 
 def compilers() -> dict[str, Compiler]:
-    """Return the compilers by platform: zig for all platforms if it is installed, else the C compiler for this machine.
+    """Return the compilers by platform: zig for all platforms if it is installed, or else the C compiler of this
+    machine.
 
     Raises `ToolchainError` if the compiler named in CC does not work.
     """

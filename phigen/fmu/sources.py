@@ -1,4 +1,4 @@
-"""C sources of an FMU: the solver as ``phigen build`` writes it, and the functions of FMI 2.0 and 3.0 that call it.
+"""C sources of an FMU: the solver as ``phigen build`` writes it, and functions of FMI 2.0 and 3.0 that call the solver.
 
 The functions of FMI are in ``templates/c/runtime/fmu*.c``; this module adds the constants of a system.
 """
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -> str:
-    """Return the text of ``NAME_fmi.c``, the functions of FMI for the solver in ``NAME.h``."""
+    """Return the text of ``NAME_fmi.c``: the functions of FMI, which call the solver declared in ``NAME.h``."""
     program = compilation.program
     switches = runtime_of(program)[0].switches
     amalgam = Amalgam(program.name, switches, {"solver.h": "", "fmu_model.h": _model(compilation, variables, token)})
@@ -37,8 +37,8 @@ def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -
 
 
 def token_of(compilation: Compilation, files: dict[str, str]) -> str:
-    """Return a token by which FMI checks that ``modelDescription.xml`` and a binary belong together: a hash of the
-    solver."""
+    """Return a hash of the solver and its first run, by which FMI checks that a library fits
+    ``modelDescription.xml``."""
     identity = "".join(files[name] for name in sorted(files)) + repr(first_run(compilation.spec))
     digest = hashlib.sha256(identity.encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

@@ -1,4 +1,4 @@
-"""Variables of an FMU, which the simulator reads and sets by their numbers."""
+"""Variables of an FMU: quantities of the solver that the simulator reads and sets by their numbers."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ POSITION = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Variable:
-    """Variable in ``modelDescription.xml``.
+    """Quantity of the solver that ``modelDescription.xml`` offers to the simulator.
 
-    ``number`` is its value reference, the same in FMI 2.0 and 3.0. ``start`` is its initial value, or None if the
-    solver computes it. ``whole`` marks integers, and ``positive`` variables with lower bound 0.
+    ``number`` identifies the variable (the value reference of FMI). ``start`` is its initial value, or None if the
+    solver computes it. ``whole`` marks integers, and ``positive`` marks variables with lower bound 0.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Variable:
 
     @property
     def initial(self) -> str:
-        """Return the value of the attribute ``initial``: exact or calculated, "" for causalities without this
+        """The attribute ``initial`` of the variable in FMI: "exact", "calculated", or "" if its causality allows no
         attribute."""
         if self.causality in ("independent", "input"):
             return ""
@@ -46,7 +46,7 @@ class Variable:
 
 
 def first_run(spec: Spec) -> Run:
-    """Return the first run with a positive step, which gives initial state, parameters and step of an FMU.
+    """Return the first run of the spec with a positive step, which gives initial state, parameters and step of the FMU.
 
     Raises `SpecError` for lattices, and for a spec without such a run.
     """
@@ -68,14 +68,17 @@ def first_run(spec: Spec) -> Run:
 
 
 def variables_of(compilation: Compilation) -> tuple[Variable, ...]:
-    """Return all variables in the order of their numbers 0, 1, …, grouped by kind as in `first_numbers`."""
+    """Return all variables in the order of their numbers 0, 1, …; variables of one kind, such as parameters, are
+    adjacent."""
     all_variables = chain.from_iterable(_kinds(compilation).values())
     return tuple(replace(variable, number=k) for k, variable in enumerate(all_variables))
 
 
 def first_numbers(compilation: Compilation) -> dict[str, int]:
-    """Return the number of the first variable of each kind; for a kind without variables, the number of the next
-    kind."""
+    """Return, by kind of variables, the number of the first variable of this kind.
+
+    A kind without variables has the number of the next kind. ``END`` is the number of all variables.
+    """
     numbers, number = {}, 0
     for kind, variables_of_kind in _kinds(compilation).items():
         numbers[kind] = number
@@ -84,7 +87,7 @@ def first_numbers(compilation: Compilation) -> dict[str, int]:
 
 
 def _kinds(compilation: Compilation) -> dict[str, list[Variable]]:
-    """Return the variables of each kind, in the order of their numbers."""
+    """Return the variables of each kind, such as "STATE"; kinds and variables are in the order of the numbers."""
     spec, program = compilation.spec, compilation.program
     run = first_run(spec)
     return {
@@ -134,7 +137,7 @@ def _seed(program: Program, run: Run) -> Iterator[Variable]:
 
 
 def _attitude(program: Program) -> Iterator[Variable]:
-    """Yield the entries of the attitude, which is the identity at the start."""
+    """Yield the variables for the entries of the attitude, whose initial value is the identity."""
     if not program.attitude:
         return
     rows = program.attitude.group.rows
@@ -146,7 +149,7 @@ def _attitude(program: Program) -> Iterator[Variable]:
 
 
 def _position(program: Program) -> Iterator[Variable]:
-    """Yield the position of a body with an attitude and a position; it is 0 at the start."""
+    """Yield the variables for the position of a body, if the system has one; its initial value is 0."""
     if program.attitude and program.attitude.group.translation:
         for name in POSITION:
             yield Variable(f"position.{name}", "output", "continuous", 0.0, "position of the body in space")

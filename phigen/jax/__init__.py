@@ -1,4 +1,4 @@
-"""Runs as functions of JAX with derivatives, for use with `jit` and `vmap`. Needs jax.
+"""Runs of phigen as functions of JAX, with derivatives, for use with `jit` and `vmap`. Needs the package jax.
 
 `propagator` calls a compiled solver. `flow` integrates in JAX, with the bracket of a system and any function of JAX as
 H.

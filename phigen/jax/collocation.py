@@ -1,9 +1,9 @@
-"""Gauss collocation in JAX: the step of a bracket with any function as H.
+"""Gauss collocation in JAX: the step for the bracket of a system, with any function of JAX as H.
 
-The unknowns, the sweeps that solve for them, and the predictor are those of `phigen.gauss`. JAX differentiates the
-stages of a step as the solution of an equation: tangents solve the linearised equation, and cotangents its transpose,
-by sweeps of their own. So derivatives are those of the exact solution of the stage equations, to round-off; the sweeps
-of the step are not differentiated.
+The stage equations of a step are solved by fixed-point iteration, whose iterations are called sweeps. The unknowns, the
+sweeps and the predictor are those of `phigen.gauss`. For derivatives JAX solves the linearised stage equations
+(tangents) or their transpose (cotangents), by further sweeps. So derivatives are those of the exact solution of the
+stage equations, to round-off; the sweeps of the step are not differentiated.
 """
 
 from __future__ import annotations
@@ -30,13 +30,14 @@ from phigen.symbolic.symbols import Symbol
 #: Kind of the symbols that stand for the components of ∇H.
 GRADIENT = "gradient"
 
-#: Largest number of sweeps of a step or of a linear equation, the same as in generated code.
+#: Largest number of sweeps (fixed-point iterations) for a step or for a linear equation, the same as in generated code.
 MAX_SWEEPS = 100
 
-#: Thresholds for the sweeps of a step and for those of linear equations, in double precision.
+#: Thresholds, in double precision, at which the iterations for a step and for a linear equation end.
 POLICY, LINEAR_POLICY = GaussPolicy(), GaussAdjointPolicy()
 
-#: State of a run between two steps: x, its compensation term, and the increments of the last step in the frame of x.
+#: Data of a run between two steps: the state x, its compensation term, and the increments of the last step, expressed
+#: in the frame of x.
 Carry = tuple[Any, Any, Any]
 
 
@@ -54,13 +55,13 @@ class _Traced(Arrays):
 
 
 def rounding_of(dtype: Any) -> float:
-    """Return the rounding unit of a floating-point type, relative to that of double precision."""
+    """Return the machine epsilon of a floating-point type, divided by that of double precision."""
     return float(jnp.finfo(dtype).eps) / float(np.finfo(np.float64).eps)
 
 
 def tableau_of(dtype: Any, stages: int) -> Tableau:
-    """Return the coefficients of a method for a floating-point type: for double precision, or else for single
-    precision."""
+    """Return the coefficients of the Gauss method, rounded for double precision, or for single precision if dtype is
+    shorter."""
     return tableau(stages, DOUBLE if rounding_of(dtype) == 1 else SINGLE)
 
 
@@ -68,7 +69,7 @@ def tableau_of(dtype: Any, stages: int) -> Tableau:
 class Collocation:
     """Step of size ``h`` by the Gauss method with ``stages`` stages.
 
-    ``points`` are the stage equations of a system, whose own H is not used. ``slope`` is ∇H, a function of x and
+    ``points`` are the stage equations of a system, in which ``slope`` replaces ∇H of the system: a function of x and
     further arguments.
     """
 
@@ -97,8 +98,11 @@ class Collocation:
         return None if kernel is None else (kernel.inputs["k"], kernel.outputs[0].values)
 
     def _values(self, x: Any, z: Any, parameters: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the values of symbols by name: parameters, coordinates ``x`` at the start, and unknowns ``z``, arrays
-        over stages."""
+        """Return the values of the symbols in the stage equations, by name.
+
+        The symbols are the parameters, the coordinates (values ``x`` at the start of the step), and the unknowns
+        (values ``z``, each an array over the stages).
+        """
         return {
             **parameters,
             **dict(zip(self.points.system.coordinates, x, strict=True)),
@@ -106,13 +110,15 @@ class Collocation:
         }
 
     def start(self, x: Any) -> Carry:
-        """Return the state of a run at its start, where there is no increment for a prediction."""
+        """Return the data of a run at its start x, with compensation term 0 and increments 0, since there is no last
+        step."""
         return x, jnp.zeros_like(x), jnp.zeros((len(self.points.unknowns), self.stages), x.dtype)
 
     def moves(self, table: Tableau, x: Any, moves: Any, arguments: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return h b_j f_j for the derivatives f_j of the unknowns at stage j, as an array (unknowns, stages).
+        """Return h b_j f_j as an array (unknowns, stages): f_j is the time derivative of the unknowns at stage j, b_j
+        its weight.
 
-        ``moves`` are the current increments L_j, of the same shape, which determine the unknowns at the stages.
+        ``moves`` are the current increments L_j, of the same shape, from which the unknowns at the stages follow.
         """
         z = moves @ jnp.asarray(table.mixing, x.dtype).T
         values = self._values(x, z, parameters)
@@ -123,7 +129,7 @@ class Collocation:
         return weights * _stacked(_Traced(values).values(self._derivatives), self.stages, x.dtype)
 
     def advance(self, carry: Carry, arguments: Any, parameters: Mapping[str, Any]) -> Carry:
-        """Return the state of a run after a step; x is NaN if the step failed."""
+        """Return the data of a run after a step; x is NaN if the step failed."""
         x, compensation, difference = carry
         table, unit = tableau_of(x.dtype, self.stages), rounding_of(x.dtype)
 
@@ -145,14 +151,21 @@ class Collocation:
         return following, rounding_error, jax.lax.stop_gradient(self._from_the_end(x, end, moves, parameters))
 
     def _scale(self, x: Any) -> Any:
-        """Return the scales of the unknowns (unknowns, 1): |x| for coordinates and functionals, 1 for the others."""
+        """Return the sizes (unknowns, 1) to which changes of the unknowns are relative: |x| or 1.
+
+        x| is for unknowns that are coordinates or functionals of x, 1 for all others.
+        """
         size = jnp.sqrt(jnp.sum(x**2))
         size = jnp.where(size > 0, size, 1)
         ones = jnp.ones(len(self.points.unknowns) - self.points.plain, x.dtype)
         return jnp.concatenate([jnp.broadcast_to(size, (self.points.plain,)), ones])[:, None]
 
     def _from_the_end(self, x: Any, end: Any, moves: Any, parameters: Mapping[str, Any]) -> Any:
-        """Return the increments of a step from ``x`` in the frame of its end; ``end`` has the unknowns there."""
+        """Return the increments of a step from ``x``, converted to the frame of the end of the step, for the next
+        prediction.
+
+        ``end`` has the values of the unknowns at the end.
+        """
         if self._traced_value is None:
             return moves
         symbols, roots = self._traced_value
@@ -161,25 +174,26 @@ class Collocation:
 
 
 def _stacked(values: Sequence[Any], stages: int | None, dtype: Any) -> Any:
-    """Return the values as rows of an array; each is an array over the stages, or one number for all stages."""
+    """Return an array with a row for each of the ``values``, which are arrays over the stages or single numbers."""
     shape = () if stages is None else (stages,)
     return jnp.stack([jnp.broadcast_to(jnp.asarray(v, dtype), shape) for v in values])
 
 
 def _inverse_mixing(table: Tableau, dtype: Any) -> Any:
-    """Return the transpose of μ⁻¹, by which predicted unknowns at the stages are converted to increments."""
+    """Return the transpose of μ⁻¹ for the matrix μ of the method, which converts unknowns at the stages to
+    increments."""
     return jnp.asarray(np.linalg.inv(np.array(table.mixing)).T, dtype)
 
 
 def _largest(change: Any, scale: Any) -> Any:
-    """Return the largest norm over the stages of a change, relative to the scales of the unknowns."""
+    """Return the largest norm over the stages of a change of the unknowns, relative to ``scale``."""
     return jnp.sqrt(jnp.max(jnp.sum((change / scale) ** 2, axis=0)))
 
 
 def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float) -> Any:
-    """Return the solution L of F(L) = L by sweeps L ← F(L); NaN if the sweeps do not converge.
+    """Return the solution L of F(L) = L, found by the iteration L ← F(L); NaN if the iteration does not converge.
 
-    ``equation`` is the function F(L) − L. If the sweeps diverge from ``start``, they restart once from 0.
+    ``equation`` is the function F(L) − L. If the iteration diverges from ``start``, it begins again once, from 0.
     """
     solved_limit, rounding, near_rounding = (unit * v for v in (POLICY.solved, POLICY.rounding, POLICY.nearly_rounding))
     stages, infinity = start.shape[1], jnp.asarray(jnp.inf, start.dtype)
@@ -213,17 +227,19 @@ def _solved(equation: Callable[[Any], Any], start: Any, scale: Any, unit: float)
 
 
 def _solved_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
-    """Return the solution L of (F′ − 1) L = side, where ``linear`` is F′ − 1. JAX transposes it to sweeps of the same
-    kind."""
+    """Return the solution L of (F′ − 1) L = side; ``linear`` is the linear map F′ − 1.
+
+    JAX can transpose this function: the transposed equation is solved by the same iteration.
+    """
     return jax.lax.custom_linear_solve(
         linear, side, lambda f, b: _swept_linear(f, b, unit), lambda f, b: _swept_linear(f, b, unit)
     )
 
 
 def _swept_linear(linear: Callable[[Any], Any], side: Any, unit: float) -> Any:
-    """Return the solution L of (F′ − 1) L = side by sweeps L ← F′L − side, where ``linear`` is F′ − 1.
+    """Return the solution L of (F′ − 1) L = side, found by the iteration L ← F′L − side; ``linear`` is the map F′ − 1.
 
-    The result is NaN if the sweeps do not converge.
+    The result is NaN if the iteration does not converge.
     """
     solved_limit, rounding = unit * LINEAR_POLICY.adjoint_solved, unit * LINEAR_POLICY.adjoint_rounding
     floor = jnp.finfo(side.dtype).tiny

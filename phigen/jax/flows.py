@@ -27,7 +27,7 @@ from phigen.symbolic.verdict import REFUTED
 if TYPE_CHECKING:
     from phigen.lattice.lattice_system import LatticeSystem
 
-#: Hint for brackets without a known exact Poisson map.
+#: Hint in the error for brackets for which no exact Poisson map is known.
 TRUNCATION_HINT = 'structure="to truncation" takes every bracket; its steps are no Poisson maps'
 
 
@@ -43,18 +43,19 @@ def flow(
 ) -> Callable[..., Any]:
     """Return the run of ẋ = π∇H as a function ``f(x0, *arguments, **parameters)``.
 
-    π is that of ``system``, whose H and runs are not used. H is ``hamiltonian(x, *arguments)``, a function of JAX that
-    returns a number. x has the shape (DIM,), and ``arguments`` are arrays or trees of arrays, such as the weights of a
-    network. ``parameters`` are parameters of π by name; missing ones have their defaults.
+    π is the Poisson tensor of ``system``, whose H and runs are not used. H is ``hamiltonian(x, *arguments)``, a
+    function of JAX that returns a number. x has the shape (DIM,), and ``arguments`` are arrays or trees of arrays, such
+    as the weights of a network. ``parameters`` are parameters of π by name; missing ones have their defaults.
 
-    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, it returns all rows of
+    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, f returns all rows of
     `Solver.integrate`, (…, rows, DIM). f is written in JAX and has the precision of x0. It can be used with `jit` and
-    `vmap`, on every device of XLA, and has derivatives in both modes, from the linearised equations of a step.
+    `vmap`, on every device of XLA. It has derivatives in forward and in reverse mode, computed from the linearised
+    equations of each step.
 
-    Steps are those of ``scheme: gauss`` of this order: Poisson maps, for any H and step size, if the bracket is
-    constant or that of a Lie algebra that phigen knows. ``structure="to truncation"`` accepts every bracket, but its
-    steps are no Poisson maps. If a step fails because h is too large, the result is NaN from there on. H should be
-    smooth, since the order depends on its derivatives.
+    Steps are those of ``scheme: gauss`` at this order: Poisson maps, for any H and step size, if the bracket is
+    constant or the bracket of a Lie algebra that phigen knows. ``structure="to truncation"`` accepts every bracket, but
+    its steps are no Poisson maps. If a step fails because h is too large, all later states are NaN. H should be smooth,
+    since the order depends on its derivatives.
 
     Raises `SpecError` for brackets without exact steps, and `CheckError` if π is not a Poisson tensor.
     """
@@ -107,7 +108,8 @@ def _run_of(method: Collocation, bracket: System, steps: int, stride: int | None
         if unknown:
             raise TypeError(f"unknown parameter {min(unknown)!r}; those of {bracket.name} are {', '.join(defaults)}")
         values = {name: jnp.asarray(v, x.dtype) for name, v in (defaults | parameters).items()}
-        # Trees with leaves other than arrays, such as functions, cannot be arguments of `jit`.
+        # `jit` accepts only trees of arrays as arguments; with other leaves, such as functions, the run is not
+        # compiled.
         of_arrays = all(
             isinstance(leaf, jax.Array | np.ndarray | np.number | float) for leaf in jax.tree.leaves(arguments)
         )
@@ -130,7 +132,10 @@ def _real_state(x0: Any, bracket: System) -> Any:
 
 
 def _system_of(source: str | PathLike[str] | Spec | System | LatticeSystem) -> System:
-    """Return the system of a source. Raises `SpecError` if its motion is not determined by π and H(x) alone."""
+    """Return the system that a file, a spec or a system object describes.
+
+    Raises `SpecError` if the motion is not determined by π and H(x) alone, for instance with forces.
+    """
     system = load(source) if isinstance(source, str | PathLike) else source
     system = system_from_spec(system) if isinstance(system, Spec) else system
     if not isinstance(system, System):
@@ -145,7 +150,7 @@ def _system_of(source: str | PathLike[str] | Spec | System | LatticeSystem) -> S
 
 
 def _refused(system: System) -> Iterator[tuple[str, str, str]]:
-    """Yield key, message and hint for each part of a system that `flow` does not offer."""
+    """Yield the key in the spec, a message and a hint for each part of a system that `flow` does not support."""
     if system.time:
         message = "the system depends on the time, but H is a function of x without the time"
         yield "time", message, "remove time, or use phigen.jax.propagator"
@@ -166,7 +171,7 @@ def _realised(system: System, structure: str) -> Realisation:
 
 
 def _expect_proved(system: System, realisation: Realisation, stages: int) -> None:
-    """Raise `CheckError` if π is not a Poisson tensor, or if a statement about the step is refuted."""
+    """Raise `CheckError` if π is not a Poisson tensor, or if a statement about the Gauss step is refuted."""
     statements_of_spec = [s for group in statements.tensor(system).values() for s in group]
     if not any(s.verdict == REFUTED for s in statements_of_spec):
         statements_of_spec += gauss_statements.check(system, system, realisation, tableau(stages))

@@ -1,7 +1,7 @@
-"""Runs of solvers as functions of JAX with derivatives, for use with `jit` and `vmap`.
+"""Runs of compiled solvers as functions of JAX with derivatives, for use with `jit` and `vmap`.
 
-The solver runs on the CPU in double precision, in a callback. Derivatives are computed by `Solver.pullback`; there are
-no second derivatives.
+JAX calls the solver on the CPU, in double precision. Derivatives are computed by `Solver.pullback`; there are no second
+derivatives.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.propagation import Propagation
 from phigen.runtime.solver import Solver
 
-#: Message if forward mode is used for a lattice.
+#: Message of the error for derivatives of lattices in forward mode.
 NO_FORWARD_MODE = (
     "lattices have no derivatives in forward mode (jax.jvp, jax.jacfwd, forward=True); "
     "use jax.grad, jax.vjp or jax.jacrev"
 )
 
-# Identity whose compilation or evaluation raises the error about forward mode.
+# An identity map for JAX that raises the error about forward mode if JAX compiles or evaluates it.
 _refused_forward = Primitive("lattices_have_no_forward_mode")
 _refused_forward.def_abstract_eval(lambda value: value)
 
@@ -52,14 +52,14 @@ def propagator(
 ) -> Callable[..., Any]:
     """Return the run of a solver as a function ``f(x0, parameters={})`` of arrays.
 
-    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, it returns all rows of
+    f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, f returns all rows of
     `Solver.integrate`, (…, rows, DIM). ``parameters`` are arrays by name, whose shapes broadcast to (…); missing ones
-    have their defaults. Results have the precision of x0, which is single unless ``jax_enable_x64`` is set. `vmap` runs
-    its members as an ensemble. A failed step raises its exception where the result is used.
+    have their defaults. Results have the precision of x0, which is single unless ``jax_enable_x64`` is set. `vmap`
+    integrates its members as one ensemble. If a step fails, its exception is raised where the result is used.
 
     Derivatives are exact to round-off, and need a solver compiled with ``adjoint=True``. `jax.grad` and `jax.vjp` take
-    one reverse pass. `jax.jvp` and `jax.jacfwd`, and all derivatives with ``forward``, use the Jacobian, which takes
-    one reverse pass for each number of the result.
+    one reverse pass. `jax.jvp` and `jax.jacfwd` compute the Jacobian, which takes one reverse pass for each number of
+    the result. With ``forward``, all derivatives are computed in this way.
 
     For lattices, DIM stands for (coordinates, *sizes), parameters at sites have the axes of the sites, and further
     arguments, such as ``bonds=``, apply to all runs. Lattices have no derivatives in forward mode.
@@ -88,7 +88,7 @@ def propagator(
         batch, (x0, parameters), (state_directions, changes) = _Axes(runs, *arguments), arguments, directions
         states = runs.shape(x0.shape)
         if runs.axes > 1:
-            # JAX also traces this branch in reverse mode, but does not evaluate it.
+            # In reverse mode JAX also traces this branch, but does not evaluate it, so the error is not raised.
             return _refused_forward.bind(jax.lax.full(states, 0, x0.dtype))
 
         def jacobian(x: Any, p: Any) -> Any:
@@ -145,11 +145,12 @@ def _real(value: Any, argument: str) -> Any:
 def _linear(
     apply: Callable[[Any], Any], transpose: Callable[[Any], Any], arguments: Any, shape: tuple[int, ...]
 ) -> Any:
-    """Return ``apply(arguments)`` for a linear map with a known transpose; ``shape`` is the shape of the result.
+    """Return ``apply(arguments)`` for a linear map A, whose transpose JAX shall compute by the function ``transpose``.
 
-    JAX only accepts transposes of linear solves, so the map A is written as the trivial solve (u, y) = (v, A v).
+    ``shape`` is the shape of the result. JAX accepts a given transpose for solutions of linear equations only, so A is
+    written as the trivial solution (u, y) = (v, A v) of an equation.
     """
-    # zero, but a linear function of v, as JAX requires of solutions
+    # JAX requires a solution that is a linear function of v; adding this zero makes it one.
     zero = sum(0 * jnp.sum(leaf) for leaf in jax.tree.leaves(arguments))
     arguments, nothing = jax.tree.map(lambda leaf: leaf + zero, arguments), jnp.broadcast_to(zero, shape)
 
@@ -174,7 +175,7 @@ def _derived_twice(*_: Any) -> Any:
 
 
 class _Axes:
-    """Numbers of axes of the arguments of a function, by which the axes that `vmap` adds in front are recognised."""
+    """Numbers of axes that arguments have without `vmap`, from which the axes that `vmap` adds in front are found."""
 
     def __init__(self, runs: Propagation, x0: Any, parameters: Mapping[str, Any]) -> None:
         self._leading = x0.ndim - runs.axes

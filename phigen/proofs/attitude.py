@@ -1,9 +1,10 @@
-"""Statements on attitudes: a step conserves a momentum, and rotates with the velocity ∇H.
+"""Statements on attitudes: a step conserves the angular momentum, and rotates with the angular velocity ∇H.
 
-If x is the momentum in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, and the momentum in space is constant. If x is the
-momentum in space, g₁ = τ g₀, and the momentum in the body is constant. The product of τ and a rotation that fixes x
-conserves the momentum as well, so a second statement is needed, on the rate of rotation: for h → 0 it must be ∇H, where
-H includes the Casimirs that the gauge subtracted.
+g₀ and g₁ are the attitudes before and after a step, as group elements, and τ is the attitude increment. If x is the
+momentum in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, and the momentum in space is constant. If x is the momentum in space,
+g₁ = τ g₀, and the momentum in the body is constant. The product of τ and a rotation that fixes x conserves the momentum
+as well, so a second statement is needed, on the rate of rotation: for h → 0 it must be ∇H, where H includes the
+Casimirs that the gauge subtracted.
 """
 
 from __future__ import annotations
@@ -49,12 +50,12 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 Vector = Sequence[Expression]
 
-#: The attitude before a step: symbols for the four components of a quaternion.
+#: Symbols for the four components of a quaternion, the attitude before a step.
 BEFORE = tuple(symbol(Symbol("attitude", i)) for i in range(4))
 
 
 def check(compilation: Compilation) -> Iterator[Statement]:
-    """Yield the statements about the attitude of a method."""
+    """Yield the statements about the attitude that a method computes; none if it computes no attitude."""
     attitude = compilation.program.attitude
     if attitude is not None:
         yield from compilation.by_kind(
@@ -65,9 +66,9 @@ def check(compilation: Compilation) -> Iterator[Statement]:
 
 
 def _series_statements(attitude: Attitude, compilation: CompiledSeries) -> Iterator[Statement]:
-    """Yield the statements on the group element of an implicit or explicit step, and on the gradient of S_1."""
+    """Yield the statements for a step from the series S_1, S_2, …: on the attitude increment, and on its rate ∇S_1."""
     system, group, chart = compilation.system, attitude.group, compilation.realisation
-    # The p of the coordinates contains the covector force, the p of the group element does not.
+    # With forces, α and β are taken at p = ∇S_h + hζ, but the attitude increment is that of ∇S_h alone.
     pushed = system.forces is not None and any(not z.is_zero for z in system.forces.covector)
     if group.matrices:
         yield from _matrix_statements(system, chart, attitude)
@@ -88,7 +89,7 @@ def _series_statements(attitude: Attitude, compilation: CompiledSeries) -> Itera
 
 
 def _first_term(compilation: CompiledSeries) -> Expression:
-    """Return S_1 as an expression. It is not expanded if it has too many terms."""
+    """Return S_1 as an expression, which is not expanded if it has too many terms."""
     try:
         first = compilation.series.polynomial(1)
     except OverflowError:
@@ -97,12 +98,12 @@ def _first_term(compilation: CompiledSeries) -> Expression:
 
 
 def _gauss_statements(attitude: Attitude, compilation: CompiledGauss) -> Iterator[Statement]:
-    """Yield the statement on the rate of the group element of a Gauss step at its start."""
+    """Yield the statement for a Gauss step: the rate of the group element at the start of the step."""
     system, group = compilation.system, attitude.group
     pace = compilation.gauge.pace(system)
     points = stage_map(compilation.discretised, compilation.gauss, pace)
     values = group_element(points, group)
-    assert values is not None  # otherwise the program would have no attitude
+    assert values is not None  # the program has an attitude, so the group element exists
     at_start = dict.fromkeys(points.unknowns, ZERO)
     slopes = dict(zip(points.unknowns, substitute(vector_field(points, at_unknowns(points)), at_start), strict=True))
     rates = [total(substitute([e], at_start)[0] * slopes[z] for z, e in row.items())
@@ -114,10 +115,10 @@ def _gauss_statements(attitude: Attitude, compilation: CompiledGauss) -> Iterato
 
 
 def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: Expression | None = None) -> Statement:
-    """Return the statement that ∇S_1 (``slope``) plus the terms restored for Casimirs equals ∇H, in rotation
-    components.
+    """Return the statement that the attitude rotates with ∇H for h → 0, in components of the Lie algebra.
 
-    With a ``monitor`` g, the sum equals g∇H where K = 0.
+    ``slope`` is ∇S_1, the rate of the attitude increment. Gradients of Casimirs that were subtracted from H are added
+    to it. With a ``monitor`` g, which rescales time by dt = g dτ, the sum must equal g∇H where K = g (H − H(x₀)) is 0.
     """
     group, velocity = attitude.group, list(gradient(system.hamiltonian, system.coordinates))
     if monitor:
@@ -133,10 +134,10 @@ def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: E
 
 
 def path_statement(system: System, group: Group) -> Statement:
-    """Return the statement that a momentum is constant along ṁ = π(m)p with ġ = g·p or p·g.
+    """Return the statement that a momentum is constant along the path ṁ = π(m)p with ġ = g·p or ġ = p·g.
 
-    This is the momentum in space if m is the momentum in the body, and that in the body if m is the momentum in space.
-    α and β are the ends of such a path.
+    It is the momentum in space if m is the momentum in the body, and the momentum in the body if m is that in space. α
+    and β are the ends of such a path.
     """
     m, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
     slope = hamiltonian_vector_field(system.poisson, p)
@@ -158,8 +159,10 @@ def path_statement(system: System, group: Group) -> Statement:
 
 
 def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) -> Iterator[Statement]:
-    """Yield the statements on the parts of a splitting: the gradient of each is constant along its flow; they sum to
-    H with Casimirs."""
+    """Yield the statements for a splitting: ∇H_k of each part is constant along its flow, and the parts add up to H.
+
+    Casimirs that were subtracted from H are added again.
+    """
     system, splitting, group = compilation.system, compilation.splitting, attitude.group
     elements = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
     order = "exp(t∇H_{k}) g₀" if group.spatial else "g₀ exp(t∇H_{k})"
@@ -195,7 +198,7 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
 
 
 def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]:
-    """Yield the rates of the coordinates of free rigid bodies along the terms that precede the bodies; all must be
+    """Yield the rates of the coordinates of free rigid bodies along the flows of other terms of a part; all must be
     0."""
     for factor in turning.factors if turning.bodies else ():
         rates = hamiltonian_vector_field(system.poisson, gradient(factor, system.coordinates))
@@ -204,8 +207,10 @@ def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]
 
 
 def _weights(turning: Turning, group: Group) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of α_i = ±(w_k − w_j), where w are the second derivatives of H and α the factors of the
-    rotations."""
+    """Yield the residuals of α_i = ±(w_k − w_j) for free rigid bodies.
+
+    w are the second derivatives of H (inverse moments of inertia), and α the factors in the body's attitude increment.
+    """
     for body in turning.bodies:
         w = [derivative(derivative(body.hamiltonian, c), c) for c in body.coordinates]
         for a, (j, k) in zip(body.factors, CYCLIC, strict=True):
@@ -213,9 +218,10 @@ def _weights(turning: Turning, group: Group) -> Iterator[tuple[str, Expression]]
 
 
 def exponential_statement(system: System, group: Group, turning: Turning, name: str) -> Statement:
-    """Return the statement that each factor 1 + E of the group element solves dE/dt = (1 + E)P with E = 0 at t = 0.
+    """Return the statement that each factor 1 + E of the attitude increment solves dE/dt = (1 + E)P with E = 0 at t =
+    0.
 
-    P is the matrix of the gradient of the term of H that belongs to the factor.
+    P is the matrix of ∇H_i for that term H_i of the Hamiltonian to which the factor belongs.
     """
     residuals = []
     for factor, factor_element in zip(turning.factors, factor_elements(system, group, turning), strict=True):
@@ -227,8 +233,10 @@ def exponential_statement(system: System, group: Group, turning: Turning, name: 
 
 
 def _matrix_statements(system: System, chart: BiRealisation, attitude: Attitude) -> Iterator[Statement]:
-    """Yield two statements: the matrices represent the bracket; the element is the exponential, or the Cayley
-    transform, of p."""
+    """Yield two statements for attitudes that are matrices: they represent the bracket, and the increment belongs to p.
+
+    The increment must be the exponential, or the Cayley transform, of p.
+    """
     algebra = system.lie_algebra
     assert algebra is not None
     yield representation_statement(system, algebra, attitude.group)
@@ -239,9 +247,9 @@ def _matrix_statements(system: System, chart: BiRealisation, attitude: Attitude)
 
 
 def representation_statement(system: System, algebra: LieAlgebra, group: Group) -> Statement:
-    """Return the statement [E_i, E_j] = ± Σ c_ij^k E_k, for {x_i, x_j} = Σ c_ij^k x_k.
+    """Return the statement that the matrices E_i of a group represent the bracket: [E_i, E_j] = ± Σ c_ij^k E_k.
 
-    The sign is + if the group element is multiplied from the left.
+    The structure constants are those of {x_i, x_j} = Σ c_ij^k x_k. The sign is + if increments multiply from the left.
     """
     n, size = range(algebra.dimension), range(group.rows)
     residuals = []
@@ -258,10 +266,10 @@ def representation_statement(system: System, algebra: LieAlgebra, group: Group) 
 
 
 def ends_statement(system: System, beta: Vector) -> Statement:
-    """Return the statement that β(x, p) is the end of the path ṁ = π(m)p of mean x, for a β that is linear in x.
+    """Return the statement that β(x, p) is the end of the path ṁ = π(m)p with mean x, for a β that is linear in x.
 
-    With Mx = π(x)p, the end is b(M)x, b(z) = z/(1 − e^{−z}). b is the only solution of z b' = b + z b − b² with b(0) =
-    1.
+    With Mx = π(x)p, the end is b(M)x for b(z) = z/(1 − e^{−z}). b is the only solution of z b' = b + z b − b² with b(0)
+    = 1.
     """
     names, p = system.coordinates, covector_symbols(system.coordinates)
     twice = substitute(beta, dict(zip(names, beta, strict=True)))
@@ -273,9 +281,10 @@ def ends_statement(system: System, beta: Vector) -> Statement:
 
 
 def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: Vector, beta: Vector) -> Statement:
-    """Return the statement Ad*_g₁ β = Ad*_g₀ α for the Cayley transform τ of P.
+    """Return the statement Ad*_g₁ β = Ad*_g₀ α: the increment, the Cayley transform τ of the matrix P, conserves
+    momentum.
 
-    It is decided on all elements of the form (1 ± P/2) E_i (1 ∓ P/2).
+    It is decided on the elements (1 ± P/2) E_i (1 ∓ P/2), where E_i are the matrices of the basis.
     """
     p, n = covector_symbols(system.coordinates), range(algebra.dimension)
     sign = 1 if group.spatial else -1
@@ -289,8 +298,8 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
         half = [total(sign * c * p[a] / 2 for a in n for m, c in algebra.bracket(a, i).items() if m == k) for k in n]
         square = [total(c * p[a] * p[b] / 4 for (j, a, b, m), c in terms.items() if (j, m) == (i, k)) for k in n]
         momenta = (beta, alpha) if group.spatial else (alpha, beta)
-        # ⟨β, (1 + P/2) E_i (1 − P/2)⟩ = ⟨α, (1 − P/2) E_i (1 + P/2)⟩ if x is the momentum in space; otherwise P has the
-        # other sign.
+        # ⟨β, (1 + P/2) E_i (1 − P/2)⟩ = ⟨α, (1 − P/2) E_i (1 + P/2)⟩ if x is the momentum in space. If x is the
+        # momentum in the body, P has the other sign.
         first_equation = [total((h - q) * x for h, q, x in zip(half, square, momenta[0], strict=True)), momenta[0][i]]
         less = [total((-h - q) * x for h, q, x in zip(half, square, momenta[1], strict=True)), momenta[1][i]]
         residuals.append((f"E_{i + 1}", total(first_equation) - total(less)))
@@ -301,11 +310,12 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
 def element_statements(
     group: Group, group_element: Vector, p: Vector, start: Vector, end: Vector, *, cayley: bool, positive: Sequence[str]
 ) -> Iterator[Statement]:
-    """Yield the statements that ``group_element`` is the element of p and conserves a momentum.
+    """Yield two statements on the attitude increment ``group_element``: it is the element of p, and it conserves
+    momentum.
 
-    This is the momentum in space if x is the momentum in the body, and that in the body if x is the momentum in space.
-    With ``cayley`` the element is written without φ(s/4). ``start`` and ``end`` are the states before and after a
-    step. The attitude before the step is any quaternion.
+    It conserves the momentum in space if x is the momentum in the body, and the momentum in the body if x is that in
+    space. ``start`` and ``end`` are the states before and after a step; the attitude before the step is any quaternion.
+    With ``cayley`` the element is the Cayley transform of p, else its exponential.
     """
     covectors = [p[i] for i in group.rotation], [p[i] for i in group.translation]
     increment = direction(*covectors, cayley=cayley)
@@ -337,8 +347,11 @@ def element_statements(
 def _residuals(
     group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector
 ) -> Iterator[tuple[str, Expression]]:
-    """Yield the residuals of the momentum: after the step minus before it, times |τ|², and for se(3) also times
-    |g₀|²."""
+    """Yield the momentum after a step minus the momentum before, times |τ|² for the quaternion τ of the attitude
+    increment.
+
+    For se(3) the differences are also multiplied by |g₀|², for the quaternion g₀ of the attitude before the step.
+    """
     square = dot(turn, turn)
     product_after = product(turn, BEFORE) if group.spatial else product(BEFORE, turn)
     first, last = (_conjugate(q) if group.spatial else list(q) for q in (BEFORE, product_after))
@@ -354,7 +367,7 @@ def _residuals(
 
 
 def _screwed(group: Group, turn: Vector, shift: Vector, start: Vector, end: Vector) -> list[Expression]:
-    """Return the residuals of the angular momentum of se(3) for g₀ = 1, where the attitude after the step is τ."""
+    """Return the change of the angular momentum of se(3) in a step from the attitude g₀ = 1 to the attitude τ."""
     square = dot(turn, turn)
     (momentum_before, _), (momentum_after, force) = (
         ([x[i] for i in group.rotation], [x[i] for i in group.translation]) for x in (start, end)
@@ -373,9 +386,9 @@ def _screwed(group: Group, turn: Vector, shift: Vector, start: Vector, end: Vect
 
 
 def _with_phi(expressions: Sequence[Expression], value: Callable[[Expression], Expression]) -> list[Expression]:
-    """Return the expressions with each φ(s) replaced by ``value``, and φ′ by its differential equation.
+    """Return the expressions with each φ(s) replaced by ``value``, and its derivative φ′ by its differential equation.
 
-    The proofs use no other property of φ.
+    The proofs use no other property of the function φ.
     """
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
@@ -393,12 +406,12 @@ def _any(s: Expression) -> Expression:
 
 
 def _quarter(s: Expression) -> Expression:
-    """Return φ(s/4) in terms of c = 1 − φ(s/4)s/4, with φ(s/4) as a free symbol."""
+    """Return φ(s/4) as a function of c = 1 − φ(s/4)s/4, where c is a free symbol."""
     return (ONE - symbol(Symbol("cosine"))) / s
 
 
 def _doubled(s: Expression) -> Expression:
-    """Return φ(s) in terms of φ(s/4): c = 1 − φ(s/4)s/4 = w cot w for w = √s/4, and 2w cot 2w = (c² − w²)/c."""
+    """Return φ(s) as a function of c = 1 − φ(s/4)s/4: with w = √s/4, c = w cot w and 2w cot 2w = (c² − w²)/c."""
     c = symbol(Symbol("cosine"))
     return (ONE - (c**2 - s / 16) / c) / s
 

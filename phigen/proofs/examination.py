@@ -1,4 +1,4 @@
-"""All proofs about one spec, in groups, and the refuted statements with their places in the spec."""
+"""All proofs about one spec, in groups, and the place in the spec of each refuted statement."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from phigen.proofs.statements import (
 from phigen.spec.model import LieAlgebraForm, Spec
 from phigen.symbolic.verdict import REFUTED, Statement
 
-#: Groups of statements that are not examined if π is not a Poisson tensor, since they depend on it.
+#: Names of the groups that are not examined if π is not a Poisson tensor, since their statements depend on it.
 UNEXAMINED = "Casimirs, invariants, the method"
 
-#: Keys of a spec that a group of statements refers to.
+#: The key of a spec to which the statements of a group refer, by the name of the group.
 _PLACES = {METHOD: ("birealisation",), MONITOR: ("monitor",), SPLITTING: ("scheme",), ATTITUDE: ("reconstruct",)}
 _PLACES |= {DAMPING: ("damping",), GAUSS: ("scheme",)}
 
 
 @dataclass(frozen=True)
 class Examination:
-    """The statements about a spec, with their verdicts.
+    """The statements about a spec, in groups, with their verdicts.
 
     ``compilation`` is None if the spec does not compile; ``obstacle`` is then the reason. An obstacle is not a
-    refutation: no bi-realisation of the catalogue may apply to a correct Poisson tensor. ``unexamined`` names the
-    groups that were skipped since they depend on a refuted statement; it is empty if everything was examined.
+    refutation: the Poisson tensor may be correct, but of a form for which phigen has no bi-realisation. ``unexamined``
+    names the groups that were skipped since they depend on a refuted statement; it is empty if everything was examined.
     """
 
     spec: Spec
@@ -57,10 +57,10 @@ class Examination:
 
     @property
     def mistakes(self) -> list[tuple[str, Statement]]:
-        """The refuted statements with their groups, without those that may follow from an earlier one.
+        """The refuted statements with their groups, except those that may follow from an earlier refuted statement.
 
-        Casimirs and invariants are independent of each other. The axioms of a bi-realisation, and the flows of a
-        splitting, concern the same few formulas, so only the first refuted statement of the group is listed.
+        Casimirs and invariants are independent of each other, so all are listed. In other groups, such as the axioms of
+        a bi-realisation, all statements concern the same formulas, and only the first refuted statement is listed.
         """
         mistakes = []
         for group, statements in self.groups.items():
@@ -75,7 +75,7 @@ def refuted(groups: Groups) -> list[Statement]:
 
 
 def refutation(examination: Examination) -> str:
-    """Return the text of a message on the refuted statements, each with its place in the spec."""
+    """Return the text of the error about the refuted statements, each with its place in the spec."""
     unexamined_note = (
         f"not examined, because they depend on it: {examination.unexamined}" if examination.unexamined else ""
     )
@@ -90,10 +90,9 @@ def refutation(examination: Examination) -> str:
 
 
 def hint_of(spec: Spec, group: str) -> str:
-    """Return a hint at the usual cause of a refuted statement of a group, or "".
+    """Return a hint at the usual cause if a statement of this group is refuted, or "".
 
-    For Casimirs, the cause may be that the order of the coordinates differs from that of the basis of the named
-    algebra.
+    A function that is no Casimir may be due to coordinates whose order differs from the basis of the named algebra.
     """
     form = spec.poisson
     if group == DAMPING:
@@ -106,8 +105,10 @@ def hint_of(spec: Spec, group: str) -> str:
 
 
 def doubts(examination: Examination) -> list[Diagnostic]:
-    """Return warnings about expressions that seem to be undefined everywhere or at the start of a run, with their
-    places."""
+    """Return warnings, with places in the spec, about expressions that seem to be undefined.
+
+    They may be undefined everywhere, or at the start of a run.
+    """
     messages = [
         examination.spec.diagnostic(_place(examination.spec, DEFINEDNESS, s), str(s))
         for s in examination.groups.get(DEFINEDNESS, ())
@@ -116,7 +117,7 @@ def doubts(examination: Examination) -> list[Diagnostic]:
 
 
 def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:
-    """Return the path of keys in the spec to the subject of a statement."""
+    """Return the path of keys in the spec that leads to the subject of a statement, such as ("casimirs", "C")."""
     key_paths: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
     key_paths |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
     key_paths |= {"H is defined": ("hamiltonian",), "the density of a pair is symmetric": ("hamiltonian", "pairs")}
@@ -127,7 +128,7 @@ def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:
 
 
 def located(error: SpecError, spec: Spec) -> SpecError:
-    """Return the error with a line of the spec for each diagnostic."""
+    """Return the error with the line of the spec added to each diagnostic that lacks it."""
     lines = spec.source.split("\n")
 
     def shown(d: Diagnostic) -> Diagnostic:

@@ -1,4 +1,5 @@
-"""Comparison of the second derivation, `phigen.series.reference`, with that of the compiler, term by term."""
+"""Comparison of two derivations of a method, term by term: that of the compiler, and `phigen.series.reference` by
+sympy."""
 
 from __future__ import annotations
 
@@ -29,27 +30,27 @@ from phigen.series.reference_paths import source_of_paths
 from phigen.symbolic.expression import Expression, symbol
 from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, refutation, sample_point
 
-#: Default time limit for the second derivation of one spec, in seconds.
+#: Default time limit, in seconds, for the derivation of one spec by sympy.
 SECONDS = 60.0
 
-#: Number of digits of values at points, and number of digits that must agree.
+#: Number of digits with which expressions are evaluated at a point, and number of digits in which they must agree.
 DIGITS, AGREEING = 120, 60
 _ATTEMPTS = 64
 _LONGEST = 160
 
-#: Names of the comparisons that follow those of the S_i.
+#: Names of the comparisons of ∇S_h, and of α and β, which follow the comparisons of the S_i.
 GRADIENT, MAPS = "∇S_h", "α and β"
 
-#: A name, and two sympy expressions that should be equal.
+#: What is compared: a label, and two sympy expressions that should be equal.
 Pair = tuple[str, Any, Any]
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """Result of a comparison of both derivations: of S_``term`` or, if ``term`` is None, of ∇S_h or of α and β.
+    """Result of comparing both derivations: of S_``term`` or, if ``term`` is None, of ∇S_h or of α and β.
 
-    ``sympy`` and ``compiler`` are the seconds that the derivations took up to this S_i. For terms that the compiler had
-    derived before, its seconds are not known.
+    ``sympy`` and ``compiler`` are the seconds that the two derivations took for S_1 … S_``term``. ``compiler`` is None
+    if the time is not known.
     """
 
     statement: Statement
@@ -59,7 +60,7 @@ class Agreement:
 
     @property
     def timed(self) -> Statement:
-        """The statement, with the seconds in its detail."""
+        """The statement, with the seconds of both derivations in its detail."""
         seconds = f"in {self.sympy:.2f} s"
         if self.compiler is not None:
             terms = "" if self.term == 1 else f"S_1 … S_{self.term} "
@@ -68,14 +69,15 @@ class Agreement:
 
 
 class OutOfTimeError(BaseException):
-    """The time limit is reached. This is not an `Exception`, so that no handler for exceptions catches it."""
+    """The time limit was reached. This is a `BaseException`, so that no handler for exceptions catches it."""
 
 
 def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Agreement]:
-    """Yield comparisons of S_1 … S_terms, by default all S_i of the method, then of ∇S_h, α and β.
+    """Yield comparisons of both derivations: of S_1 … S_``terms`` (by default of the method), then of ∇S_h, α and β.
 
-    The ∇S_h of the program is compared only if no further S_i is needed for it. If steps follow paths, α and β are
-    compared only through the S_i. Raises `LimitError` after ``seconds``, or if a polynomial has too many terms.
+    ∇S_h of the program is compared only if no further S_i is needed for it. If steps follow paths, α and β have no
+    closed form, and are compared only through the S_i. Raises `LimitError` after ``seconds``, or if a polynomial has
+    too many terms.
     """
     terms = terms or compilation.stage.terms
     derivation: _Derivation | None = None
@@ -91,7 +93,7 @@ def compare(compilation: CompiledSeries, terms: int | None = None, seconds: floa
 
 
 def _steps(compilation: CompiledSeries, terms: int) -> list[str]:
-    """Return the names of the comparisons, in order."""
+    """Return the names of the comparisons in order, such as ``S_1``."""
     steps = [f"S_{i}" for i in range(1, terms + 1)]
     if compilation.scheme.terms <= terms:
         steps.append(GRADIENT)
@@ -133,7 +135,7 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 
 class _Derivation:
-    """Both derivations of the S_i of one compilation, as far as they have been computed."""
+    """The derivations of one method by the compiler and by sympy, as far as they have been computed."""
 
     def __init__(self, compilation: CompiledSeries, terms: int) -> None:
         self._compilation, self._terms = compilation, terms
@@ -155,7 +157,7 @@ class _Derivation:
         return closed_form(self._maps(maps), self._dictionary.covector)
 
     def _maps(self, maps: Sequence[Expression]) -> list[Any]:
-        """Return α or β of the compiler in sympy, with φ expanded at 0."""
+        """Return the compiler's α or β as sympy expressions, with the function φ replaced by its Taylor polynomial."""
 
         def expanded(order: int, s: Any) -> Any:
             least = min(sum(mu) for mu in closed_form([s], self._dictionary.covector)(self._degree)[0])
@@ -165,7 +167,10 @@ class _Derivation:
 
     @property
     def _degree(self) -> int:
-        """The degree in p up to which α and β are compared: the degree that S_1 … S_terms need, at least 2."""
+        """The degree in p up to which α and β are compared: the degree that S_1 … S_terms need, and at least 2.
+
+        A truncated bi-realisation is compared up to its own degree.
+        """
         degree, chart = max(self._terms - 1, 2), self._compilation.realisation
         return degree if chart.exact or chart.degree is None else min(degree, chart.degree)
 
@@ -175,7 +180,7 @@ class _Derivation:
         return len(self._found)
 
     def compared(self, step: str) -> Agreement:
-        """Return the comparison named ``step``: of the next S_i, of the gradient, or of the maps."""
+        """Return the comparison named ``step``: of the next S_i, of ∇S_h, or of α and β."""
         if step == GRADIENT:
             return self._gradient()
         if step == MAPS:
@@ -198,13 +203,14 @@ class _Derivation:
         return Agreement(statement, i, self._taken, end - middle)
 
     def _gradient(self) -> Agreement:
-        """Return the comparison of ∇S_h of one stage, with coefficients replaced by their expressions."""
+        """Return the comparison of ∇S_h in one stage of a step; named coefficients are replaced by their
+        expressions."""
         scheme, h = self._compilation.scheme, self._dictionary.step
         start = time.perf_counter()
         slope = scheme.generating.coefficients.written_out(scheme.generating.slope)
         pairs: list[Pair] = []
         pushes, monitor = self._pushes(), self._compilation.monitor
-        # With forces the series is that of H, and g multiplies all terms.
+        # With forces, S_h is the series of H, and the monitor g multiplies all terms; otherwise S_h contains g.
         factor = self._dictionary.expression(monitor) if monitor and self._compilation.system.forces else 1
         for c, theirs in zip(self._dictionary.coordinates, slope, strict=True):
             terms = (h**i * derivative(s, c) for i, s in enumerate(self._found[: scheme.terms], 1))
@@ -213,7 +219,8 @@ class _Derivation:
         return Agreement(statement, None, time.perf_counter() - start)
 
     def _pushes(self) -> dict[Any, Any]:
-        """Return the terms of p besides ∇S_h, by coordinate: hζ of forces, ΔW σ∇g of noise."""
+        """Return the terms that forces and noise add to ∇S_h, by coordinate: hζ for a force ζ, ΔW σ∇g for a source of
+        noise."""
         system, dictionary = self._compilation.system, self._dictionary
         pushes = dict.fromkeys(dictionary.coordinates, sympy.Integer(0))
         for c, zeta in zip(dictionary.coordinates, system.forces.covector if system.forces else (), strict=False):
@@ -230,7 +237,10 @@ class _Derivation:
         return chart.kind == exponential.KIND or flat
 
     def _at_origin(self) -> list[Pair]:
-        """Return the pairs for α(x, 0) = x and β(x, 0) = x, which coefficients of positive degree do not contain."""
+        """Return the pairs to compare for α(x, 0) = x and β(x, 0) = x.
+
+        The comparison of Taylor coefficients of positive degree in p does not include this.
+        """
         chart, origin = self._compilation.realisation, dict.fromkeys(self._dictionary.covector, 0)
         return [
             (f"{name}_{x} at p = 0", e.subs(origin), x)
@@ -262,8 +272,9 @@ class _Derivation:
 def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: str) -> Statement:
     """Return the statement that both expressions of each pair are equal, as functions of their symbols.
 
-    Equality is proved if the difference is 0 as a polynomial in functions, by the relations of `Functions`. Otherwise
-    the values at points are compared in `DIGITS` digits: they refute equality, or the statement is checked.
+    Equality is proved if the difference, as a polynomial in functions, is 0 by the relations of `Functions`. Otherwise
+    both expressions are evaluated at points with `DIGITS` digits: if they differ, equality is refuted, else it is
+    checked.
     """
     fewest, open_pairs = POINTS, 0
     for label, theirs, mine in pairs:
@@ -287,8 +298,10 @@ def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: 
 
 
 def _differing_point(pair: Sequence[Any], positive: Collection[str]) -> str | int:
-    """Return a point where both expressions differ, with their values, as text; else the number of points where they
-    agree."""
+    """Return a text with a point where both expressions differ, and their values there.
+
+    If none is found, return the number of points where they agree.
+    """
     symbols = sorted(set().union(*(e.free_symbols for e in pair)), key=str)
     values = sympy.lambdify(symbols, list(pair), modules=[{Sign.__name__: mpmath.sign}, "mpmath"], cse=True)
     agreeing = 0
@@ -298,7 +311,7 @@ def _differing_point(pair: Sequence[Any], positive: Collection[str]) -> str | in
             coordinates_at_point = [mpmath.mpf(v.numerator) / v.denominator for v in point.values()]
             try:
                 theirs, mine = (mpmath.mpf(v) for v in values(*coordinates_at_point))
-            except (ArithmeticError, TypeError, ValueError):  # a pole, a complex value, not in the domain
+            except (ArithmeticError, TypeError, ValueError):  # a pole, a complex value, or a point outside the domain
                 continue
             if not (mpmath.isfinite(theirs) and mpmath.isfinite(mine)):
                 continue

@@ -1,4 +1,4 @@
-"""Statements on a lattice of any size and on its method."""
+"""Statements on a lattice, which hold for any number of sites, and statements on its method."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from phigen.symbolic.verdict import REFUTED, Statement
 
 
 def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements on π, Casimirs and invariants of a lattice of any size, by group."""
+    """Return the statements on a lattice, by group: on π, Casimirs, forces, noise, invariants, and pair interactions.
+
+    The other groups are missing if a statement on π is refuted.
+    """
     groups = {"Poisson tensor": proofs.tensor(cell)}
     if any(s.verdict == REFUTED for s in groups["Poisson tensor"]):
         return groups
@@ -29,10 +32,10 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
 
 
 def sweeps(compilation: CompiledLattice) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements on the method of a lattice, by group.
+    """Return the statements on the method of a lattice, by the name of the group.
 
-    A splitting has statements on the parts of H and their flows, a series on its bi-realisation and the equation of a
-    stage.
+    For a splitting they are on the parts of H and their flows, for a series on the bi-realisation and on the equation
+    of a stage.
     """
     cell, plan = compilation.cell, compilation.sweeps
     group = f"{METHOD} ({plan.kind})" if plan.is_implicit else SPLITTING

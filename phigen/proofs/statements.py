@@ -1,4 +1,4 @@
-"""Statements on a system and on its method, by group, each proved, refuted or checked."""
+"""Statements on a system and on its method, in groups, each with the verdict proved, refuted or checked."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from phigen.splitting.statements import check as check_splitting
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_elements
 
-#: Statements by group, a part of the mathematics, in the order of the pipeline.
+#: Name of a group, such as "Casimirs" → its statements; groups are in the order in which they are proved.
 Groups = Mapping[str, tuple[Statement, ...]]
 
 PREFIX = "bi-realisation: "
@@ -33,7 +33,7 @@ GAUSS = "Gauss collocation"
 
 
 def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements on expressions that are undefined everywhere or at the start of a run; none if all are
+    """Return statements on expressions that are undefined everywhere or at the start of a run; {} if all are
     defined."""
     starts = _starts(system, spec)
     undefined = tuple(undefined_parts(system, starts)) or tuple(
@@ -43,7 +43,7 @@ def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
 
 
 def _starts(system: System, spec: Spec) -> list[dict[str, float]]:
-    """Return the coordinates, parameters and times at the starts of all runs, by name."""
+    """Return, for each run, the coordinates, parameters and times at its start, by name."""
     starts = []
     for run in spec.runs.values():
         initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
@@ -52,17 +52,18 @@ def _starts(system: System, spec: Spec) -> list[dict[str, float]]:
 
 
 def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """Return the statement that the factor g of dt = g dτ is positive; no statement without a monitor."""
+    """Return the statement that the monitor g, which rescales time by dt = g dτ, is positive; {} without a monitor."""
     if spec.monitor is None or isinstance(spec.monitor, str):
         return {}
-    positive = [p.name for p in spec.parameters if p.positive]  # a factor that may be 0 is not positive
+    positive = [p.name for p in spec.parameters if p.positive]  # not those that may be 0, since g could then be 0
     return {MONITOR: (positivity("g > 0", spec.monitor, positive, _starts(system, spec)),)}
 
 
 def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tuple[Statement, ...]]:
-    """Return the statement that the damping coefficient λ is not negative, decided at ``starts``.
+    """Return the statement that the damping coefficient λ is not negative, evaluated at ``starts``.
 
-    There is no statement without damping, or if its sign is unknown.
+    ``starts`` are values of coordinates, parameters and times. The result is {} without damping, or if the sign of λ is
+    unknown.
     """
     rate = spec.forces.damping
     if rate is None:
@@ -73,17 +74,21 @@ def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tupl
 
 
 def damping_of(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """Return `damping` at the starts of runs or, if λ depends on parameters only, with their defaults."""
+    """Return the statement λ ≥ 0 of `damping`, evaluated at the starts of runs.
+
+    Without runs, a λ that depends on parameters only is evaluated with their defaults.
+    """
     return damping(spec, _starts(system, spec) or _defaults(spec))
 
 
 def damping_of_lattice(spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """Return `damping` of a lattice, with those parameters that are one number."""
+    """Return the statement λ ≥ 0 of `damping` for a lattice, if λ depends only on parameters that are one number."""
     return damping(spec, _defaults(spec, *spec.runs.values()))
 
 
 def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
-    """Return the parameters of runs, or the defaults, if the damping depends on parameters only; else nothing."""
+    """Return the parameters of the ``runs`` or, without runs, the defaults; [] if λ depends on more than these
+    parameters."""
     numbers = {p.name for p in spec.parameters if p.at == "all"}
     rate = spec.forces.damping
     if rate is None or not set(symbols_of(rate)) <= numbers:
@@ -93,13 +98,13 @@ def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
 
 
 def tensor(system: System) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements that π is skew and satisfies the Jacobi identity; the second one only if π is skew."""
+    """Return the statements that π is skew and that it satisfies the Jacobi identity; the latter only if π is skew."""
     skew = checks.skew_symmetry(system)
     return {"Poisson tensor": (skew,) if skew.verdict == REFUTED else (skew, jacobi_identity(system))}
 
 
 def integrals(system: System) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements on the Casimirs, the rank of π, the changes by forces, and the declared invariants."""
+    """Return the statements on Casimirs, the rank of π, forces, noise, and declared invariants, by group."""
     casimirs = (*checks.casimir_statements(system), checks.rank_statement(system))
     invariants = tuple(checks.invariant_statements(system))
     forces = tuple(checks.force_statements(system))
@@ -117,9 +122,10 @@ def _attitude(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
 
 
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements on a method, by group.
+    """Return the statements on the method of a compilation, by group, and those on its attitude.
 
-    They are on the flows of a splitting, or on the axioms of the bi-realisation and the Hamilton–Jacobi equation.
+    For a splitting they are on its flows, for a series on the axioms of the bi-realisation and on the Hamilton–Jacobi
+    equation, for Gauss collocation on its stages.
     """
     return compilation.by_kind(_method_by_series, _method_by_splitting, _method_by_gauss) | _attitude(compilation)
 
@@ -143,10 +149,12 @@ def _method_by_series(compilation: CompiledSeries) -> dict[str, tuple[Statement,
 
 
 def series_statements(compilation: CompiledSeries) -> Iterator[Statement]:
-    """Yield the statements on S_1 … S_k: they solve the Hamilton–Jacobi equation, and those of even index vanish if
-    the order relies on it."""
+    """Yield the statements on S_1 … S_k: the sum S_t solves the Hamilton–Jacobi equation up to a power of t.
+
+    If the order relies on symmetry, a second statement says that the S_i of even index are 0.
+    """
     system, realisation, plan = compilation.discretised, compilation.realisation, compilation.stage
-    terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 implies the order k + 1
+    terms = plan.terms + (1 if realisation.symmetric else 0)  # if S_{k+1} = 0, the order is k + 1
     equation = "∂_t S_t = H(α(x, ∇S_t))" if not system.time else "∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t"
     name = f"{equation} for S_t = {sum_of_terms(plan.terms)}"
     try:
