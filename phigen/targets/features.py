@@ -1,4 +1,4 @@
-"""Features of solvers: the switches by which parts of the runtimes are included, with their conditions."""
+"""Features of solvers: switches that say which parts of the runtimes a solver has, with their conditions."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from phigen.scheme.step_kinds import STEP_KINDS, StepKind
 
 @dataclass(frozen=True)
 class Feature:
-    """A switch of a runtime.
+    """Switch that says whether a solver has some parts of the runtime.
 
-    It is on if ``when`` is true for the program, all switches in ``requires`` are on, and the user does not leave out
-    the part of the code named ``part``.
+    It is on if three conditions hold: ``when`` is true for the program, all switches in ``requires`` are on, and the
+    user has not excluded the part of the code named ``part``.
     """
 
     name: str
@@ -24,7 +24,9 @@ class Feature:
 
 
 def _sums(kind: str) -> Callable[[Program], bool]:
-    """Return the test whether the path, its tangent path or its reverse pass contains sums over orders of this kind."""
+    """Return the condition of a switch: whether a path, tangent path or reverse pass has convolutions of the given
+    kind.
+    """
 
     def needed(program: Program) -> bool:
         step = program.step
@@ -38,7 +40,7 @@ def _is_of(kind: StepKind) -> Callable[[Program], bool]:
     return lambda p: p.step.kind is kind
 
 
-#: Switches of all languages; each comes after the switches that it requires.
+#: The switches that all languages have. A switch comes after the switches that it requires.
 FEATURES = (
     *(Feature(kind.name.upper(), _is_of(kind)) for kind in STEP_KINDS.values() if not kind.sites),
     Feature("FRAMED", lambda p: p.step.frame),
@@ -75,7 +77,9 @@ FEATURES = (
 
 
 def holds(condition: str, switches: Mapping[str, bool]) -> bool:
-    """Whether a condition holds: alternatives (``||``) of conjunctions (``&&``) of switches and of their negations."""
+    """Whether a condition on switches holds. It consists of alternatives (``||``) of conjunctions (``&&``) of NAME or
+    !NAME.
+    """
     return any(
         all(switches[s.removeprefix("!")] != s.startswith("!") for s in part.split(" && "))
         for part in condition.split(" || ")
@@ -83,7 +87,7 @@ def holds(condition: str, switches: Mapping[str, bool]) -> bool:
 
 
 def switches(program: Program, further: Iterable[Feature] = ()) -> dict[str, bool]:
-    """Return the values of all switches for a program; ``further`` are those of one language only."""
+    """Return the values of all switches for a program, by name; ``further`` are switches of one language only."""
     values: dict[str, bool] = {}
     for feature in (*FEATURES, *further):
         asked = bool(feature.when(program)) and program.offers(feature.part)

@@ -1,4 +1,4 @@
-"""Description of a language for printing formulas."""
+"""Description of a target language, as far as it concerns the printing of formulas."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from phigen.targets.reserved import Reserved
 class Language:
     """Spelling of formulas in a language.
 
-    ``functions`` are names of functions, or texts with ``{0}`` for the argument; they include functions that the
-    generated file defines. ``whole`` and ``real`` print integers and other numbers.
+    ``functions`` maps elementary functions to their names, or to texts with ``{0}`` for the argument. They include
+    functions that the generated file defines. ``whole`` and ``real`` print integers and all other numbers.
     """
 
     reserved: Reserved
@@ -25,6 +25,6 @@ class Language:
     real: Callable[[float], str] = repr
 
     def printer(self, scope: Scope) -> Printer:
-        """Return a printer of lowered trees with the names of a scope."""
+        """Return a printer of formulas with the identifiers of a scope."""
         power = self.functions["power"]
         return Printer(lambda n: scope[n], self.functions, self.constants, power, self.whole, self.real)

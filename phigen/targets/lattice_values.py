@@ -1,4 +1,4 @@
-"""Values of templates and switches of runtimes that are the same for lattices in all languages."""
+"""Template values and switches for lattices that are common to all languages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from phigen.scheme.steps import Sweeps
 
 
 def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], str]) -> dict[str, object]:
-    """Return the tables of sites, colours and flows for templates; ``listed`` prints a sequence."""
+    """Return the tables of sites, colours and flows as template values; ``listed`` prints a sequence in the
+    language.
+    """
     sites, schedule = step.sites, step.schedule
     return {
         "axes": listed(sites.axes),
@@ -43,7 +45,7 @@ def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], 
 
 
 def switches(step: Sweeps) -> dict[str, bool]:
-    """Return the switches that the runtimes of all languages have for lattices."""
+    """Return the switches for lattices that the runtimes of all languages have, by name."""
     return {
         "COLOURS": step.sites.colours > 1,
         "SEAMS": bool(step.sites.seams),

@@ -1,8 +1,8 @@
 """Identifiers of generated code: names of the spec, changed if the language reserves them.
 
-An underscore is appended to a reserved name. A reserved name that begins with an underscore gets the prefix ``v``
-instead, since ``_Bool_`` is reserved like ``_Bool``. Further underscores are appended while the result equals another
-name.
+If a name is reserved, an underscore is appended. If a reserved name begins with an underscore, it gets the prefix ``v``
+instead, since C reserves ``_Bool_`` as well as ``_Bool``. Further underscores are appended while the result equals
+another name.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ from phigen.targets.reserved import Reserved
 
 
 def identifiers(names: Iterable[str], reserved: Reserved) -> dict[str, str]:
-    """Return distinct identifiers for names, in order. Names that are not reserved are unchanged if possible."""
+    """Return an identifier for each name. All identifiers are distinct, and names that are not reserved are unchanged
+    if possible.
+    """
     names = list(names)
     chosen = {name: name for name in names if name not in reserved}
     for name in names:
@@ -33,28 +35,28 @@ def _free(name: str, reserved: Reserved, used: Iterable[str]) -> str:
 
 
 class Scope:
-    """Identifiers of the symbols of one function, all distinct."""
+    """Identifiers of the symbols in one function, all distinct."""
 
     def __init__(self, reserved: Reserved) -> None:
-        # t12 is the name of a temporary, so a coordinate called t12 gets another identifier.
+        # Generated code has temporaries such as t12, so a coordinate with this name gets another identifier.
         self._reserved = Reserved(reserved.words, re.compile(rf"t\d+|{reserved.pattern.pattern}"))
         self._identifiers: set[str] = set()
         self._codes: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> str:
-        """Return the identifier of a symbol; that of temporary 12 is ``t12``."""
+        """Return the identifier of a symbol. The identifier of temporary number 12 is ``t12``."""
         if name not in self._codes and isinstance(name, Symbol) and name.kind == TEMPORARY:
             self._codes[name] = name.replace(":", "")
             self._identifiers.add(self._codes[name])
         return self.request(name, name)
 
     def request(self, name: str, preferred: str) -> str:
-        """Return the identifier of a symbol: ``preferred`` if that is free."""
+        """Return the identifier of a symbol: ``preferred``, or a similar name if ``preferred`` is used already."""
         if name not in self._codes:
             self._codes[name] = _free(re.sub(r"\W", "_", preferred, flags=re.ASCII), self._reserved, self._identifiers)
             self._identifiers.add(self._codes[name])
         return self._codes[name]
 
     def bind(self, name: str, code: str) -> None:
-        """Use a piece of code, such as ``coef[3]``, wherever the symbol is printed."""
+        """Print ``code``, such as ``coef[3]``, in place of the symbol ``name``."""
         self._codes[name] = code

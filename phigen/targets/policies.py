@@ -1,4 +1,4 @@
-"""Policies of a program (`phigen.scheme.policies`) as named constants of C, JavaScript and Python."""
+"""Policies, such as tolerances and limits of iterations (`phigen.scheme.policies`), as constants in generated code."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from phigen.scheme.policies import POLICIES, MeasurePolicy, Policy, PolicyConstant
 from phigen.scheme.program import Program
 
-#: Exponent of two below which numbers are printed as powers of two: these are bounds on rounding errors.
+#: Numbers below two to this power are printed as powers of two. They are bounds on rounding errors.
 _LEAST_EXPONENT = -20
 
 
 def policies_of(program: Program) -> dict[str, Policy]:
-    """Return the policies by the names of their files.
+    """Return the policies of a program by the names of their files.
 
-    If coordinates keep their sign, errors are relative to each coordinate.
+    If coordinates keep their signs during a step, errors are measured relative to each coordinate.
     """
     if program.step.inner_solve and program.step.inner_solve.relative:
         return {**POLICIES, "measure_policy": MeasurePolicy(floor=0.0)}
@@ -25,9 +25,10 @@ def policies_of(program: Program) -> dict[str, Policy]:
 
 @dataclass(frozen=True)
 class PolicySpelling:
-    """Spelling of constants in a language: powers of two with a negative exponent, and all constants of a policy.
+    """The way a language declares the constants of policies.
 
-    ``rounded`` prints real numbers for another precision.
+    ``power`` is the format of a power of two with a negative exponent, and ``written`` declares constants. ``rounded``
+    prints real numbers if the solver has another precision than double.
     """
 
     power: str

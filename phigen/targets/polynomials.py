@@ -1,4 +1,4 @@
-"""Polynomials in one variable as C, arranged for short chains of dependent operations."""
+"""Polynomials in one variable as C. They are arranged such that few operations have to wait for one another."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _BLOCK = 4
 def estrin(coefficients: Sequence[Fraction], variable: str, first: str = "a") -> tuple[list[str], str]:
     """Return statements, and the value of Σ c_k variable^k.
 
-    Estrin's scheme is used with blocks of four coefficients, each evaluated by Horner's rule. The blocks are named by
-    letters from ``first`` on.
+    Estrin's scheme combines blocks of four coefficients. The values of the blocks are variables that are named by
+    letters, from ``first`` on.
     """
     v = variable
     blocks = [coefficients[i : i + _BLOCK] for i in range(0, len(coefficients), _BLOCK)]

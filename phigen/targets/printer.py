@@ -1,4 +1,4 @@
-"""Trees over symbols as infix text: the common part of the printers of C, JavaScript and Python."""
+"""Printing of expression trees as infix text: the common part of the printers of C, JavaScript and Python."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ from fractions import Fraction
 
 from phigen.symbolic.expression import Expression, fold
 
-#: Binding strength of sums, products and atoms. A unary minus is printed in parentheses inside products.
+#: Binding strength of sums, products and atoms, by which parentheses are set. Inside products, a unary minus is in
+#: parentheses.
 SUM, PRODUCT, ATOM = 1, 2, 3
 
 Printed = tuple[str, int]
 
 
 class Printer:
-    """Printer of lowered trees (`phigen.scheme.lowering`). Targets define names, literals and functions."""
+    """Printer of expressions after lowering (`phigen.scheme.lowering`), for one language."""
 
     def __init__(
         self,
@@ -25,26 +26,27 @@ class Printer:
         whole: Callable[[int], str] = "{}.0".format,
         real: Callable[[float], str] = repr,
     ) -> None:
-        """Make a printer.
+        """Make a printer for a language.
 
-        ``name`` returns the identifier of a symbol, ``whole`` an integer as text, ``real`` any other number as text.
-        ``power`` is the spelling of a power.
+        ``name`` returns the identifier of a symbol. ``functions`` and ``constants`` map names in expressions to texts
+        of the language. ``power`` is the format of a power. ``whole`` prints an integer, ``real`` any other number.
         """
         self.name, self.functions, self.constants, self.power = name, functions, constants, power
         self.whole, self.real = whole, real
 
     def __call__(self, e: Expression) -> str:
-        """Return the tree as text."""
+        """Return an expression as text."""
         return self.bound(e)[0]
 
     def bound(self, e: Expression) -> Printed:
-        """Return the tree as text, and its binding strength."""
+        """Return an expression as text, and the binding strength of its outermost operator."""
         return fold([e], self._visit)[0]
 
     def literal(self, value: Fraction) -> Printed:
-        """Return a rational number as text with its binding strength.
+        """Return a rational number as text, with its binding strength.
 
-        It is exact if possible; otherwise it is a quotient or the shortest text of the nearest double.
+        The text is exact if the number is a double. Otherwise it is a quotient of integers, or the shortest text of the
+        nearest double.
         """
         if value < 0:
             return "-" + self.literal(-value)[0], SUM

@@ -1,5 +1,6 @@
-"""Rendering of Jinja templates. Values are printed strings and lists of strings: decisions are made before, in
-Python."""
+"""Rendering of Jinja templates. The values for templates are printed strings and lists of strings; Python makes all
+decisions.
+"""
 
 from __future__ import annotations
 
@@ -24,5 +25,7 @@ def _environment(target: str) -> jinja2.Environment:
 
 
 def render(target: str, template: str, values: Mapping[str, object]) -> str:
-    """Return the text of ``templates/TARGET/TEMPLATE.jinja`` with the values inserted. A missing value is an error."""
+    """Return the text of ``templates/TARGET/TEMPLATE.jinja`` with the values inserted. If a value is missing, Jinja
+    raises an error.
+    """
     return _environment(target).get_template(template + ".jinja").render(values)

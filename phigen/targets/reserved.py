@@ -1,7 +1,7 @@
 """Reserved identifiers of each language: its keywords, and macros of its standard headers.
 
-Macros of the headers that generated C includes would break that code. Macros of other headers would break programs that
-include these before the header of a solver. The tests compare the lists with the compilers of the machine.
+A name in a spec that equals such a macro would break generated C, or a program that includes a standard header before
+the header of a solver. The tests compare the lists with the compilers of the machine on which they run.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Reserved:
-    """Reserved names of a language: ``words``, and all names that match a ``pattern``. The operator ``|`` adds
-    words."""
+    """Reserved names of a language: those in ``words``, and all names that match ``pattern``. The operator ``|`` adds
+    words.
+    """
 
     words: frozenset[str] = frozenset()
     pattern: re.Pattern[str] = re.compile(r"(?!)")
@@ -36,11 +37,12 @@ explicit export false friend mutable namespace new noexcept not not_eq operator 
 reinterpret_cast requires static_assert static_cast template this thread_local throw true try typeid typename using
 virtual wchar_t xor xor_eq fortran far near main size_t ptrdiff_t"""
 
-# Keywords and types of OpenCL C. Parameters have the same names there as in C.
+# Keywords and types of OpenCL C. They are reserved in C as well, so that parameters have the same names in both
+# languages.
 _OPENCL = """constant event_t generic global half kernel local pipe quad read_only read_write sampler_t uchar uint ulong
 uniform ushort write_only"""
 
-# Macros of the standard headers, and of headers that these include, that do not belong to the families below.
+# Macros of the standard headers and of headers that these include, except for the families of macros below.
 _C_MACROS = """AIO_PRIO_DELTA_MAX BC_BASE_MAX BC_DIM_MAX BC_SCALE_MAX BC_STRING_MAX BIG_ENDIAN
 BITINT_MAXWIDTH BUFSIZ BYTE_ORDER CHARCLASS_NAME_MAX CHAR_BIT CLOCKS_PER_SEC COLL_WEIGHTS_MAX CPU_SETSIZE CSIGNAL
 DELAYTIMER_MAX DOMAIN EOF EXIT_FAILURE EXIT_SUCCESS EXPR_NEST_MAX FD_SETSIZE FILENAME_MAX FOPEN_MAX F_LOCK F_OK F_TEST
@@ -75,7 +77,7 @@ _SIGINFO = """addr addr_lsb arch band call_addr fd int lower overrun pid pkey pt
 utime value"""
 _ATOMIC = "init|load|store|exchange|compare_exchange_strong|compare_exchange_weak|fetch_(add|and|or|sub|xor)"
 
-#: Families of reserved names: all names with an initial underscore, and macros that differ only in a part.
+#: Families of reserved names: all names with an initial underscore, and macros whose names differ in one part only.
 _C_FAMILIES = (
     r"_\w*",
     rf"({_INTEGERS}|SIG_ATOMIC|WCHAR|WINT)_(MAX|MIN|WIDTH)",
@@ -89,7 +91,8 @@ _C_FAMILIES = (
     r"(bool|u?(char|short|int|long)|half|float|double)(2|3|4|8|16)",
 )
 
-#: Keywords of C and C++ up to C23 and C++26 and of OpenCL C, and macros of the standard headers on Linux and elsewhere.
+#: Keywords of C and C++ up to C23 and C++26, keywords of OpenCL C, and macros of the standard headers on Linux and
+#: other systems.
 C_RESERVED = Reserved(
     frozenset([*_C.split(), *_OPENCL.split(), *_C_MACROS.split(), *(f"E{e}" for e in _ERRNO.split())]),
     re.compile("|".join(_C_FAMILIES)),
@@ -102,7 +105,7 @@ global if import in is lambda nonlocal not or pass raise return try while with y
 print self DIM ORDER CASIMIRS DEFAULT_PARAMETERS StepError step integrate hamiltonian casimirs vector_field
 OBSERVABLES observables x0 steps stride parameters _filled _sum _values"""
 
-#: Keywords of Python, names with a meaning in Python, and names that the generated module uses.
+#: Keywords of Python, names with a special meaning in Python, and names that the generated module uses.
 PYTHON_RESERVED = Reserved(frozenset(_PYTHON.split()), re.compile(r"__\w*__"))
 
 # -- JavaScript
@@ -112,5 +115,5 @@ export extends false finally for function get if implements import in instanceof
 private protected public return set static super switch this throw true try typeof undefined var void while with yield
 __proto__ constructor globalThis Array Error Float64Array Infinity Math NaN Number Object"""
 
-#: Keywords in JavaScript modules, names with a meaning in objects, and globals that generated code may use.
+#: Keywords in JavaScript modules, names with a special meaning in objects, and globals that generated code may use.
 JAVASCRIPT_RESERVED = Reserved(frozenset(_JAVASCRIPT.split()))

@@ -1,4 +1,7 @@
-"""Values for the templates of φ and its derivatives, and of entire functions, in all languages."""
+"""Template values, common to all languages, for φ and its derivatives, entire functions, elliptic functions and others.
+
+φ is the function of the exponential bi-realisation, φ(s) = (1 − w cot w)/s with w = √s/2.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +23,11 @@ from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
 
-#: Largest number of halvings of t for exponentials of small matrices; with more, the exponentials overflow.
+#: Largest number of halvings of t when exponentials of small matrices are computed. Arguments that need more would
+#: overflow.
 MOST_HALVINGS = 14
 
-#: Number of iterations after which the arithmetic–geometric mean has converged for any two numbers.
+#: Number of iterations after which the arithmetic–geometric mean of any two doubles has converged.
 MOST_MEANS = 16
 
 _MEANING = (
@@ -40,14 +44,16 @@ _CLOSED = (
 
 
 def used(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
-    """Return the functions of `SPECIAL` that the kernels call, in order, except the ``unprinted`` kernels."""
+    """Return the functions of `SPECIAL` that kernels of a program call, in order; the kernels ``unprinted`` do not
+    count.
+    """
     kernels = [kernel for kernel in program.kernels if kernel not in unprinted]
     ops = {e.op for e in topological([e for kernel in kernels for e in kernel.roots])}
     return [name for name in SPECIAL if name in ops]
 
 
 def values(function: str, name: str) -> Mapping[str, object]:
-    """Return the values for the template of one function, which is named ``name`` in the output."""
+    """Return the values for the template of φ or of a derivative of φ, which is called ``name`` in the output."""
     order = order_of(function)
     near, rest = near_coefficients(order), rest_coefficients(order)
     return {
@@ -67,39 +73,40 @@ def values(function: str, name: str) -> Mapping[str, object]:
 
 
 def closed(order: int) -> tuple[str, ...]:
-    """Return the closed form of a derivative of φ in C and in Python, and the values that it reads.
+    """Return the statements for a derivative of φ in closed form, preceded by those for the values that they read.
 
-    The form is in terms of c = w cot w.
+    They are valid in C and in Python, and use c = w cot w.
     """
     return _CLOSED[: order + 1]
 
 
 def turns(*, single: bool) -> dict[str, object]:
-    """Return the constants that subtract multiples of π from w = √s/2: the upper part of π, the lower part, and 1/π.
+    """Return the constants with which multiples of π are subtracted from w = √s/2: two parts of π, whose sum is π, and
+    1/π.
 
-    The upper part has 33 bits, 8 in single precision. So its products with the first 2^20 (2^16) integers are exact;
-    ``limit`` is the value of s for the last of them.
+    The upper part of π has 33 bits, or 8 in single precision. So its products with integers up to 2^20, or 2^16, are
+    exact. ``limit`` is the value of s up to which no larger integer is needed.
     """
     bits, most = (6, 2.0**16) if single else (31, 2.0**20)
     upper = math.floor(math.pi * 2.0**bits) / 2.0**bits
     lower = (math.pi - upper) + _BEYOND_PI
-    limit = float(f"{0.95 * (2.0 * math.pi * most) ** 2:.1e}")  # rounded down to two digits
+    limit = float(f"{0.95 * (2.0 * math.pi * most) ** 2:.1e}")  # rounded to two digits
     return {"reciprocal": repr(1.0 / math.pi), "upper": repr(upper), "lower": repr(lower), "limit": repr(limit)}
 
 
-#: Difference of π and its double.
+#: The difference π − (the double nearest to π).
 _BEYOND_PI = 1.2246467991473532e-16
 
 
 class _Calls:
-    """A math library whose calls are recorded as expressions."""
+    """A math library that returns each call as an expression."""
 
     def __getattr__(self, name: str) -> Callable[..., Expression]:
         return lambda *arguments: call(name, *arguments)
 
 
 def _closed_forms(function: str) -> list[Expression]:
-    """Return the closed forms of a function of `ENTIRE`, for s > 0 and for s < 0, or one for both.
+    """Return the closed forms of a function of `ENTIRE`: one for s > 0 and one for s < 0, or a single one for both.
 
     The symbol ``root`` stands for √|s|.
     """
@@ -107,9 +114,9 @@ def _closed_forms(function: str) -> list[Expression]:
 
 
 def far(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict[str, object]:
-    """Return the closed form of a function of `ENTIRE` in a language, and whether it contains the ``root`` of |s|.
+    """Return the closed form of a function of `ENTIRE` as text, and whether it contains the ``root`` of |s|.
 
-    ``choice`` is the spelling of a conditional, {0} for s > 0 and {1} for s < 0.
+    ``choice`` is the format of a conditional in the language: {0} is the value for s > 0, {1} for s < 0.
     """
     forms = _closed_forms(function)
     texts = [printer(Scope(Reserved()))(expand_powers([form])[0]) for form in forms]
@@ -117,7 +124,9 @@ def far(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict
 
 
 def entire_used(program: Program) -> list[str]:
-    """Return the functions of `ENTIRE` that the kernels call, directly or through each other, in order."""
+    """Return the functions of `ENTIRE` that kernels of a program call, directly or through other functions, in
+    order.
+    """
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     for f in (f for f in ENTIRE if f in ops):
         ops = ops | {e.op for e in topological(_closed_forms(f))}
@@ -130,20 +139,24 @@ def calls_anomaly(program: Program) -> bool:
 
 
 def elliptic_used(program: Program) -> list[str]:
-    """Return the functions of `ELLIPTIC` that kernels call. The first of them is included if any other is called."""
+    """Return the functions of `ELLIPTIC` that kernels of a program call. If there are any, the first function is
+    included.
+    """
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     called = [name for name in (*ELLIPTIC, elliptic.THIRD) if name in ops]
     return called if not called or called[0] == ELLIPTIC[0] else [ELLIPTIC[0], *called]
 
 
 def remainders_used(program: Program) -> list[str]:
-    """Return the functions of `phigen.symbolic.remainders` that kernels call."""
+    """Return the functions of `phigen.symbolic.remainders` that kernels of a program call."""
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     return [name for name in (*remainders.REMAINDERS, *remainders.QUOTIENTS) if name in ops]
 
 
 def remainder_values(names: Sequence[str]) -> dict[str, object]:
-    """Return the values for the templates of these functions, with their indices among remainders and quotients."""
+    """Return the template values for functions of `phigen.symbolic.remainders`, with the index that each has among
+    these.
+    """
     places = {name: k for k, name in enumerate((*remainders.REMAINDERS, *remainders.QUOTIENTS))}
     reach = remainders.MAX_ROOT
     return {
@@ -158,13 +171,12 @@ def remainder_values(names: Sequence[str]) -> dict[str, object]:
 
 
 def _described(place: int) -> str:
-    """Return the purpose of a function of `phigen.symbolic.remainders`, as a comment."""
+    """Return the comment that says what a function of `phigen.symbolic.remainders` returns."""
     return f"Coefficient {place % 4} of the {'remainder' if place < 4 else 'quotient'}."
 
 
-#: The integrals of elliptic functions: their meaning, the template of Carlson's integral, and its arguments, for the
-#: integral and for half a turn. The arguments are in terms of the squares cc of cn, dd of dn and s*s of S, and the
-#: ratio R/P.
+#: The integrals of elliptic functions: the comment, the template of Carlson's integral, and its arguments, for the
+#: integral and for half a turn. In the arguments, cc, dd and s*s are the squares of cn, dn and S, and ratio is R/P.
 _INTEGRALS = {
     elliptic.SQUARES: ("The integral over t of S**2 with S = sn/sqrt(P)", "carlson", "cc, dd, 1.0", "0.0, ratio, 1.0"),
     elliptic.RATIOS: (
@@ -182,10 +194,10 @@ def elliptic_texts(
     render: Callable[[str, Mapping[str, object]], str],
     spelling: Callable[[str], str] = lambda name: name,
 ) -> list[str]:
-    """Return the definitions of elliptic functions by templates: amplitude, Carlson's integrals, and functions that
+    """Return the definitions of elliptic functions: of the amplitude, of Carlson's integrals, and of functions that
     call these.
 
-    ``spelling`` returns the names of Carlson's integrals in the language.
+    ``render`` renders a template, and ``spelling`` returns the names of Carlson's integrals in the language.
     """
     values: dict[str, object] = {
         "part": repr(2.0**-elliptic.DOUBLINGS),
@@ -194,7 +206,8 @@ def elliptic_texts(
         "ratio": repr(elliptic.MEAN_RATIO),
         "most": MOST_MEANS,
         "circle": repr(2 * math.pi),
-        # the error of the last polynomial is below rounding if the spread is at most this fraction of the mean
+        # If the spread of the three arguments is at most this fraction of their mean, the error of the final polynomial
+        # is below a rounding error.
         "spread": repr((2.2e-16 / 4) ** (-1 / 6)),
         "duplications": elliptic.LANE_DUPLICATIONS,
     }
@@ -210,7 +223,7 @@ def elliptic_texts(
 
 
 def _nested_series() -> str:
-    """Return the series of S/t as text, by Horner's rule in x and y."""
+    """Return the power series of S/t in x and y as text, arranged by Horner's rule."""
     return _nested([_nested([repr(float(c)) for c in row], "x") for row in elliptic.series()], "y")
 
 
@@ -223,16 +236,20 @@ def _nested(coefficients: Sequence[str], variable: str) -> str:
 
 
 def stumpff() -> tuple[list[Fraction], list[Fraction]]:
-    """Return the coefficients of c2 = (1 - cos x)/x² and c3 = (x - sin x)/x³ as series in x², for x² up to 1."""
+    """Return the coefficients of c2 = (1 - cos x)/x² and c3 = (x - sin x)/x³ as series in x², which are sufficient for
+    x² ≤ 1.
+    """
     count = len(ENTIRE["arcroot"].terms())
     c2 = [Fraction((-1) ** n, math.factorial(2 * n + 2)) for n in range(count)]
     return c2, [ENTIRE["arcroot"].coefficient(n) for n in range(count)]
 
 
 def anomaly_values(*, single: bool = False) -> dict[str, object]:
-    """Return the values for the templates of the anomaly that all languages share; ``single`` is for 32-bit numbers.
+    """Return the values that the templates of the universal anomaly have in all languages; ``single`` is for 32-bit
+    numbers.
 
-    ``unit`` is the unit of rounding; ``rounding``, a tenth of it, is the remaining error of the iteration.
+    ``unit`` is the relative error of a rounding; ``rounding``, a tenth of ``unit``, is the error at which the iteration
+    ends.
     """
     if single:
         return {"most": MOST_ITERATIONS, "radial": "1e-12", "unit": "1.2e-7", "rounding": "1e-8"}
@@ -245,10 +262,10 @@ def largest_exponential(program: Program) -> int:
 
 
 def transposes_exponentials(program: Program) -> bool:
-    """Whether the reverse pass goes through matrix exponentials that depend on parameters."""
+    """Whether the reverse pass goes through exponentials of matrices that depend on parameters."""
     return program.step.adjoint is not None and program.step.adjoint.prepare.exponents is not None
 
 
 def exponential_constants() -> dict[str, object]:
-    """Return the constants of the matrix exponential."""
+    """Return the constants in the templates of the matrix exponential."""
     return {"pade": ", ".join(repr(float(c)) for c in PADE), "reach": repr(MAX_PADE_NORM)}

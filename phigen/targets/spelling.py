@@ -1,4 +1,4 @@
-"""Values of the loop IR as text, for the printers of all languages."""
+"""Values of the loop IR as text: the common part of the printers of statements in all languages."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from phigen.targets.language import Language
 from phigen.targets.names import Scope
 from phigen.targets.printer import ATOM, PRODUCT, SUM
 
-#: Binding strength of operators, as in `phigen.targets.printer`.
+#: Binding strength of operators, by which parentheses are set, as in `phigen.targets.printer`.
 _STRENGTH = {"or": 1, "and": 1, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
 _STRENGTH |= dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), 2)
 _ATOM = 9
@@ -24,11 +24,11 @@ _OF_ARITHMETIC = {SUM: 3, PRODUCT: 4, ATOM: _ATOM}
 
 @dataclass(frozen=True)
 class Dialect:
-    """Spelling of values in a language; ``operators`` and ``functions`` have the names that differ from those of the
-    IR.
+    """Spelling of values of the loop IR in a language.
 
-    ``select`` prints a conditional value, from the condition and both values. ``subscript`` prints an element of an
-    array, whose indices count from 0, and ``member`` a member of a record.
+    ``operators`` and ``functions`` map names in the IR to names in the language, if these differ. ``select`` is the
+    format of a conditional value: condition, and the values if it is true and false. ``subscript`` prints an element of
+    an array, whose indices count from 0, and ``member`` a member of a record.
     """
 
     language: Language
@@ -38,18 +38,18 @@ class Dialect:
     subscript: str = "{0}[{1}]"
     member: str = "{0}.{1}"
     pointers: frozenset[str] = frozenset()  # parameters that are addresses of records
-    links: frozenset[str] = frozenset()  # members that are addresses of records
+    links: frozenset[str] = frozenset()  # members of records that are addresses of records
     quote: str = '"{0}"'
 
 
 class Spelling:
-    """The identifiers of one function, and its values as text."""
+    """Printer of the values in one function, with the identifiers that it has chosen for the function."""
 
     def __init__(self, dialect: Dialect, reserved: Iterable[str], body: ir.Block) -> None:
-        """Choose the identifiers of a function.
+        """Choose the identifiers of a function from the statements of its ``body``.
 
-        Names of the spec come first, so that they are changed only if they are ``reserved``. Names that statements
-        define are reserved, as are functions that the dialect can call.
+        Names of the spec keep their spelling unless they are ``reserved``, are defined by statements of the body, or
+        are functions that the dialect can call.
         """
         self.dialect = dialect
         called = _words("\n".join(dialect.language.functions.values()))
@@ -79,7 +79,7 @@ class Spelling:
         return self.scope[symbol]
 
     def substitute(self, declaration: ir.Declare) -> None:
-        """Print the values of a declaration wherever its symbols occur, instead of the symbols."""
+        """Print the value of each symbol that a declaration defines in place of this symbol."""
         for symbol, value in declaration.items:
             text, strength = self._spelt(value)
             self.scope.bind(symbol, text if strength else f"({text})")
@@ -142,7 +142,7 @@ def _words(text: str) -> frozenset[str]:
 
 
 def _fixed(body: ir.Block) -> Iterator[str]:
-    """Yield the identifiers that statements define."""
+    """Yield the identifiers of variables that statements define."""
     for node in values(body):
         match node:
             case ir.Name(Symbol(kind=ir.FIXED, key=(name,))):

@@ -1,8 +1,8 @@
-"""The state of a solver, block by block: its members, and how copies, rollback and a new step size treat them.
+"""The members of the struct of a solver in generated code, in blocks, with the code that copies and resets them.
 
-A block belongs to the solvers whose switches satisfy its condition. In C the blocks determine the members of the
-struct, the copies by which a step of several stages is reverted if a stage fails, and the statements for a new step
-size. In JavaScript they determine the fields that a copy of a solver has.
+A solver has the blocks whose condition holds for its switches. In C the blocks determine three things: the members of
+the struct; the code that restores them if a stage of a step fails; and the statements for a new step size. In
+JavaScript they determine the fields of a copy of a solver.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class StateBlock:
-    """Members of the state that belong together; ``when`` is a condition on switches, "" for all solvers.
+    """Members of the struct of a solver that belong together; ``when`` is a condition on switches, "" for all solvers.
 
-    ``members`` are declarations in C, with comments for users. ``saved`` are the members that a failing step restores:
-    arrays with their sizes, and numbers without a size. ``reset`` are statements for a new step size. ``copied`` are
-    the statements of a copy, in JavaScript.
+    ``members`` are declarations in C, with comments for users. ``saved`` has the members that are restored if a step
+    fails, each with its length, which is "" for numbers. ``reset`` are statements for a new step size. ``copied`` are
+    the statements of JavaScript that copy the fields to another solver.
     """
 
     name: str
@@ -30,7 +30,7 @@ class StateBlock:
     copied: tuple[str, ...] = ()
 
     def save(self) -> Iterator[str]:
-        """Yield the statements that copy the members which a step changes."""
+        """Yield the statements that copy the members which a step changes to local variables."""
         arrays = [f"{member}[{size}]" for member, size in self.saved if size]
         numbers = [f"{member} = s->{member}" for member, size in self.saved if not size]
         yield from [f"double {', '.join(arrays)};"] if arrays else []
@@ -38,7 +38,7 @@ class StateBlock:
         yield from (f"PHI_COPY({member}, s->{member}, {member}, {size});" for member, size in self.saved if size)
 
     def restore(self) -> Iterator[str]:
-        """Yield the statements that restore the state from the copies."""
+        """Yield the statements that restore these members from the local variables."""
         for member, size in self.saved:
             yield f"PHI_COPY(s->{member}, {member}, {member}, {size});" if size else f"s->{member} = {member};"
 
@@ -214,10 +214,10 @@ STATE = (
 
 
 def copied(switches: Mapping[str, bool]) -> list[str]:
-    """Return the statements in JavaScript that copy the state to another solver."""
+    """Return the statements in JavaScript that copy the state of a solver to another solver."""
     return [line for block in STATE if block.copied and belongs(block, switches) for line in block.copied]
 
 
 def belongs(block: StateBlock, switches: Mapping[str, bool]) -> bool:
-    """Whether a solver has the block."""
+    """Whether a solver with these switches has the block."""
     return not block.when or holds(block.when, switches)

@@ -1,9 +1,9 @@
 """Assembly of the C runtime for one solver.
 
 The files of ``templates/c/runtime`` are valid C99, with the prefix ``phi_`` and with switches and sizes
-(``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. This module resolves, as a preprocessor would, ``#include "…"`` of
-these files, ``#if`` on switches, include guards, and phrases (`phigen.targets.c.phrases`). It removes static functions
-that nothing calls (`phigen.targets.c.unused`). All other directives remain.
+(``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. This module processes these files as a preprocessor would: it
+resolves ``#include "…"``, ``#if`` on switches, include guards, and phrases (`phigen.targets.c.phrases`). It also
+removes static functions that nothing calls (`phigen.targets.c.unused`). All other directives remain.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from phigen.targets.c.tokens import lines_with
 from phigen.targets.c.unused import without_unused
 from phigen.targets.features import holds
 
-#: Names of phrases; names of the model are in `phigen.targets.c.language`.
+#: Names of phrases. The names that belong to the model are in `phigen.targets.c.language`.
 _PHRASES = phrases.names()
 _PREFIX = re.compile(r"\b(?:phi|PHI)_")
 
 
 @dataclass
 class Amalgam:
-    """Assembler of the text of one solver: ``switches``, and ``printed`` files by name; all numbers have the type
-    ``real``.
+    """Assembler of the C code of one solver.
 
-    ``headers`` collects the headers of the C library.
+    ``switches`` are the features of the solver, and ``printed`` are the files that were printed for it, by name. All
+    numbers have the type ``real``. ``headers`` collects the headers of the C library that are included.
     """
 
     name: str
@@ -56,12 +56,12 @@ class Amalgam:
     def text(self, file: str, spelt: Callable[[Sequence[str]], Sequence[str]] = lambda lines: lines) -> str:
         """Return a file with all files that it includes, except those included before.
 
-        ``spelt`` translates its lines to another dialect of C.
+        ``spelt`` translates all lines to another dialect of C.
         """
         return _spaced(spelt(without_unused(self._expanded(file), f"{self.name}_")))
 
     def texts(self, header: str, code: str) -> tuple[str, str]:
-        """Return the texts of a header and of a source that includes it, as `text` does."""
+        """Return the text of a header, and the text of a source that includes the header; see `text`."""
         lines = [*self._expanded(header), _BEHIND, *self._expanded(code)]
         used = without_unused(lines, f"{self.name}_")
         border = used.index(_BEHIND)
@@ -87,11 +87,12 @@ class Amalgam:
         return [*lines, *self._own(pending)]
 
     def _selected(self, text: str) -> list[str]:
-        """Return the lines of a text that the switches select."""
+        """Return the lines of a text that the ``#if`` conditions on switches select."""
         chosen: list[str] = []
-        # For each open #if: whether its present branch is on, whether one was on so far, whether it tests a switch.
+        # An entry for each open #if: whether its current branch is selected, whether a branch was selected so far, and
+        # whether the condition is on a switch.
         frames: list[list[bool]] = []
-        selected = True  # whether all open branches are on
+        selected = True  # whether the current branches of all open #if are selected
         for line in text.splitlines():
             if not line.startswith("#"):
                 chosen += [line] * selected
@@ -125,9 +126,9 @@ class Amalgam:
         return holds(condition.replace("PHI_", ""), self.switches)
 
     def _printed(self, lines: Sequence[str]) -> list[str]:
-        """Return lines that were printed for the solver, in its number type and with macros expanded.
+        """Return lines that were printed for the solver, with its number type and with macros expanded.
 
-        Names of the model are unchanged.
+        Names in the lines are not changed.
         """
         named = lines_with("\n".join(lines), _PHRASES)
         spelt_lines: list[str] = []
@@ -143,18 +144,20 @@ class Amalgam:
         return _PREFIX.sub(f"{self.name}_", line)
 
     def _own(self, lines: Sequence[str]) -> list[str]:
-        """Return lines of the runtime with macros expanded, and with the prefix of the solver."""
+        """Return lines of the runtime with macros expanded, and with the name of the solver in place of the prefix
+        ``phi_``.
+        """
         lines = [line for line in lines if not (line.endswith(");") and self._not_called.match(line))]
         expanded = self._macros.expanded(lines)
         return self._typed(self._prefixed("\n".join(expanded)).split("\n") if expanded else [])
 
 
-#: Separator of header and source while both are processed as one text.
+#: Mark between header and source while they are processed as a single text.
 _BEHIND = "/* */"
 
 
 def _spaced(lines: Sequence[str]) -> str:
-    """Return the text of lines, with at most one blank line in succession, and none after the title of a chapter."""
+    """Return lines as text, with at most one blank line in succession, and with none after the title of a chapter."""
     spaced: list[str] = []
     for line in lines:
         if line or (spaced and spaced[-1] and not spaced[-1].endswith(" ---- */")):

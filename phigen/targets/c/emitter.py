@@ -1,7 +1,7 @@
-"""A program as C source: `NAME.h` and `NAME.c`.
+"""Emission of a program as C source: `NAME.h` and `NAME.c`.
 
-The parts that depend on the model are printed: sizes, constants, kernels (`printed`). The remaining code is the
-runtime: C in ``templates/c/runtime``, assembled by `amalgamation` for the `features` of the program.
+The parts that depend on the model are printed: sizes, constants, kernels (`printed`). All other code is the runtime: C
+in ``templates/c/runtime``, which `amalgamation` assembles for the `features` of the program.
 """
 
 from __future__ import annotations
@@ -35,20 +35,20 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Number of iterations over a block that cost, per step, as much as one evaluation at a single point: for vectorised
-#: loops; and for loops that call library functions, and paths, whose derivatives a single evaluation does not need.
+#: Number of iterations over a block of steps whose time, per step, is that of one evaluation at a single point. PASSES
+#: is for vectorised loops. PASSES_OF_CALLS is for loops that call library functions, and for paths, since a single
+#: evaluation needs no derivatives of paths.
 PASSES, PASSES_OF_CALLS = 2, 1
 
-#: Number of attempts at a stage of an implicit step: with the predictor, and without it if the first one fails.
+#: Number of attempts to solve a stage of an implicit step: first with the predictor, then without it.
 ATTEMPTS = 2
 
-#: Number of lines above which a file gets a table of contents.
+#: A file with more lines than this begins with a table of contents.
 FEW_SCREENS = 240
 
 
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
-    """Return file names and their contents. With ``single_file`` only `NAME.c` is returned, which then needs no
-    header."""
+    """Return the generated files by their names. With ``single_file`` there is only `NAME.c`, which needs no header."""
     program = with_frames(program)
     name, lines = program.name, header_lines(program, command)
     amalgam, header, code = runtime_of(program)
@@ -68,9 +68,9 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
 
 
 def unrestricted(program: Program, code: str) -> str:
-    """Return code that compilers without ``restrict`` also accept.
+    """Return code that compilers without ``restrict`` accept as well.
 
-    ``restrict`` is removed except in loops over lanes and sites, the only loops that it makes faster.
+    ``restrict`` is removed, except in loops over lanes and sites: only these loops become faster by it.
     """
     if program.profile != "fast" and not program.step.kind.sites and "_EACH_LANE" not in code:
         return without_word(code, "restrict")
@@ -78,7 +78,7 @@ def unrestricted(program: Program, code: str) -> str:
 
 
 def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
-    """Return the assembler of a solver, and the files of the runtime from which header and source start."""
+    """Return the assembler of a solver, and the names of the runtime files with which header and source begin."""
     lanes = in_lanes(program)
     has = switches(program, lanes)
     constants, real = policies(program, staged=has["STAGED"]), real_of(program)
@@ -104,9 +104,10 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
 
 
 def policies(program: Program, *, staged: bool = False) -> dict[str, str]:
-    """Return the headers with the constants of policies. Sizes of arrays are declared with the solver instead.
+    """Return the headers with the constants of policies, by file name.
 
-    ``staged`` is true for Gauss methods with their stages in lanes.
+    Sizes of arrays are left out, since they are declared with the struct of the solver. ``staged`` is true for Gauss
+    methods with their stages in lanes.
     """
     sizes = ("DIFFERENCES", "DIRECTIONS")
     policy_by_name = policies_of(program) | {"gauss_policy": gauss_policy(single=program.single, staged=staged)}
@@ -117,7 +118,9 @@ def policies(program: Program, *, staged: bool = False) -> dict[str, str]:
 
 
 def _declared_lines(program: Program) -> list[str]:
-    """Return the lines of the comment at the head of the declarations; all other facts are in the source."""
+    """Return the lines of the comment at the head of the declarations. All other facts on the solver are in the source
+    file.
+    """
     name = program.name
     return [
         f"The declarations of {name}.c. DO NOT EDIT: phigen detects changes by the checksum below.",
@@ -140,7 +143,9 @@ def _is_chapter(line: str) -> bool:
 
 
 def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, str]:
-    """Return the printed parts of the model, by the names under which the runtime includes them."""
+    """Return the texts that are printed for the model, by the names of the files under which the runtime includes
+    them.
+    """
     step = program.step
     texts = text_of(program).texts(program, step, lanes, has)
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
@@ -151,7 +156,7 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
 
 
 def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
-    """Return the values for the template of declarations."""
+    """Return the values for the template of the public declarations."""
     member, step = members(program), program.step
     public: Sizes = [
         ("DIM", program.dimension, f"coordinates: {', '.join(program.coordinates)}"),
@@ -210,8 +215,10 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
 
 
 def _stack(bound: StackBound, name: str) -> Sizes:
-    """Return the bytes of stack of the longest chains of calls as constants, with comments that name the first
-    functions."""
+    """Return the number of bytes of stack that the solver needs, as constants with comments.
+
+    There is a constant for calls that begin with each of several functions; the comment names the function.
+    """
     return [
         ("STACK_OF_INIT", bound.init, f"from {name}_init on"),
         ("STACK_OF_STEP", bound.step, f"from {name}_step on"),
@@ -219,12 +226,15 @@ def _stack(bound: StackBound, name: str) -> Sizes:
     ]
 
 
-#: Kernels that are public functions, each with its name in the API and whether it returns its only value.
+#: Kernels that are public functions: the kernel, the name of its function, and whether the function returns the only
+#: output.
 Exported = list[tuple[Kernel, str, bool]]
 
 
 def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
-    """Yield the public functions of a state, in groups, each with its comment for the header."""
+    """Yield the public functions that are evaluated at a state, in groups, each group with its comment for the
+    header.
+    """
     seen, noise, monitor, modified = program.observables, program.noise, program.monitor, program.modified
     at = " at the time t" if program.time else ""
     yield (
@@ -251,7 +261,7 @@ def _state_functions(program: Program) -> Iterator[tuple[str, Exported]]:
 
 
 def _renewing(program: Program) -> str:
-    """Return the inputs of `refresh` in words: the time, the noise, or both."""
+    """Return in words what the coefficients of `refresh` depend on: the time, the noise, or both."""
     arguments = {"the time": program.time, "the noise": program.noise}
     return " and ".join(name for name, present in arguments.items() if present)
 
@@ -280,13 +290,14 @@ def _of_attitude(attitude: Attitude) -> Sizes:
 
 
 def _defaults(program: Program) -> str:
-    """Return the default parameters as an initialiser."""
+    """Return the default values of the parameters as an initialiser in C."""
     return ", ".join(repr(float(p.value)) for p in program.parameters) or "0"
 
 
 def _member_comment(parameter: Parameter, member: str) -> str:
-    """Return the comment on a member of the parameter struct; it contains the name in the spec if the member has
-    another name."""
+    """Return the comment on a member of the parameter struct. It has the name of the parameter in the spec if this
+    differs.
+    """
     comment = plain(parameter.description) or f"default {float(parameter.value)!r}"
     comment += f" [{plain(parameter.unit)}]" * bool(parameter.unit)
     return comment if member == parameter.name else f"{parameter.name}: {comment}"
@@ -328,7 +339,7 @@ def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
 
 
 def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
-    """Return the constants and the functions of the model; ``others`` are further printed texts."""
+    """Return the text of the constants and functions of the model; ``others`` are further printed texts."""
     step = program.step
     body = functions.called(program, device=has["DEVICE"])
     kernels_of_step = text_of(program).kernels(step, has)
@@ -380,7 +391,7 @@ def model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others
 
 
 def _of_adjoint(program: Program, adjoint: Adjoint) -> list[Kernel]:
-    """Return the kernels that the reverse pass of any step calls."""
+    """Return the kernels that the reverse pass of each kind of step calls."""
     path = [adjoint.path.curvature, adjoint.path.slope] if adjoint.path else []
     kernels = [*path, *([adjoint.prepare] if program.parameters or program.monitor else [])]
     return [*kernels, program.monitor.level] if program.monitor and program.monitor.level else kernels

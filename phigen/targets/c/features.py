@@ -12,8 +12,8 @@ from phigen.targets.features import Feature
 
 FEATURES = (
     Feature("PREDICTED", lambda p: p.step.kind.predicted and not p.noise),
-    Feature("DEVICE", lambda p: False),  # set by `phigen.targets.device` only
-    Feature("COMMON", lambda p: False),  # set by `phigen.targets.device` only
+    Feature("DEVICE", lambda p: False),  # switched on by `phigen.targets.device`
+    Feature("COMMON", lambda p: False),  # switched on by `phigen.targets.device`
     Feature("SINGLE", lambda p: p.single),
     Feature("PARAMETERS", lambda p: p.parameters),
     Feature("CHANGED_PARAMETERS", requires=("PARAMETERS",), part="parameters"),
@@ -34,14 +34,14 @@ def _calls(lanes: Lanes | None, function: str) -> Callable[[Program], bool]:
 
 
 def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
-    """Yield the features that depend on the lowering to SIMD lanes."""
+    """Yield the features that depend on the parts of the program in SIMD lanes."""
     blocks = lanes if isinstance(lanes, Blocks) else None
     traces = lanes if isinstance(lanes, Traces) else None
     packs = lanes if isinstance(lanes, Packs) else None
     stages = lanes if isinstance(lanes, Stages) else None
     yield Feature("BLOCKS", lambda p: blocks, ("RECURRENCES",), "lanes")
     yield Feature("TRACED", lambda p: (blocks or traces) and p.step.kind.implicit, ("ADJOINT",))
-    blocked = blocks or traces  # the reverse pass is vectorised over stages; the scalar one is rarely used
+    blocked = blocks or traces  # the reverse pass then has stages in lanes; the scalar one is rarely used
     yield Feature("UNROLLED_TRANSPOSE", lambda p: p.step.eliminate_transposed and not blocked, ("UNROLLED", "ADJOINT"))
     yield Feature("STAGED", lambda p: stages, part="lanes")
     yield Feature("REDUCED", lambda p: p.step.reduced, ("STAGED",))
@@ -56,7 +56,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("BATCHED", lambda p: packs.transposes if packs else True, (together, "ADJOINT", "EACH"))
     yield Feature("RECOMPUTED", lambda p: packs and packs.recomputed, ("BATCHED",))
     yield Feature("SPARSE", lambda p: blocks and blocks.factors, ("BLOCKS",))
-    full = blocks and blocks.factors is None  # whether Newton matrices are inverted instead of factorised
+    full = blocks and blocks.factors is None  # whether Newton matrices are inverted, not factorised
     yield Feature("SWEPT", lambda p: full, ("BLOCKS", "COMPOSED"))
     yield Feature("CENTRED", lambda p: p.step.centred, ("SWEPT",))
     yield Feature("INVERSE_UNROLLED", lambda p: p.step.invert, ("BLOCKS",))
@@ -64,5 +64,5 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
 
 
 def switches(program: Program, lanes: Lanes | None) -> dict[str, bool]:
-    """Return the values of all switches of the C runtime for a program."""
+    """Return the values of all switches of the C runtime for a program, by name."""
     return features.switches(program, (*FEATURES, *_in_lanes(lanes)))

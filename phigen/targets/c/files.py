@@ -1,8 +1,8 @@
-"""The files of the C runtime that only some solvers have, each with its condition.
+"""Files and functions of the C runtime that only some solvers have, with their conditions.
 
 Other files include these files without a condition: if a file is left out, its include guard counts as defined. Other
-files also call the functions in `CALLS` without a condition. If such a function is left out, so are the statements that
-call it, with an `if` or `for` before them on the line.
+files also call the functions in `CALLS` without a condition. If a function is left out, the statements that call it are
+removed, together with an `if` or `for` before them on the same line.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from phigen.targets.features import holds
 
 _KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
-#: Conditions on switches (`phigen.targets.c.features`), by file.
+#: The condition of each file, a condition on switches (`phigen.targets.c.features`).
 CONDITIONS = {
     **{f"{kind}.c": kind.upper() for kind in _KINDS},
     **{f"tangent_{kind}.c": f"TANGENT && {kind.upper()}" for kind in _KINDS},
@@ -225,7 +225,7 @@ CONDITIONS = {
     "tangent_product.c": "TANGENT",
 }
 
-#: Hooks: functions that are called as statements of their own, each with the condition under which the call is kept.
+#: Hooks: functions that are called as statements of their own. Each has the condition under which its calls remain.
 CALLS = {
     "phi_add_aside": "RATE_OF_GAUGE",
     "phi_add_by_parameters": "PARAMETERS || MONITOR",
@@ -290,17 +290,17 @@ CALLS = {
 
 
 def guard(file: str) -> str:
-    """Return the include guard of a file of the runtime."""
+    """Return the name of the include guard of a file of the runtime."""
     return f"PHI_FILE_{file.removesuffix('.c').replace('.', '_').upper()}"
 
 
 def left_out(switches: Mapping[str, bool]) -> dict[str, str]:
-    """Return the files that a solver does not have, with their include guards."""
+    """Return the files of the runtime that a solver with these switches does not have, with their include guards."""
     return {file: guard(file) for file in _lacking(CONDITIONS, switches)}
 
 
 def calls_left_out(switches: Mapping[str, bool]) -> list[str]:
-    """Return the hooks whose calls are removed from a solver."""
+    """Return the hooks whose calls are removed from a solver with these switches."""
     return _lacking(CALLS, switches)
 
 

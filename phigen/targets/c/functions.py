@@ -1,4 +1,6 @@
-"""Elementary functions that generated C defines: polynomials for small arguments, otherwise formulas with libm."""
+"""Definitions of elementary functions in generated C: polynomials for small arguments, formulas with libm for all
+others.
+"""
 
 from __future__ import annotations
 
@@ -35,14 +37,15 @@ from phigen.targets.c.real import rendered
 from phigen.targets.polynomials import estrin
 from phigen.targets.special import entire_used
 
-#: The functions of the C library that have a small-argument version in generated code; flows call that version.
+#: Functions of the C library for which generated code has a version with a polynomial for small arguments. Flows call
+#: this version.
 FLOW_FUNCTIONS = tuple(
     f for f in SMALL_ARGUMENT_FUNCTIONS if f not in (*ENTIRE, ANOMALY, *ELLIPTIC, *REMAINDERS, *QUOTIENTS)
 )
 
 
-#: Relative size of terms of series, compared with the first term, below which they are omitted in single precision: a
-#: quarter of a rounding.
+#: Terms of a series are omitted in single precision if they are smaller than this, relative to the first term: a
+#: quarter of a rounding error.
 _SINGLE_NEGLIGIBLE = 2.0**-26
 
 C = TypeVar("C", float, Fraction)
@@ -50,11 +53,11 @@ C = TypeVar("C", float, Fraction)
 
 @dataclass(frozen=True)
 class Small:
-    """A function with a series for small arguments t: ±1/first!, ±1/(first + step)!, … with alternating signs.
+    """An elementary function with a series for small arguments t: Σ ±z^k/(first + k·step)!, with ``signs`` in turn.
 
-    The variable z is t², or t if ``step`` is 1. ``far`` is the full-range formula. ``flows`` is the small-argument
-    version in flows: a radius, a number of terms, and the value as a function of the sum P. ``rows`` is the version for
-    loops over sites, with the fewest operations.
+    The variable z is t², or t if ``step`` is 1. ``far`` is the formula for all arguments. ``flows`` describes the
+    version for flows: the largest |t|, the number of terms, and the function as a text in the sum P. ``rows`` describes
+    the version for loops over sites, which has the fewest operations.
     """
 
     meaning: str
@@ -66,13 +69,13 @@ class Small:
     rows: tuple[Fraction, int, str]
 
     def terms(self, count: int) -> list[Fraction]:
-        """Return the first ``count`` coefficients of the series, exactly."""
+        """Return the first ``count`` coefficients of the series as exact fractions."""
         return [Fraction(self.signs[k % 2], math.factorial(self.first + k * self.step)) for k in range(count)]
 
 
 _QUARTER, _HALF, _TWICE = Fraction(1, 4), Fraction(1, 2), "2.0 * sin(0.5 * t) * sin(0.5 * t)"
 
-#: The functions of `FLOW_FUNCTIONS` by name.
+#: Descriptions of the functions in `FLOW_FUNCTIONS`, by name.
 _SMALL = {
     "expm1": Small(
         "exp(t) - 1", "expm1(t)", 2, 1, (1, 1), (0.35, 12, "t + t * t * ({P})"), (_QUARTER, 9, "z + z * z * {P}")
@@ -83,16 +86,16 @@ _SMALL = {
 
 
 def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool = False) -> list[str]:
-    """Return the special functions that kernels call, except the ``unprinted`` kernels.
+    """Return the definitions of special functions that the kernels of a program call, except the kernels ``unprinted``.
 
-    They are φ and its derivatives, the functions of `ENTIRE`, and for a splitting those that its flows call. On a
-    ``device`` φ calls no tangent.
+    Special functions are φ and its derivatives, the functions of `ENTIRE`, and for a splitting those that its flows
+    call. On a ``device``, φ is computed without a tangent.
     """
-    # loops over sites have separate versions
+    # Only flows of ordinary systems are considered, since loops over sites have separate versions.
     used = {e.op for e in topological([e for kernel in program.step.flow_kernels for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     names = special.used(program, unprinted)
-    if device and names and SPECIAL[0] not in names:  # the other functions call it
+    if device and names and SPECIAL[0] not in names:  # the derivatives of φ call φ
         names = [SPECIAL[0], *names]
     phis = [rendered(program, "phi_device.c" if device else "phi.c", _phi(program, f, device=device)) for f in names]
     polynomial = [rendered(program, "polynomial.c", {})] if phis else []
@@ -104,7 +107,7 @@ def called(program: Program, unprinted: Sequence[Kernel] = (), *, device: bool =
 
 
 def _exponentials(program: Program) -> list[str]:
-    """Return the matrix exponential for the largest matrix in ``prepare``, or nothing if there is none."""
+    """Return the definition of the matrix exponential, for the largest matrix in ``prepare``; [] if there is none."""
     rows, adjoint = special.largest_exponential(program), special.transposes_exponentials(program)
     if not rows:
         return []
@@ -113,7 +116,7 @@ def _exponentials(program: Program) -> list[str]:
 
 
 def near(program: Program, names: Iterable[str]) -> list[str]:
-    """Return the versions of these functions for loops over lanes, for small arguments only."""
+    """Return the definitions of functions for loops over lanes, which are correct for small arguments only."""
     listed = list(names)
     others = [f for f in listed if f not in (*ELLIPTIC, *REMAINDERS, *QUOTIENTS)]
     texts = [
@@ -125,26 +128,28 @@ def near(program: Program, names: Iterable[str]) -> list[str]:
 
 
 def _small_argument_function(program: Program, f: str, **values: object) -> str:
-    """Return a function with a polynomial for small arguments."""
+    """Return the definition of a function by a polynomial for small arguments and a formula for all others."""
     return rendered(program, "small.c", _values(program, f) | values)
 
 
 def _remainders(program: Program, names: Sequence[str], *, near: bool) -> list[str]:
-    """Return the functions of exponentials of small matrices."""
+    """Return the definitions of the functions that exponentials of small matrices need."""
     doublings = LANE_DOUBLINGS if near else "halvings"
     values = {"NAME": program.name, "near": near, "doublings": doublings, **special.remainder_values(names)}
     return [rendered(program, "remainders.c", values)] if names else []
 
 
 def _elliptic(program: Program, names: Sequence[str], *, near: bool) -> list[str]:
-    """Return the elliptic functions of free rigid bodies."""
+    """Return the definitions of the elliptic functions that free rigid bodies need."""
     return special.elliptic_texts(
         names, lambda template, values: rendered(program, f"{template}.c", {"near": near, **values})
     )
 
 
 def _anomaly(program: Program, *, near: bool = False) -> str:
-    """Return the universal anomaly of Kepler motions, with c2 and c3 by series in the same powers."""
+    """Return the definition of the universal anomaly of Kepler motions; its series for c2 and c3 have the same
+    powers.
+    """
     c2, c3 = special.stumpff()
     count = max(len(needed(program, c, 1.0)) for c in (c2, c3))
     c2, c3 = c2[:count], c3[:count]
@@ -155,7 +160,10 @@ def _anomaly(program: Program, *, near: bool = False) -> str:
 
 
 def near_rows(program: Program, names: Iterable[str]) -> list[str]:
-    """Return small-argument functions for loops over sites, with the fewest operations that give full precision."""
+    """Return the definitions of functions of small arguments for loops over sites.
+
+    Their polynomials have the fewest terms that give full precision.
+    """
     return [
         _anomaly(program, near=True) if f == ANOMALY else rendered(program, "row_near.c", _row_values(program, f))
         for f in names
@@ -187,7 +195,7 @@ def _nested(coefficients: Sequence[float]) -> str:
 
 
 def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
-    """Return φ and those of its derivatives that occur in ``ops``, for loops over lanes."""
+    """Return the definitions for loops over lanes of φ and of those derivatives of φ that are in ``ops``."""
     texts = []
     for f in (f for f in SPECIAL if f in ops):
         first, *rest = map(repr, lane_coefficients(order_of(f)))
@@ -216,7 +224,7 @@ def _phi(program: Program, f: str, *, device: bool) -> Mapping[str, object]:
 
 
 def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]:
-    """Return the coefficients of a series that are needed for full precision at arguments up to ``reach``."""
+    """Return the first coefficients of a series, as many as full precision at arguments up to ``reach`` needs."""
     if not program.single:
         return list(coefficients)
     least = _SINGLE_NEGLIGIBLE * abs(float(coefficients[0]))
@@ -225,7 +233,7 @@ def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]
 
 
 def _table(name: str, numbers: Sequence[float]) -> list[str]:
-    """Return the lines of the declaration of a table."""
+    """Return the lines that declare a table of numbers in C."""
     text = f"static const double {name}[{len(numbers)}] = {{ {', '.join(map(repr, numbers))} }};"
     first, *rest = textwrap.wrap(text, WIDTH - 4, subsequent_indent="    ", break_on_hyphens=False)
     return [first.replace("static const", "PHI_LOCAL_TABLE", 1), *rest]

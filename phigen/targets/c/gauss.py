@@ -1,4 +1,4 @@
-"""Parts of a Gauss method in C: its coefficients, sizes, and the kernels at one stage."""
+"""Gauss methods in C: coefficients, sizes of arrays, and the kernels that are evaluated at one stage."""
 
 from __future__ import annotations
 
@@ -14,18 +14,21 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss
 from phigen.targets.c.real import rendered
 
-#: In single precision, thresholds are powers of those of double precision. This exception becomes 1e-9, the same
-#: fraction of a rounding error as 2e-18 in double precision. With the general rule, 1e5 steps of Hénon–Heiles have an
-#: energy error of 2e-5 instead of 5e-7.
+#: Threshold for the end of sweeps in single precision. Thresholds of single precision are printed as powers of those of
+#: double precision; by this rule 1.3e-20 becomes 1e-9, which is the same fraction of a rounding error as 2e-18 is in
+#: double precision. With 2e-18 and the rule, the energy error of 1e5 steps of Hénon–Heiles is 2e-5 instead of 5e-7.
 SINGLE_SOLVED = 1.3e-20
 
-#: The threshold for stages in a loop. With 2e-18 the energy of the Hénon–Heiles system drifts by 1.7e-18 of its size in
-#: each of 3e5 steps of 0.7 at order 12; with this threshold, by less than 2e-19. Steps take 5 % longer.
+#: Threshold for methods whose stages are in a loop, not in lanes. With 2e-18, the relative energy of the Hénon–Heiles
+#: system drifts by 1.7e-18 in each of 3e5 steps of 0.7 at order 12. With this threshold it drifts by less than 2e-19,
+#: and steps take 5 % longer.
 LOOP_SOLVED = 5e-19
 
 
 def policy(*, single: bool, staged: bool) -> GaussPolicy:
-    """Return the thresholds of a Gauss method; ``staged`` says that its stages are in lanes."""
+    """Return the thresholds of a Gauss method. ``staged`` says that its stages are in SIMD lanes, ``single`` that the
+    solver has single precision.
+    """
     usual = POLICIES["gauss_policy"]
     assert isinstance(usual, GaussPolicy)
     if single:
@@ -34,7 +37,9 @@ def policy(*, single: bool, staged: bool) -> GaussPolicy:
 
 
 def _width(step: Gauss, lanes: Lanes | None) -> int:
-    """Return the number of entries of an array over the stages: that of the lanes, or that of the stages."""
+    """Return the length of an array over the stages: the number of lanes if stages are in lanes, else the number of
+    stages.
+    """
     return lanes.lanes if isinstance(lanes, Stages) else step.tableau.stages
 
 
@@ -65,8 +70,10 @@ def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
 
 
 def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
-    """Return the kernels that are evaluated at one stage. If ``staged``, most kernels are evaluated at all stages
-    together."""
+    """Return the kernels that are evaluated at a single stage.
+
+    If stages are in lanes (``staged``), most kernels are evaluated at all stages together, and are left out here.
+    """
     at_stages = [] if staged else [step.slope, step.frame]
     at_stages += [step.reduced.follow] if staged and step.reduced else []
     at_stages += [step.lift.functionals] if step.lift else []
@@ -77,22 +84,24 @@ def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
 
 
 def trail(program: Program, step: Gauss, lanes: Lanes | None) -> int:
-    """Return the number of values on the tape for one step: those of its start and its stage increments."""
+    """Return the number of values that one step stores on the tape: the state at its start, and its stage
+    increments.
+    """
     return program.dimension + step.unknowns * _width(step, lanes)
 
 
 def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool) -> str:
-    """Return the coefficients, and the functions that compute unknowns from stage increments.
+    """Return the tables of coefficients, and the functions that compute the unknowns of stages from stage increments.
 
-    ``batched`` adds the function for members in lanes.
+    ``batched`` adds the function for batches with one member of an ensemble in each lane.
     """
     table, width = step.tableau, _width(step, lanes)
     precision = SINGLE if program.single else DOUBLE
     if program.single:
-        table = tableau(table.stages, SINGLE)  # rounded to float, the sums of coefficients would differ from 1
+        table = tableau(table.stages, SINGLE)  # coefficients rounded to float would not have the sum 1
     staged = isinstance(lanes, Stages)
     predictions = predictors(table.stages, precision, integrated=staged and bool(step.reduced))
-    if not staged:  # in single precision the continuation would magnify rounding errors to the size of increments
+    if not staged:  # in single precision, the continuation would amplify rounding errors to the size of increments
         predictions = [[list(row) for row in table.prediction] if program.single else continuation(table.stages)]
     terms = [f"matrix[{j}][lane] * increment[{j}]" for j in range(table.stages)]
     older = [f"matrix[{table.stages + j}][lane] * before[{j}]" for j in range(table.stages)]
@@ -119,9 +128,11 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
 
 
 def with_frames(program: Program) -> Program:
-    """Return the program with steps in frames that move along, where single trajectories have their stages in lanes.
+    """Return the program with the step of `Gauss.lifted`, if the solver can use it; else return the program unchanged.
 
-    Batches of members, whose steps are those of single trajectories, have other frames.
+    This step has frames of group elements that change from step to step. It is used if single trajectories have their
+    stages in SIMD lanes. It is not used if ensembles are integrated in batches, since a batch has no frames, and its
+    steps must equal those of single trajectories.
     """
     step = program.step.lifted
     lanes = in_lanes(program) if step else None
@@ -132,7 +143,9 @@ def with_frames(program: Program) -> Program:
 
 
 def _reduced(step: Gauss, table: Tableau, width: int) -> dict[str, object]:
-    """Return the values for the template of reduced sweeps."""
+    """Return the values for the template of sweeps over some of the unknowns; see `ReducedSweeps` in
+    `phigen.scheme.steps`.
+    """
     reduced = step.reduced
     assert reduced is not None
     return {
@@ -153,12 +166,12 @@ def _listed(numbers: Sequence[int]) -> str:
 
 
 def _in_chains(terms: Sequence[str]) -> str:
-    """Return a sum as two partial sums, which processors compute in parallel."""
+    """Return a sum as text: two partial sums, which a processor computes in parallel, are added at the end."""
     return " + ".join(f"({' + '.join(terms[k::2])})" for k in range(min(2, len(terms))))
 
 
 def _halved(terms: Sequence[str]) -> str:
-    """Return a sum as the sum of two halves, which are divided likewise: the chain of dependent additions is short."""
+    """Return a sum as text: it is divided into halves again and again, so that no chain of additions is long."""
     if len(terms) == 1:
         return terms[0]
     half = (len(terms) + 1) // 2

@@ -21,22 +21,22 @@ from phigen.targets.c.loops import statements
 from phigen.targets.c.real import real_of
 from phigen.targets.header import plain, sentence
 
-#: Largest number of assignments in one function; compile time grows quadratically with it.
+#: Largest number of assignments in a function. The time of compilation grows as the square of this number.
 LONGEST_FUNCTION = 200
 
-#: Largest length of a line with the declarations of several temporaries.
+#: Largest length of a line that declares several temporaries.
 SHARED_LINE = 105
 
 
 @dataclass(frozen=True)
 class Form:
-    """Form in which a kernel is printed as a C function called ``name``.
+    """The form in which a kernel is printed as a C function called ``name``.
 
-    An ``exported`` function accepts NULL for the default parameters. ``returning`` means that the only output is the
-    return value. ``lanes`` evaluates the kernel at all SIMD lanes, ``single`` at one of them. The arrays in ``shared``
-    have one value for all lanes. Those in ``alike`` have one value for all lanes if the argument ``own`` is 0.
-    ``workspace`` is the size of the workspace of a function that is cut into parts. ``linkage`` is that of a static
-    function.
+    An ``exported`` function accepts NULL for the default parameters. With ``returning``, the only output is the return
+    value. With ``lanes``, the kernel is evaluated in all SIMD lanes, and with ``single`` in one lane. Arrays in
+    ``shared`` have one value for all lanes; arrays in ``alike`` have one value for all lanes if the argument
+    ``distinct_coef`` is 0. ``workspace`` is the length of the workspace array of a function that is cut into parts.
+    ``linkage`` stands before the type of a static function.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Form:
     linkage: str = "static"
 
     def number(self, program: Program, array: str) -> str:
-        """Return the C type of an entry of an array."""
+        """Return the C type of an element of an argument."""
         return f"{program.name}_lanes" if self.lanes and array not in self.shared else real_of(program).name
 
 
@@ -69,13 +69,15 @@ def function(
     versions: Mapping[str, str] | None = None,
     linkage: str = "static",
 ) -> str:
-    """Return the C source of a kernel: one function, or a chain of static functions that share a workspace.
+    """Return the C source of a kernel: a function, or static functions that are called in turn and share a workspace
+    array.
 
-    With ``lanes`` the kernel is evaluated at several points: each value becomes an array over the lanes, except the
-    inputs that are ``shared``. For inputs that are ``alike``, all lanes read the first lane if the argument ``own`` is
-    0; such a kernel is inlined where ``own`` is known. A ``single`` kernel is evaluated at one lane, the argument
-    ``lane``, and its outputs are numbers. A ``sparse`` kernel does not store entries that are always zero. ``versions``
-    of functions are called, as in `phigen.ir.passes.forms`.
+    With ``lanes``, the kernel is evaluated at several points: each value becomes an array over the lanes, except for
+    the inputs in ``shared``. For the inputs in ``alike``, all lanes read the first lane if the argument
+    ``distinct_coef`` is 0; such a kernel is inlined where the value of this argument is known. A ``single`` kernel is
+    evaluated in one lane, the argument ``lane``, and its outputs are numbers. A ``sparse`` kernel does not store
+    outputs that are always zero. ``versions`` maps elementary functions to the functions that are called
+    (`phigen.ir.passes.forms`).
     """
     if kernel.exponents:
         return _through_exponentials(program, kernel)
@@ -99,7 +101,7 @@ def function(
     if not whole:
         built = after_passes(whole=False)
         pieces = cut(built, LONGEST_FUNCTION)
-    # the comment of an exported function is in the header
+    # The comment of an exported function is in the header, so none is printed here.
     said = [] if exported else _comment(f"{called}." if lanes else sentence(kernel.purpose))
     head = [*said, _signature(program, kernel, form) + "\n{"]
     if whole:
@@ -130,15 +132,16 @@ def function(
 
 
 def _exponentials(program: Program, kernel: Kernel) -> list[str]:
-    """Return the statements that replace matrices by their exponentials minus 1."""
+    """Return the statements that replace matrices in an array by their exponentials minus 1."""
     array = kernel.outputs[0].name
     return [f"    {program.name}_matrix_exponential({n}, {array} + {start});" for start, n in kernel.exponentials]
 
 
 def _through_exponentials(program: Program, kernel: Kernel) -> str:
-    """Return the transpose of a kernel with exponentials.
+    """Return the transpose of a kernel that computes matrix exponentials, as several functions.
 
-    It consists of functions for the matrices, for their cotangents, and for the kernel itself.
+    There is a function for the matrices, a function for their cotangents, and the function of the kernel, which calls
+    both.
     """
     assert kernel.exponents is not None
     inner = kernel.exponents
@@ -159,13 +162,13 @@ def _through_exponentials(program: Program, kernel: Kernel) -> str:
 
 
 def declaration(program: Program, kernel: Kernel, *, name: str = "", returning: bool = False) -> str:
-    """Return the declaration of an exported function, as `function` defines it."""
+    """Return the declaration of the exported function that `function` defines for a kernel."""
     form = Form(f"{program.name}_{name or kernel.name}", exported=True, returning=returning)
     return f"{_signature(program, kernel, form)};"
 
 
 def _signature(program: Program, kernel: Kernel, form: Form) -> str:
-    # The inputs of lanes are not const, because C99 has no conversion from double (*)[8] to const double (*)[8].
+    # Inputs in lanes are not const, because C99 does not convert double (*)[8] to const double (*)[8].
     real = real_of(program).name
     inputs, alone = (f"{program.name}_lanes", "restrict ") if form.lanes else (f"const {real}", "")
     kinds = {i: (f"const {real}", "") if i in form.shared else (inputs, alone) for i in kernel.inputs}
@@ -177,12 +180,13 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
         else f"{kinds[i][0]} {i}[{kinds[i][1]}{max(1, len(symbols))}]"
         for i, symbols in kernel.inputs.items()
     ]
-    # Internal calls never pass overlapping inputs and outputs, so restrict is correct there; callers of the API may.
+    # Inside a solver, inputs and outputs never overlap, so that restrict is correct. For exported functions they may
+    # overlap.
     qualifier = "" if form.exported else "restrict "
     arguments += ["int lane"] if form.single else []
     arguments += ["int distinct_coef"] if form.alike else []
     for o in () if form.returning else kernel.outputs:
-        # The caller of NAME_casimirs sizes the array by NAME_CASIMIRS, which may be 0.
+        # The caller of NAME_casimirs has an array of NAME_CASIMIRS numbers, which may be 0, so the length is left out.
         length = "" if form.exported and kernel.role is Role.CASIMIRS else f"{qualifier}{max(1, len(o.values))}"
         arguments.append(f"{form.number(program, o.name)} {o.name}[{length}]")
     if form.workspace:
@@ -193,7 +197,7 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
 
 
 def _body(program: Program, kernel: Kernel, form: Form, built: ir.Function) -> list[str]:
-    """Return the lines of a function; arguments that it does not read are marked as unused."""
+    """Return the lines of the body of a function; they mark arguments that the function does not read as unused."""
     parameters = [*kernel.inputs, *(() if form.returning else (o.name for o in kernel.outputs))]
     parameters += [*["work"] * bool(form.workspace), *["distinct_coef"] * bool(form.alike), *["lane"] * form.single]
     if form.returning:

@@ -1,6 +1,7 @@
 """SIMD lowering in C: blocks of steps, and batches of members.
 
-Batches of implicit steps are called groups in the runtime, batches of explicit steps packs.
+In the runtime, a batch of members of an ensemble is called a group if steps are implicit, and a pack if they are
+explicit.
 """
 
 from __future__ import annotations
@@ -17,20 +18,24 @@ from phigen.scheme.steps import Splitting
 from phigen.targets.c import functions, splitting
 from phigen.targets.c.kernels import function
 
-#: WINDOW is the number of past values in the fitted recurrence, a multiple of 8. FITTED is the number of values that it
-#: is fitted to, and SMALLEST the least such number, which is for large systems, whose solvers would otherwise need too
-#: much memory.
+#: Predictors fit linear recurrences to past solutions. WINDOW is the number of past values in a recurrence, a multiple
+#: of 8. FITTED is the number of values to which it is fitted. For large systems this would need too much memory; then
+#: the number is smaller, but at least SMALLEST.
 WINDOW, FITTED, SMALLEST = 40, 112, 32
 
-#: Largest number of values in the history of a solver: 64 kB in double precision.
+#: Largest number of past values that a solver stores for its recurrences: 64 kB in double precision.
 MOST_HISTORY = 8_000
 
-#: Number of past values that a recurrence is not fitted to but tested with.
+#: Number of past values on which a recurrence is tested. They are not among the values that it is fitted to.
 CHECKS = 8
 
 
 def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
-    """Return the sizes of the recurrences of a solver as constants by name: values stored, used, predicted, tested."""
+    """Return the sizes of the recurrences of a solver as constants by name.
+
+    They are the numbers of past values that are stored, that a recurrence has, that it predicts, and on which it is
+    tested.
+    """
     affordable = MOST_HISTORY // (2 * program.dimension * len(program.fractions))
     values = max(SMALLEST, min(FITTED, affordable))
     window = 8 * (values * WINDOW // FITTED // 8)
@@ -40,16 +45,16 @@ def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
     return {"REMEMBERED": rows + checks + window + ahead - 1, "WINDOW": window, "AHEAD": ahead, "CHECKS": checks}
 
 
-#: Number of steps whose initial slopes are known, from which the increment of a stage is predicted: the next step, the
+#: The increment of a stage is predicted from derivatives at the starts of this number of steps: the next step, the
 #: present one, and earlier ones.
 KNOTS = 4
 
 
 def travels(fractions: Sequence[float]) -> list[list[float]]:
-    """Return, for each stage, the weights of slopes at the times 2 − `KNOTS` … 1 whose weighted sum is its increment.
+    """Return, for each stage, the weights w with which Σ w_k f_k predicts the increment of the stage.
 
-    Times and increments are in units of the step. The weighted sum is the integral of the polynomial through the
-    slopes; it is computed by Gauss' rule of three points, which is exact.
+    f_k are the derivatives at the times 2 − `KNOTS` … 1, in units of the step. The sum is the integral over the stage
+    of the polynomial through the f_k. Gauss' rule of three points computes this integral exactly.
     """
     knots = range(2 - KNOTS, 2)
     weights = []
@@ -61,7 +66,7 @@ def travels(fractions: Sequence[float]) -> list[list[float]]:
 
 
 def grouped(program: Program, lanes: Lanes | None) -> bool:
-    """Whether ensembles are integrated in SIMD batches, whose histories are on the stack."""
+    """Whether ensembles are integrated in SIMD batches; the history of a batch must fit on the stack."""
     memory = remembered(program, lanes)
     values = len(program.fractions) * (memory["REMEMBERED"] + memory["WINDOW"]) * program.dimension
     return isinstance(lanes, Blocks) and lanes.grouped(values)
@@ -72,8 +77,8 @@ def printed(
 ) -> list[str]:
     """Return the text of the kernels in SIMD lanes.
 
-    ``packed`` prints the kernels of batches with explicit steps. ``batched`` adds the kernels of batches of Gauss
-    steps.
+    ``packed`` prints the kernels for batches of members with explicit steps. ``batched`` adds the kernels for batches
+    of members with Gauss steps.
     """
     texts = functions.phi_lanes(program, lanes.calls)
     if isinstance(lanes, Blocks | Stages | Traces):
@@ -86,22 +91,22 @@ def printed(
 
 
 def printed_back(program: Program, step: Splitting, packs: Packs) -> str:
-    """Return the transposes of the flows of batches with explicit steps."""
+    """Return the text of the transposed flows for batches of members with explicit steps."""
     return "\n".join(splitting.adjoint_in_lanes(program, step, packs.transposes, _NEAR, SIMD))
 
 
-#: The versions of functions that loops over lanes call, which are for small arguments.
+#: The versions of elementary functions that loops over lanes call; they are correct for small arguments only.
 _NEAR = {**SIMD, **{f: f + NEAR for f in SMALL_ARGUMENT_FUNCTIONS}}
 
 
 def packed_kernels(program: Program, packs: Packs) -> list[str]:
-    """Return the kernels of batches whose step is one kernel."""
+    """Return the text of the kernels for batches of members whose step is a single kernel."""
     texts = [function(program, kernel, lanes=True, alike=["coef"]) for kernel in packs.kernels]
     return texts + [function(program, kernel, lanes=True) for kernel in packs.transposes]
 
 
 def packed_step(program: Program, step: Splitting, packs: Packs) -> list[str]:
-    """Return the flows of batches, and the step that consists of them."""
+    """Return the text of the flows for batches of members, and of the step that consists of these flows."""
     called = operations([*packs.kernels, *packs.transposes])
     texts = functions.near(program, [f for f in SMALL_ARGUMENT_FUNCTIONS if f in called])
     texts += splitting.in_lanes(program, step, "", _NEAR)

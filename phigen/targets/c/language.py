@@ -1,4 +1,4 @@
-"""Description of C99 as a target language, and the names that a solver has for functions and parameters."""
+"""C99 as a target language: the spelling of formulas, and the names of functions and parameters in a solver."""
 
 from __future__ import annotations
 
@@ -21,19 +21,23 @@ FUNCTIONS = elementary.written_in("c")
 LANGUAGE = Language(
     reserved=C_RESERVED,
     functions=FUNCTIONS,
-    constants={"pi": "3.141592653589793", "E": "2.718281828459045"},  # digits, since M_PI is not defined under -std=c99
+    constants={"pi": "3.141592653589793", "E": "2.718281828459045"},  # M_PI is not defined under -std=c99
 )
 
 
 @cache
 def reserved_members(name: str) -> Reserved:
-    """Return the names that no member may have: reserved words, phrases of the runtime, and macros of the solver."""
+    """Return the names that members of structs must not have: reserved words, phrases of the runtime, macros of the
+    solver.
+    """
     return _extended(name, "[A-Z0-9_]*[A-Z0-9]")
 
 
 @cache
 def reserved_variables(name: str) -> Reserved:
-    """Return the names that no variable may have: also those with the prefixes of functions and types of the solver."""
+    """Return the names that variables must not have: those of `reserved_members`, and all names with a prefix of the
+    solver.
+    """
     return _extended(name, r"\w*[^\W_]")
 
 
@@ -45,11 +49,10 @@ def _extended(name: str, pattern: str) -> Reserved:
 
 @cache
 def elementary_functions(name: str) -> dict[str, str]:
-    """Return the names that a solver uses for elementary functions; those that the C library lacks belong to the
-    solver.
+    """Return the names in the code of a solver of the elementary functions.
 
-    Versions for small arguments and for SIMD lanes (`phigen.ir.passes.forms`) are functions of the solver, or formulas
-    of such functions.
+    Functions that the C library lacks belong to the solver, and have its name as prefix. So do versions for small
+    arguments and for SIMD lanes (`phigen.ir.passes.forms`), unless they are formulas in other functions.
     """
     lanes = {f: f"{name}_{f}{LANE}" for f in LANE_FUNCTIONS}
     formulas = {f: text.format_map(lanes) for f, text in LANE_FORMULAS.items()}
@@ -61,10 +64,10 @@ def elementary_functions(name: str) -> dict[str, str]:
 
 
 def printer(scope: Scope, functions: Mapping[str, str] = FUNCTIONS) -> Printer:
-    """Return the printer of lowered trees in C, with the names of a scope."""
+    """Return the printer of formulas in C, with the identifiers of a scope."""
     return replace(LANGUAGE, functions=functions).printer(scope)
 
 
 def members(program: Program) -> dict[str, str]:
-    """Return the members of the parameter struct, by the names of the parameters."""
+    """Return the names of the members of the parameter struct, by the names of the parameters."""
     return identifiers((p.name for p in program.parameters), reserved_members(program.name))

@@ -1,4 +1,4 @@
-"""Line breaks of generated C, for lines of at most 110 columns."""
+"""Layout of generated C: line breaks for at most 110 columns, and alignment of comments."""
 
 from __future__ import annotations
 
@@ -8,24 +8,26 @@ from collections.abc import Iterable, Iterator
 
 WIDTH = 110
 
-#: Pattern of code with a trailing comment.
+#: Pattern of a line of code with a comment at its end.
 _BEHIND = re.compile(r"( *[^ /].*?[;,0-9A-Z]) +(/\*.*\*/)")
 _STRING = re.compile(r'"[^"]*"')
 
-#: Penalties, in columns, of a line break inside parentheses and inside brackets, for each level of nesting.
+#: Penalties of a line break inside parentheses and inside brackets, in columns for each level of nesting.
 _DEPTH, _INDEX = 18, 60
 
-#: Penalty, in columns, of a line break at an operator: it is larger for operators that bind more strongly.
+#: Penalties of a line break at an operator, in columns. They are larger for operators that bind more strongly.
 _BOUND = dict.fromkeys("*/", 50) | dict.fromkeys("+-", 36) | dict.fromkeys(("<", ">", "<=", ">=", "==", "!="), 28)
 
 
 def fitted(text: str) -> str:
-    """Return the text with long lines of code broken, long comments wrapped, and trailing comments aligned."""
+    """Return the text with long lines of code broken, long comments wrapped, and comments at the ends of lines
+    aligned.
+    """
     return "\n".join([*_aligned(_lines(text.split("\n")))][:-1])
 
 
 def _aligned(lines: Iterable[str]) -> Iterator[str]:
-    """Yield the lines with the trailing comments of successive lines aligned, if they fit."""
+    """Yield the lines. Comments at the ends of consecutive lines are aligned, if the lines do not become too long."""
     run: list[tuple[str, str]] = []
     for line in [*lines, ""]:
         match = _BEHIND.fullmatch(line) if line.endswith("*/") else None
@@ -67,7 +69,7 @@ def _lines(lines: list[str]) -> Iterator[str]:
 
 
 def _macro(lines: list[str]) -> Iterator[str]:
-    """Yield the lines of a macro, with long lines broken as other code is."""
+    """Yield the lines of a macro definition; long lines are broken."""
     for line in lines:
         *first, last = _code(line.removesuffix(" \\"), WIDTH - 2)
         yield from (f"{part} \\" for part in first)
@@ -75,7 +77,7 @@ def _macro(lines: list[str]) -> Iterator[str]:
 
 
 def _statement(lines: list[str], first: int) -> int:
-    """Return the index of the line in which all parentheses of a statement are closed."""
+    """Return the index of the line in which the last open parenthesis of a statement is closed."""
     depth = 0
     for k in range(first, len(lines)):
         code = _STRING.sub("", lines[k]) if '"' in lines[k] else lines[k]
@@ -86,7 +88,7 @@ def _statement(lines: list[str], first: int) -> int:
 
 
 def comment(text: str, indent: str = "") -> list[str]:
-    """Return a comment with its marks, wrapped to lines; the closing mark is never alone on a line."""
+    """Return the lines of a comment with its marks, wrapped. The closing mark never stands alone on a line."""
     lines = textwrap.wrap(
         text.replace(" */", "\N{NO-BREAK SPACE}*/"),
         WIDTH,
@@ -102,7 +104,7 @@ def _indent(line: str) -> str:
     return line[: len(line) - len(line.lstrip())]
 
 
-#: Pattern of a function with one statement on one line.
+#: Pattern of a function whose definition is one line with one statement.
 _FUNCTION = re.compile(r"(\S.*\)) \{ (.*;) \}")
 
 
@@ -127,7 +129,9 @@ def _code(line: str, width: int = WIDTH) -> Iterator[str]:
 
 
 def _places(line: str, least: int, width: int) -> Iterator[tuple[int, int]]:
-    """Yield the columns at which a line may be broken, as pairs (score, column); the highest score is the best."""
+    """Yield the columns at which a line may be broken, as pairs (score, column). The column with the highest score is
+    the best.
+    """
     depth, index, head = 0, 0, re.match(r" *(for|if|while) \(", line)
     line = _STRING.sub(lambda match: "'" * len(match[0]), line)
     for k, c in enumerate(line[: width + 1]):

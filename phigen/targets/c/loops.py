@@ -1,4 +1,4 @@
-"""Functions of the loop IR in C."""
+"""Printing of functions of the loop IR in C."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from phigen.targets.c.layout import WIDTH, comment
 from phigen.targets.c.real import real_of
 from phigen.targets.spelling import Dialect, Spelling
 
-#: Functions and sizes of the runtime; their names in generated code begin with the name of the solver.
+#: Functions and sizes of the runtime. In generated code, their names begin with the name of the solver.
 _RUNTIME = (
     "first", "LANES", "total", "added", "ADDED", "piece_of", "between", "units", "part_of_flow", "DIM", "SUMS", "ROW",
     "ELEMENT", "BACK_PACKS", "FLOWS", "TERMS", "taylor_product", "taylor_chain", "taylor_power",
 )  # fmt: skip
 
-#: Types of integers.
+#: C types of integers, by type of the loop IR.
 _INTEGERS = {ir.Type.INDEX: "ptrdiff_t", ir.Type.SIZE: "size_t", ir.Type.FLAG: "int"}
 
-#: Types of loop variables, by kind.
+#: C types of loop variables, by kind of loop.
 _COUNTERS = {
     "segments": "size_t",
     "search": "size_t",
@@ -34,28 +34,30 @@ _COUNTERS = {
     "entries": "int",
 }
 
-#: Limits of a case of a switch that is printed on one line: number of statements, and number of characters, which
-#: leaves space for the label and the indentation.
+#: Limits for printing a case of a switch on one line: the number of statements, and the number of characters. The
+#: latter leaves space for the label and the indentation.
 _SHORT_CASE, _CASE_WIDTH = 2, WIDTH - 24
 
 
 @dataclass(frozen=True)
 class CTypes:
-    """The names of types in a solver, which begin with the name of the solver; numbers have the type ``real``."""
+    """The C types of values in a solver. Names of structs begin with the name of the solver; numbers have the type
+    ``real``.
+    """
 
     prefix: str
     real: str
 
     def number(self, *, lanes: bool) -> str:
-        """Return the type of a number, or of its values in SIMD lanes."""
+        """Return the C type of a number, or of a number in each SIMD lane."""
         return f"{self.prefix}_lanes" if lanes else self.real
 
     def value(self, kind: ir.Type) -> str:
-        """Return the type of a value that is not an address."""
+        """Return the C type of a value that is not an address."""
         return self.real if kind is ir.Type.REAL else _INTEGERS[kind]
 
     def parameter(self, name: str, kind: ir.ParameterType, spell: Spelling) -> str:
-        """Return the declaration of a parameter."""
+        """Return the declaration of a parameter in C."""
         match kind:
             case ir.RecordType(record, mutable):
                 return f"{'const ' * (not mutable)}{self.prefix}_{record} *{name}"
@@ -73,7 +75,7 @@ class CTypes:
 
 
 def function(printed: ir.Function, program: Program, linkage: str = "static") -> str:
-    """Return a function of a solver as text, without its comment."""
+    """Return a function of a solver as C, without a comment."""
     printer = _StatementPrinter.of(printed, program)
     types = printed.known_types
     parameters = ", ".join(printer.types.parameter(p, types[p], printer.spell) for p in printed.parameters)
@@ -83,12 +85,12 @@ def function(printed: ir.Function, program: Program, linkage: str = "static") ->
 
 
 def commented(printed: ir.Function, program: Program, linkage: str = "static") -> str:
-    """Return a function of a solver as text, with its purpose as a comment."""
+    """Return a function of a solver as C, with a comment that says its purpose."""
     return "\n".join([*comment(f"/* {printed.doc}. */"), function(printed, program, linkage)])
 
 
 def table(printed: ir.ConstantTable, program: Program) -> str:
-    """Return the constants of a table of a solver as a line."""
+    """Return a table of integers of a solver as one line of C."""
     number = printed.length or ir.Constant(len(printed.values))
     length = _spelling(ir.Function("", "", Role.OTHER, (), ()), program)(number)
     return f"static const int {program.name}_{printed.name}[{length}] = {{ {', '.join(map(str, printed.values))} }};"
@@ -97,8 +99,8 @@ def table(printed: ir.ConstantTable, program: Program) -> str:
 def statements(printed: ir.Function, program: Program, *, shared_line: int = 0) -> list[str]:
     """Return the lines of the body of a function of a solver.
 
-    Declarations of computed values share lines of at most ``shared_line`` characters; 0 means one declaration on each
-    line.
+    With ``shared_line``, several declarations of computed values are on one line of at most this number of characters.
+    With 0, each declaration has its own line.
     """
     return [*_indented(_StatementPrinter.of(printed, program, shared_line).lines(printed.body))]
 
@@ -122,7 +124,7 @@ def _indented(lines: Iterable[str]) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class _StatementPrinter:
-    """Printer of the statements of one function, with a spelling and with the types of a solver; see `statements`."""
+    """Printer of the statements of one function, with its identifiers and the types of the solver; see `statements`."""
 
     spell: Spelling
     types: CTypes
@@ -130,7 +132,7 @@ class _StatementPrinter:
 
     @classmethod
     def of(cls, printed: ir.Function, program: Program, shared_line: int = 0) -> _StatementPrinter:
-        """Return the printer of a function of a solver."""
+        """Return the printer for a function of the loop IR in a solver."""
         return cls(_spelling(printed, program), CTypes(program.name, real_of(program).name), shared_line)
 
     @property
@@ -155,7 +157,7 @@ class _StatementPrinter:
                     yield from self._statement(s)
 
     def _kind(self, s: ir.Statement) -> str:
-        """Return the kind of statements that are printed as a group, or ""."""
+        """Return the kind of a statement if consecutive statements of this kind are printed together, else ""."""
         if isinstance(s, ir.Discard):
             return "discards"
         if not self.shared_line or not isinstance(s, ir.Declare) or s.in_place or s.type is not ir.Type.REAL:
@@ -259,7 +261,7 @@ class _StatementPrinter:
         yield "}"
 
     def _switch(self, s: ir.Switch) -> Iterator[str]:
-        """Yield the lines of a switch; each case is on a line if all cases are short."""
+        """Yield the lines of a switch. Each case is on one line if all cases are short."""
         *labels, _ = s.labels
         cases = [[*self.lines(case)] for case in s.cases]
         one_line = [" ".join(lines) for lines in cases]

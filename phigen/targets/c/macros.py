@@ -1,7 +1,7 @@
-"""Expansion of the macros that the C runtime uses, and that generated files do not contain.
+"""Expansion of macros of the C runtime, so that generated files do not contain these macros.
 
-The macros follow the rules of C, with two differences. A macro and its arguments must be on one line. If a macro before
-a statement or a block is empty, such as the head of a loop that is made once, the statement loses its indentation.
+The macros follow the rules of C, with two differences. A macro and its arguments must be on one line. If an empty macro
+stands before a statement or a block, as the head of a loop that runs once does, the statement loses its indentation.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ _DEFINITION = re.compile(r"#define (\w+)(?:\(([^)]*)\))?(?: (.*))?$")
 
 @dataclass(frozen=True)
 class Macro:
-    """A macro with its replacement ``text``; ``parameters`` is None for a macro without a parameter list."""
+    """A macro with its replacement ``text``; ``parameters`` is None for a macro that takes no arguments."""
 
     parameters: tuple[str, ...] | None
     text: str
 
     def of(self, arguments: Sequence[str]) -> str:
-        """Return the text for these arguments. Raises `ValueError` if their number is wrong."""
+        """Return the replacement text for these arguments. Raises `ValueError` if the number of arguments is wrong."""
         values = dict(zip(self.parameters or (), arguments, strict=True))
         return re.sub(r"\b\w+\b", lambda word: values.get(word[0], word[0]), self.text) if values else self.text
 
 
 @dataclass
 class Macros:
-    """The macros of the runtime by name, for expansion without a preprocessor."""
+    """The macros of the runtime by name. They are expanded here, without a C preprocessor."""
 
     _known: dict[str, Macro] = field(default_factory=dict)
-    _heads: re.Pattern[str] | None = None  # pattern of macros that are empty, made on first use
+    _heads: re.Pattern[str] | None = None  # pattern of empty macros at the begin of a line, made on first use
 
     def define(self, line: str) -> None:
-        """Add the macro that a line defines, if it defines one."""
+        """Record the macro that a line defines; other lines are ignored."""
         if match := _DEFINITION.match(line):
             self._known[match[1]] = Macro(tuple(match[2].split(", ")) if match[2] else None, match[3] or "")
             self._heads = None
@@ -47,11 +47,13 @@ class Macros:
         )
         lines = _without_heads(lines, self._heads)
         expanded = [(line, self._line(line) if "PHI_" in line else line) for line in lines]
-        # a statement that is expanded to nothing leaves no line
+        # A line is removed if it consists of a macro with an empty text.
         return [text for line, text in expanded if text or not line]
 
     def _line(self, line: str) -> str:
-        """Return a line with macros expanded, without spaces before a comma or an empty expansion."""
+        """Return a line with macros expanded. Spaces before a macro are removed if its text is empty or begins with a
+        comma.
+        """
         at = 0
         while match := _NAME.search(line, at):
             macro = self._known.get(match[0])
@@ -66,7 +68,10 @@ class Macros:
 
 
 def _arguments(line: str, at: int) -> tuple[list[str], int]:
-    """Return the arguments of a macro, and the column after them. Raises `ValueError` if there are none."""
+    """Return the arguments of the macro whose parenthesis opens at column ``at``, and the column after the closing one.
+
+    Raises `ValueError` if there are no arguments, or if they do not end on the line.
+    """
     if line[at : at + 1] != "(":
         raise ValueError(f"a macro without its arguments: {line.strip()}")
     arguments, depth, begin = [], 0, at + 1
@@ -81,15 +86,17 @@ def _arguments(line: str, at: int) -> tuple[list[str], int]:
 
 
 def _pattern_of_heads(names: Iterable[str]) -> re.Pattern[str]:
-    """Return the pattern of lines that begin with one of the names."""
+    """Return the pattern of lines that begin with one of the ``names``, which are those of empty macros."""
     return re.compile(rf"^( *)(?:{'|'.join(names) or '(?!)'})(?: (.*))?$")
 
 
 def _without_heads(lines: Sequence[str], heads: re.Pattern[str]) -> list[str]:
-    """Return lines without the heads of loops that match; the body of each loop, with or without braces, is
-    dedented."""
+    """Return lines without the heads of loops that are empty macros.
+
+    The body of each loop, with or without braces, is dedented.
+    """
     remaining: list[str] = []
-    ends: list[tuple[str, str]] = []  # for each removed loop: its indentation, and the line that ends it
+    ends: list[tuple[str, str]] = []  # for each removed head: its indentation, and the line that ends its loop
     for line in lines:
         named = "PHI_" in line
         if not ends and not named:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from phigen.targets.c.tokens import TokenKind, lexemes
 
-#: Kinds of tokens that are not part of the grammar.
+#: Kinds of tokens that are not part of the grammar of C.
 _TRIVIA = (TokenKind.SPACE, TokenKind.COMMENT, TokenKind.DIRECTIVE)
 
 #: Precedence of binary operators, as in C.
@@ -23,7 +23,7 @@ _PRECEDENCE = {
 }  # fmt: skip
 _CONDITIONAL = 2
 
-#: Tokens that separate expressions.
+#: Tokens that separate expressions from one another.
 _SEPARATORS = {
     ";", ",", "{", "}", "=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>=", "return", "else", "case",
     "do", "goto",
@@ -34,13 +34,13 @@ _UNUSED = {"memcpy", "memmove", "memset"}
 
 
 def compliant(code: str) -> str:
-    """Return C that complies with the rules, from C that compiles."""
+    """Return C that complies with these rules of MISRA; ``code`` must be C that compiles."""
     return _Text(_with_void(_Text(code).braced())).parenthesised()
 
 
 @dataclass
 class _Text:
-    """Tokens of C, and text to be inserted before and after each token."""
+    """The tokens of a C file, and text that is to be inserted before and after each token."""
 
     code: str
     tokens: list[str] = field(default_factory=list)
@@ -58,7 +58,7 @@ class _Text:
         return self.tokens[self.significant[place]] if place < len(self.significant) else ""
 
     def text(self) -> str:
-        """Return the code with the inserted text."""
+        """Return the code with all insertions."""
         places = {token: place for place, token in enumerate(self.significant)}
         return "".join(
             self.before.get(places[k], "") + token + self.after.get(places[k], "") if k in places else token
@@ -66,7 +66,7 @@ class _Text:
         )
 
     def closing(self, place: int) -> int:
-        """Return the index of the bracket that closes the one at ``place``."""
+        """Return the index of the bracket that closes the bracket at ``place``."""
         opening, depth = self[place], 0
         for at in range(place, len(self.significant)):
             depth += (self[at] == opening) - (self[at] == _CLOSING[opening])
@@ -75,7 +75,7 @@ class _Text:
         raise ValueError(f"no bracket closes {opening}")
 
     def braced(self) -> str:
-        """Insert braces around the bodies of loops and conditionals, and return the code."""
+        """Return the code with braces around the bodies of all loops and conditionals."""
         for place in range(len(self.significant)):
             if self[place] in _CONTROLS and self[place + 1] == "(":
                 self._brace(self.closing(place + 1))
@@ -84,14 +84,17 @@ class _Text:
         return self.text()
 
     def _brace(self, head: int) -> None:
-        """Insert braces around the statement after ``head``, unless it has braces or there is no statement."""
+        """Insert braces around the statement that follows the token ``head``.
+
+        Nothing is inserted if the statement has braces, or if it is empty.
+        """
         if self[head + 1] not in ("{", ";"):
             last = self._end(head + 1)
             self.after[head] = self.after.get(head, "") + " {"
             self.after[last] = " }" + self.after.get(last, "")
 
     def _end(self, place: int) -> int:
-        """Return the index of the last token of the statement that starts at ``place``."""
+        """Return the index of the last token of the statement that begins at ``place``."""
         if self[place] in _CONTROLS:
             last = self._end(self.closing(place + 1) + 1)
             while self[place] == "if" and self[last + 1] == "else":
@@ -104,12 +107,12 @@ class _Text:
         return place
 
     def parenthesised(self) -> str:
-        """Insert parentheses around operands of different precedence, and return the code."""
+        """Return the code with parentheses around operands whose operator has another precedence."""
         self._within(0, len(self.significant))
         return self.text()
 
     def _within(self, begin: int, end: int) -> None:
-        """Process the expressions between two places, including those in brackets."""
+        """Insert parentheses in the expressions between two tokens, including expressions in brackets."""
         operand, operands, operators = begin, list[tuple[int, int]](), list[str]()
         place = begin
         while place < end:
@@ -134,11 +137,13 @@ class _Text:
         return token in (")", "]", "++", "--") or token[0].isalnum() or token[0] in "_\"'."
 
     def _combine(self, operands: list[tuple[int, int]], operators: list[str], last: tuple[int, int]) -> None:
-        """Insert parentheses into an expression, given by its operands and the operators between them."""
+        """Insert parentheses in an expression, given by the token ranges of its operands and the operators between
+        them.
+        """
         if len(operators) > 1:
             reader = _Operators([*operands, last], operators)
             tree = reader.conditional()
-            if reader.at == len(operators):  # not for labels, in which a colon ends the statement
+            if reader.at == len(operators):  # false for labels, in which a colon ends the statement
                 self._wrap(tree)
 
     def _wrap(self, tree: _Tree) -> None:
@@ -155,7 +160,7 @@ _OPERAND = 99
 
 @dataclass(frozen=True)
 class _Tree:
-    """An expression: its range of tokens, the precedence of its operator, and its operands."""
+    """An expression: the range of its tokens, the precedence of its operator, and its operands."""
 
     span: tuple[int, int]
     precedence: int = _OPERAND
@@ -163,7 +168,7 @@ class _Tree:
 
 
 class _Operators:
-    """Parser of a sequence of operands with operators between them, by precedence."""
+    """Parser that builds a tree from a sequence of operands and the operators between them."""
 
     def __init__(self, operands: list[tuple[int, int]], operators: list[str]) -> None:
         self.operands, self.operators, self.at = operands, operators, 0
@@ -172,7 +177,7 @@ class _Operators:
         return self.operators[self.at] if self.at < len(self.operators) else ""
 
     def conditional(self) -> _Tree:
-        """Read an expression, which may be a conditional expression."""
+        """Return the tree of the next expression, which may be a conditional expression."""
         condition = self.binary(_CONDITIONAL + 1)
         if self._next() != "?":
             return condition
@@ -185,7 +190,7 @@ class _Operators:
         return _Tree((condition.span[0], otherwise.span[1]), _CONDITIONAL, (condition, then, otherwise))
 
     def binary(self, least: int) -> _Tree:
-        """Read operands joined by operators of precedence ``least`` or higher."""
+        """Return the tree of the next operands that are joined by operators of precedence ``least`` or higher."""
         left = _Tree(self.operands[self.at])
         while _PRECEDENCE.get(self._next(), 0) >= least:
             precedence = _PRECEDENCE[self._next()]
@@ -196,7 +201,7 @@ class _Operators:
 
 
 def _with_void(code: str) -> str:
-    """Return the code with casts to void before statements that call functions of `_UNUSED`."""
+    """Return code with a cast to void before each statement that calls a function of `_UNUSED`."""
     return "".join(_cast(code))
 
 

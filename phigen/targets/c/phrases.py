@@ -1,8 +1,8 @@
 """Phrases of the C runtime that depend on features: arguments, types and statements of one line.
 
-The runtime contains the name of a phrase (``PHI_AND_STAGE``). The text of the phrase is defined here, once for each
-feature, and replaces the name in generated code (`phigen.targets.c.macros`). `header` prints the same definitions with
-conditions, for a compiler that reads the runtime before assembly.
+A phrase is a macro. The runtime contains its name, such as ``PHI_AND_STAGE``. Its text depends on switches of the
+solver, and replaces the name in generated code (`phigen.targets.c.macros`). `header` prints all definitions with
+``#if`` conditions, so that a compiler can read the runtime before assembly.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class Choice:
-    """A family of macros: for each name, with its parameters, one text for each condition on switches.
+    """Macros whose texts depend on the same switches. ``phrases`` maps each macro to one text for each condition.
 
-    The first of the ``conditions`` that holds selects the text. The last text has no condition.
+    The text belongs to the first of the ``conditions`` that holds; the last text is for the case that none holds.
+    ``about`` says in a comment what the macros are for.
     """
 
     about: str
@@ -30,7 +31,7 @@ class Choice:
         yield from (_definition(name, texts[which]) for name, texts in self.phrases.items())
 
     def header(self) -> Iterator[str]:
-        """Yield the definitions for all solvers, each under an ``#if`` with its condition."""
+        """Yield the definitions for all solvers, with an ``#if`` for each condition."""
         yield f"/* {self.about} */"
         for k, condition in enumerate((*self.conditions, "")):
             expression = " ".join(
@@ -100,8 +101,8 @@ VALUES = Choice(
     },
 )
 
-#: The time of a lattice after a number of steps. It is counted from the last change of h, so rounding errors do not
-#: accumulate.
+#: Expression for the time of a lattice after a number of steps. It counts from the last change of h, so that rounding
+#: errors do not accumulate.
 LATTICE_TIME = "s->t_before_h + (double)(steps - s->steps_before_h) * s->h"
 
 TIME = Choice(
@@ -753,7 +754,7 @@ ALL = (
 
 
 def definitions(switches: Mapping[str, bool]) -> Iterator[str]:
-    """Yield the definitions of all phrases that depend on switches, for a solver."""
+    """Yield the ``#define`` lines of all phrases for a solver with these switches."""
     known = {s: False for choice in ALL for s in _switches(choice)} | dict(switches)
     for choice in ALL:
         yield from choice.definitions(known)

@@ -1,8 +1,8 @@
 """The types of real numbers in C: the spelling of types, literals, limits and library functions.
 
-Printers spell functions of the loop IR in the type of a program. The runtime and the templates are C that is written
-for ``double``; `Real.spelt` translates these files to another type. Only thresholds change in value: small numbers
-that are named by a ``#define`` and depend on the precision.
+Functions of the loop IR are printed directly in the type of a program. The runtime and the templates are written for
+``double``, and `Real.spelt` translates them to another type. The translation changes the values of thresholds only:
+small numbers that are named by a ``#define`` and depend on the precision.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from phigen.targets.c.tokens import CToken, TokenKind, tokens
 from phigen.targets.language import Language
 from phigen.targets.rendering import render
 
-#: Ratio of the numbers of binary digits of float and double.
+#: Number of binary digits of float, relative to those of double.
 DIGITS = 24 / 53
 
-#: Largest value of a number named by a ``#define`` that counts as a threshold.
+#: A number that is named by a ``#define`` counts as a threshold if it is at most this large.
 THRESHOLD = 1e-5
 
-#: Functions of the C library that exist for each type.
+#: Functions of the C library that exist in a version for each type.
 _FUNCTIONS = frozenset(
     [
         "acos",
@@ -80,7 +80,7 @@ _LEAST, _MOST = 2.0**-126, (2.0 - 2.0**-23) * 2.0**127
 
 @dataclass(frozen=True)
 class Real:
-    """A type of real numbers: its ``name``, and the ``words`` that replace the type and the limits of double.
+    """A type of real numbers in C: its ``name``, and ``words`` that take the place of the type double and its limits.
 
     ``function_suffix`` is appended to the names of library functions; it is "" if these are overloaded.
     """
@@ -94,12 +94,13 @@ class Real:
         return literal(value) if self.words else repr(value)
 
     def threshold(self, value: float) -> float:
-        """Return the value of a named constant in this type; small constants are thresholds that depend on the
-        precision."""
+        """Return the value of a named constant in this type. Small constants are thresholds, which depend on the
+        precision.
+        """
         return threshold(value) if self.words and 0.0 < value < THRESHOLD else value
 
     def language(self, language: Language) -> Language:
-        """Return the description of C with this type, from that with double."""
+        """Return the description of C with this type, from the description of C with double."""
         if not self.words:
             return language
         functions = {f: self._function(text) for f, text in language.functions.items()}
@@ -107,18 +108,18 @@ class Real:
         return replace(language, functions=functions, constants=constants, whole=self.number, real=self.number)
 
     def names(self) -> dict[str, str]:
-        """Return the names of library functions and limits that differ from those for double."""
+        """The names of library functions and limits that differ from those for double, by the names for double."""
         functions = {f: self._function(f) for f in _FUNCTIONS}
         return {**functions, **self.words, **{f"-{word}": f"-{text}" for word, text in self.words.items()}}
 
     def _function(self, text: str) -> str:
-        """Return the name of a function, or a formula that calls functions, for this type."""
+        """Return the spelling of a function for this type; ``text`` is its name, or a formula that calls functions."""
         if text.isidentifier():
             return f"{text}{self.function_suffix}" if text in _FUNCTIONS else text
         return self.spelt(text)
 
     def spelt(self, text: str) -> str:
-        """Return C that computes in this type, from C that computes in double."""
+        """Return code that computes in this type, from code that computes in double."""
         return "".join(self._spelt(text)) if self.words else text
 
     def _spelt(self, text: str) -> Iterator[str]:
@@ -162,13 +163,15 @@ def rendered(program: Program, template: str, values: Mapping[str, object]) -> s
 
 
 def threshold(value: float) -> float:
-    """Return the threshold in single precision that corresponds to the same fraction of the digits as ``value`` in
-    double."""
+    """Return the threshold for single precision that corresponds to ``value`` in double precision.
+
+    It is the power 24/53 of ``value``, and so the same fraction of the digits of a number.
+    """
     return float(f"{value**DIGITS:.0e}")
 
 
 def literal(value: float) -> str:
-    """Return the shortest literal of the nearest float; values outside the range of floats become its limits."""
+    """Return the shortest literal of the nearest float. Values beyond the largest float become the largest float."""
     if value < 0.0:
         return f"-{literal(-value)}"
     if value:

@@ -1,12 +1,11 @@
-"""Structs of the C runtime for a lattice and for a row segment, block by block: their members and their
-initialisation."""
+"""Members of two structs of the C runtime, for a lattice and for a row segment, in blocks with their initialisation."""
 
 from __future__ import annotations
 
 from phigen.targets.state import StateBlock
 
-#: Blocks of the struct of a lattice, in the order of its members. Members in ``reset`` are arrays in the memory of the
-#: solver.
+#: Blocks of the struct of a lattice, in the order of its members. The statements in ``reset`` place arrays in the
+#: memory of the solver.
 LATTICE = (
     StateBlock(
         "sizes",
@@ -291,8 +290,8 @@ LATTICE = (
     ),
 )
 
-#: Blocks of the struct of a row segment, the arguments of loops over its sites. ``reset`` are statements for a whole
-#: row of a solver s.
+#: Blocks of the struct of a row segment, which is the argument of loops over its sites. The statements in ``reset``
+#: initialise the struct for a whole row of a solver s.
 ROW = (
     StateBlock(
         "x",

@@ -1,4 +1,4 @@
-"""The step of a splitting in C: one function for each flow, and the schedule that calls them."""
+"""The step of a splitting in C: a function for each flow, and a function that calls the flows in order."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from phigen.targets.c.loops import commented, table
 
 
 def sizes(step: Splitting) -> list[tuple[str, int, str]]:
-    """Return the constants of a splitting: name, value and comment."""
+    """Return the sizes of a splitting as constants: name, value and comment."""
     constants = [("ROWS_OF_FLOWS", len(step.schedule.times), "times of flows in a step, each with its coefficients")]
     constants.append(("ROW", max(1, step.row), "coefficients for one of them"))
     flows = len(step.schedule.flows_of_run)
@@ -31,11 +31,11 @@ def sizes(step: Splitting) -> list[tuple[str, int, str]]:
 
 
 def printed(program: Program, step: Splitting) -> str:
-    """Return the functions of the flows, and of one step."""
+    """Return the text of the functions of the flows, and of the function of a step."""
     build, schedule = _functions(program, step), step.schedule
     texts = [function(program, replace(step.prepare, name="prepare_row"))]
     texts += [function(program, step.refresh, name="at_step" if program.noise else "at_time")] if step.refresh else []
-    # With a group element the function is too long to be inlined.
+    # With an attitude, the function of a flow is too long to be inlined.
     linkage = "static inline" if build.turns else "static"
     for k, flow in enumerate(program.attitude.turns if program.attitude else step.flows, 1):
         kernel, updated = _flow(flow, k)
@@ -49,15 +49,18 @@ def printed(program: Program, step: Splitting) -> str:
 def _functions(program: Program, step: Splitting) -> FlowFunctions:
     """Return the builder of the functions of flows.
 
-    With a monitor, flows also update the time, and a sum that is NaN outside the domain of the flows.
+    With a monitor, flows update two more values: the time, and a sum that becomes NaN outside the domain of the flows.
     """
     along = program.dimension + (2 if program.monitor else 0)
     return FlowFunctions(program.dimension, along, turns=bool(program.attitude), stores=bool(step.adjoint))
 
 
 def in_lanes(program: Program, step: Splitting, form: str, versions: Mapping[str, str]) -> list[str]:
-    """Return the step of batches of members with these ``versions`` of functions; ``form`` is appended to function
-    names."""
+    """Return the text of the step for batches of members in SIMD lanes.
+
+    ``versions`` are the versions of elementary functions that it calls; ``form`` is appended to the names of its
+    functions.
+    """
     texts, linkage = list[str](), f"{program.name}_IN_PLACE static inline"
     for k, flow in enumerate(step.flows, 1):
         kernel, updated = _flow(flow, k)
@@ -68,7 +71,7 @@ def in_lanes(program: Program, step: Splitting, form: str, versions: Mapping[str
 
 
 def _tables(program: Program, step: Splitting, prefix: str, suffix: str) -> str:
-    """Return tables with the part of H and the row of coefficients of each flow of a step."""
+    """Return the text of two tables over the flows of a step: the part of H, and the row of coefficients."""
     flows, length = step.schedule.flows_of_run, ir.fixed("FLOWS")
     parts = ir.ConstantTable(f"{prefix}part{suffix}", tuple(part + 1 for part, _ in flows), length)
     rows = ir.ConstantTable(f"{prefix}row{suffix}", tuple(row for _, row in flows), length)
@@ -77,14 +80,14 @@ def _tables(program: Program, step: Splitting, prefix: str, suffix: str) -> str:
 
 
 def tangent(program: Program, step: Splitting) -> str:
-    """Return the derivatives of the flows."""
+    """Return the text of the derivatives of the flows."""
     texts = [function(program, kernel, versions=_VERSIONS) for kernel in step.tangents]
     applied = commented(_functions(program, step).tangent(len(step.flows)), program)
     return "\n".join([*texts, _tables(program, step, "", "_of"), applied])
 
 
 def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
-    """Return the transposes of the flows."""
+    """Return the text of the transposes of the flows."""
     kernels, build = _transposed(program, step, adjoint.steps)
     texts = [function(program, kernel, versions=_VERSIONS) for kernel in kernels]
     return "\n".join([*texts, _tables(program, step, "flow_", ""), commented(build.back(), program)])
@@ -93,9 +96,10 @@ def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
 def adjoint_in_lanes(
     program: Program, step: Splitting, back: Sequence[Kernel], near: Mapping[str, str], far: Mapping[str, str]
 ) -> list[str]:
-    """Return the transposes of the flows of batches, which call the small-argument functions ``near``.
+    """Return the text of the transposes of the flows for batches of members in SIMD lanes.
 
-    Flows that call such functions have a second version with the full-range functions ``far``.
+    They call the versions ``near`` of elementary functions, for small arguments. Flows that call functions with such
+    versions are printed a second time, with the versions ``far`` for all arguments.
     """
     kernels, build = _transposed(program, step, back)
     texts = []
@@ -111,12 +115,14 @@ def adjoint_in_lanes(
 
 
 def reaches_far(kernel: Kernel) -> bool:
-    """Whether a kernel has a second version in lanes, with full-range functions."""
+    """Whether a kernel in lanes needs a second version, for all arguments of elementary functions."""
     return not operations([kernel]).isdisjoint(SMALL_ARGUMENT_FUNCTIONS)
 
 
 def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tuple[list[Kernel], FlowTransposes]:
-    """Return the transposed flows, without outputs that are always zero, and the builder of their functions."""
+    """Return the transposed flows without outputs that are always zero, and the builder of the functions that call
+    them.
+    """
     kernels, flows = list[Kernel](), list[Transposed]()
     for flow, kernel in zip(step.flows, back, strict=True):
         reached = [[i for i, e in enumerate(o.values) if not e.is_zero] for o in kernel.outputs]
@@ -132,15 +138,14 @@ def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tu
 
 
 def _read(kernel: Kernel) -> list[tuple[int, int]]:
-    """Return the coordinates of the state that a kernel reads, as ranges: the first one and the number of each
-    range."""
+    """Return the coordinates of the state that a kernel reads, as ranges (first index, length)."""
     used = {s for e in kernel.roots for s in symbols_of(e)}
     places = [i for i, s in enumerate(kernel.inputs["state"]) if s in used]
     runs = groupby(places, key=lambda i: i - places.index(i))
     return [(of[0], len(of)) for _, run in runs for of in [list(run)]]
 
 
-#: The versions of functions that flows call; they have a polynomial for small arguments.
+#: The versions of elementary functions that flows call. They use a polynomial if the argument is small.
 _VERSIONS = {f: f + OWN for f in FLOW_FUNCTIONS}
 
 

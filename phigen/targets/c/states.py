@@ -1,5 +1,7 @@
-"""The blocks of state (`phigen.targets.state`) as files that the C runtime includes: members, copies, rollback,
-reset."""
+"""The blocks of `phigen.targets.state` and of similar lists as files that the C runtime includes.
+
+The files have members of structs, and statements that copy, restore or reset these members.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from phigen.targets.state import STATE, StateBlock, belongs
 
 @dataclass(frozen=True)
 class Part:
-    """A file that the runtime includes: ``lines`` returns some lines of each of the ``blocks``; they are indented."""
+    """A file that the runtime includes. It has the lines that ``lines`` returns for each of the ``blocks``,
+    indented.
+    """
 
     blocks: Sequence[StateBlock]
     indent: int
@@ -50,13 +54,15 @@ PARTS = {
 
 
 def part(file: str, switches: Mapping[str, bool]) -> list[str]:
-    """Return the lines of one of `PARTS` for a solver."""
+    """Return the lines of one of the files in `PARTS`, for a solver with these switches."""
     lines = PARTS[file]
     return [" " * lines.indent + line for b in lines.blocks if belongs(b, switches) for line in lines.lines(b)]
 
 
 def header(file: str) -> str:
-    """Return one of `PARTS` for all solvers, with conditions, so that the runtime compiles without a solver."""
+    """Return one of the files in `PARTS` with ``#if`` conditions, so that the runtime compiles without a generated
+    solver.
+    """
     lines = PARTS[file]
     text_lines = []
     for block in lines.blocks:

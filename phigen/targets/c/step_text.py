@@ -1,4 +1,6 @@
-"""The text of steps in C, one record for each kind. `phigen.targets.c.emitter` puts it into the files of a solver."""
+"""The text of steps in C: a record for each kind of step, which `phigen.targets.c.emitter` inserts into the files of a
+solver.
+"""
 
 from __future__ import annotations
 
@@ -19,19 +21,20 @@ from phigen.targets.c.kernels import function
 from phigen.targets.c.lanes import packed_kernels, packed_step, printed_back
 from phigen.targets.c.loops import commented, table
 
-#: Constants: name, value and comment.
+#: Constants of generated C: name, value and comment.
 Sizes = list[tuple[str, int, str]]
 Switches = Mapping[str, bool]
 
 
 @dataclass(frozen=True)
 class StepText:
-    """The text of one kind of step.
+    """The text of one kind of step, as functions of the step.
 
-    ``texts`` are the runtime files of the step, ``declared`` the sizes that are declared with the struct of the solver.
-    ``constants`` and ``last_constants`` are other sizes, before and after those of lanes. ``kernels`` are printed
-    first, ``tangents`` after the kernels of the gauge and the monitor, then the ``transposes`` that are not in separate
-    texts. ``trail`` is the number of values on the tape for one step. ``packed`` prints the kernels of a SIMD batch.
+    ``texts`` returns files that the runtime includes, and ``declared`` the sizes that are declared with the struct of
+    the solver. ``constants`` and ``last_constants`` are other sizes, printed before and after those of SIMD lanes.
+    ``kernels`` are printed first. ``tangents`` are printed after the kernels of the gauge and the monitor, and
+    ``transposes`` after these. ``trail`` is the number of values that a step stores on the tape. ``packed`` prints the
+    kernels for SIMD batches of members.
     """
 
     texts: Callable[[Program, Any, Lanes | None, Switches], dict[str, str]] = lambda program, step, lanes, has: {}
@@ -92,7 +95,9 @@ def _path_constants(program: Program, step: Path) -> Sizes:
 
 
 def _adjoint_path(program: Program, path: PathAdjoint) -> str:
-    """Return the recurrences of the reverse pass of a path, and the coefficients that it depends on."""
+    """Return the text of the recurrences for paths in the reverse pass, and of the list of coefficients that π depends
+    on.
+    """
     used, extended = ir.ConstantTable("back_used", tuple(path.used) or (0,)), adjoint_program(program, path)
     said = "The coefficients" if path.used else "None of the coefficients is one"
     comment = f"/* {said} that the slope of a path depends on. */"
@@ -100,19 +105,19 @@ def _adjoint_path(program: Program, path: PathAdjoint) -> str:
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
-    """Return the recurrences of a path or of a tangent path."""
+    """Return the text of the recurrences for a path or for a tangent path."""
     return "\n".join(commented(f, program) for f in path_functions.functions(program, path, kind))
 
 
 def _path_in_lanes(program: Program, step: Path, slopes: PathSlopes) -> str:
-    """Return the recurrences of a path and its derivatives in SIMD lanes."""
+    """Return the text of the recurrences for a path and for its derivatives in SIMD lanes."""
     used = step.back.used if step.back else ()
     listed = path_functions.lane_functions(program, step.recurrences, slopes, used)
     return "\n".join(commented(f, program) for f in listed)
 
 
 def path_sizes(slopes: PathSlopes, slope_terms: int) -> Sizes:
-    """Return the constants of paths in SIMD lanes."""
+    """Return the sizes for paths in SIMD lanes, as constants."""
     return [
         ("SLOPE_TERMS", slope_terms, "most of the expansion of the derivatives of a path"),
         ("SLOPE_SERIES", max(1, len(slopes.series)), "further series that these need"),
@@ -139,7 +144,7 @@ def _splitting_texts(program: Program, step: Splitting, lanes: Lanes | None, has
     return texts
 
 
-#: The text of each kind of step; that of a lattice is `phigen.targets.c.lattice`.
+#: The text of each kind of step. The text of a lattice is in `phigen.targets.c.lattice`.
 STEP_TEXTS: Mapping[str, StepText] = {
     "newton": StepText(constants=lambda program, step: _max_iterations(step), kernels=_newton_kernels),
     "explicit": StepText(
@@ -162,5 +167,5 @@ STEP_TEXTS: Mapping[str, StepText] = {
 
 
 def text_of(program: Program) -> StepText:
-    """Return the record for the step of a program. Raises `KeyError` for a lattice."""
+    """Return the record for the kind of step of a program. Raises `KeyError` for a lattice, which has no record."""
     return STEP_TEXTS[program.step.kind.name]

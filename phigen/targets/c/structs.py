@@ -1,10 +1,10 @@
-"""Structs of the C runtime whose members depend on switches, as blocks like those of `phigen.targets.state`."""
+"""Structs of the C runtime whose members depend on switches, as lists of blocks (see `phigen.targets.state`)."""
 
 from __future__ import annotations
 
 from phigen.targets.state import StateBlock
 
-#: Members for a block of steps in SIMD lanes: coefficients and predictors.
+#: Members of the struct for a block of steps in SIMD lanes: coefficients and predictors.
 TABLE = (
     StateBlock(
         "fits",
@@ -23,7 +23,8 @@ TABLE = (
     ),
 )
 
-#: Members for a stage in SIMD lanes (one for each step of a block), and for its corrections by Newton's method.
+#: Members of the struct for one stage of all steps of a block, in SIMD lanes, and for its corrections by Newton's
+#: method.
 MODEL = (
     StateBlock(
         "y",
@@ -61,7 +62,8 @@ MODEL = (
     ),
 )
 
-#: Members for the arguments of a run of an ensemble; arrays have a value for each member, or one for all.
+#: Members of the struct with the arguments of a run of an ensemble. Arrays have a value for each member, or one for
+#: all.
 MEMBERS = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),
@@ -83,7 +85,7 @@ MEMBERS = (
     ),
 )
 
-#: Members for the reverse pass of a step: derivatives of a number L.
+#: Members of the struct for the reverse pass of a step: derivatives of a number L.
 COTANGENT = (
     StateBlock(
         "x",
@@ -103,7 +105,7 @@ COTANGENT = (
     ),
 )
 
-#: Members for linearised stages in SIMD lanes.
+#: Members of the struct for linearised stages in SIMD lanes, which the reverse pass needs.
 TRACED = (
     StateBlock(
         "stages",
@@ -116,13 +118,13 @@ TRACED = (
     StateBlock("t", "RENEWED", ("double t[PHI_LANES]; /* the times of the stages */",)),
 )
 
-#: Members for those arguments of a reverse pass of an ensemble that depend on features.
+#: Members of the struct with the arguments of the reverse pass of an ensemble, those that depend on switches.
 PULLED = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* see phi_members */",)),
 )
 
-#: Members for the reverse pass of a batch of members: derivatives of L, as in phi_cotangent.
+#: Members of the struct for the reverse pass of a batch of members: derivatives of a number L, as in phi_cotangent.
 BACK_GROUP = (
     StateBlock(
         "x",
@@ -136,7 +138,7 @@ BACK_GROUP = (
     ),
 )
 
-#: Members for the reverse pass of a lattice: derivatives of a number L, and the layout of its memory.
+#: Members of the struct for the reverse pass of a lattice: derivatives of a number L, and the places of its arrays.
 TRANSPOSE = (
     StateBlock(
         "bar",
@@ -198,7 +200,7 @@ TRANSPOSE = (
     ),
 )
 
-#: Members for a flow of a step of a lattice.
+#: Members of the struct for one flow of a step of a lattice.
 FLOW = (
     StateBlock(
         "part",

@@ -1,4 +1,4 @@
-"""Tokens of C (names, numbers, comments, marks), for passes over the runtime and over printed text."""
+"""Tokens of C: names, numbers, comments, operators. Other modules use them to rewrite the runtime and printed code."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import NamedTuple
 class TokenKind(StrEnum):
     """The kinds of tokens.
 
-    ``MARK`` is one character of an operator or a bracket; from `lexemes` it is a whole operator. ``SPACE`` is any white
-    space. ``DIRECTIVE``, from `lexemes` only, is a line of the preprocessor.
+    ``MARK`` is a character of an operator or a bracket; tokens of `lexemes` have whole operators. ``SPACE`` is any
+    white space. ``DIRECTIVE``, from `lexemes` only, is a line of the preprocessor.
     """
 
     COMMENT = "comment"
@@ -26,7 +26,7 @@ class TokenKind(StrEnum):
 
 
 class CToken(NamedTuple):
-    """A token of C. The texts of all tokens, joined, are the original text."""
+    """Token of C. The texts of all tokens, joined, are the original text."""
 
     kind: TokenKind
     text: str
@@ -43,12 +43,12 @@ _KINDS = {kind.value: kind for kind in TokenKind}
 
 
 def tokens(text: str) -> Iterator[CToken]:
-    """Yield the tokens of a text."""
+    """Yield the tokens of a text, with one character of an operator in each token."""
     for match in _TOKEN.finditer(text):
         yield CToken(_KINDS[match.lastgroup or ""], match[0])
 
 
-#: Operators of several characters. ".." is not an operator, but begins "...".
+#: Operators of several characters. ".." is not an operator, but `lexemes` reads "..." character by character.
 _OPERATORS = {
     "<<=", ">>=", "...", "..", "->", "++", "--", "<<", ">>", "<=", ">=", "==", "!=", "&&", "||", "*=", "/=", "%=", "+=",
     "-=", "&=", "^=", "|=",
@@ -56,7 +56,7 @@ _OPERATORS = {
 
 
 def lexemes(text: str) -> Iterator[CToken]:
-    """Yield the tokens of a text, with whole operators and whole directives; directives do not include the line end."""
+    """Yield the tokens of a text with whole operators, and with whole directives without their line end."""
     directive, mark, fresh = "", "", True
     for token in tokens(text):
         if directive and token.kind is TokenKind.SPACE and "\n" in token.text and not directive.endswith("\\"):
@@ -88,14 +88,14 @@ _USED = re.compile(rf"{_DIRECTIVE}|{_COMMENT}|{_STRING}|{_NUMBER}|{_MEMBER}|({_N
 
 
 def next_token(text: str, at: int) -> re.Match[str] | None:
-    """Return the first word, literal or mark from position ``at`` on, outside comments and directives."""
+    """Return the match of the first word, literal or mark from position ``at`` on, outside comments and directives."""
     while (match := _CODE.search(text, at)) and match["skipped"]:
         at = match.end()
     return match
 
 
 def closing_brace(text: str, at: int) -> int:
-    """Return the position of the brace that closes the one at ``at``, or the end of the text."""
+    """Return the position of the brace that closes the brace at ``at``, or the end of the text."""
     depth = 0
     for match in _BRACES.finditer(text, at):
         depth += (match[0] == "{") - (match[0] == "}")
@@ -105,17 +105,19 @@ def closing_brace(text: str, at: int) -> int:
 
 
 def used_names(text: str) -> set[str]:
-    """Return the identifiers in a text, without those in comments, strings and directives, and names of members."""
+    """Return the identifiers that a text uses; those in comments, strings and directives, and names of members, do not
+    count.
+    """
     return {*_USED.findall(text)} - {""}
 
 
 def names(text: str) -> set[str]:
-    """Return the identifiers and key words in a text, outside comments and strings."""
+    """Return the identifiers and keywords in a text, without those in comments and strings."""
     return {match[0] for match in _TOKEN.finditer(text) if match.lastgroup == "name"}
 
 
 def lines_with(text: str, words: Container[str]) -> set[int]:
-    """Return the indices of the lines that contain a word of ``words``, outside comments and strings."""
+    """Return the indices of the lines of a text that contain one of ``words`` outside comments and strings."""
     numbers, number, at = set[int](), 0, 0
     for match in _RUNTIME_WORD.finditer(text):
         number, at = number + text.count("\n", at, match.start()), match.start()
@@ -125,7 +127,7 @@ def lines_with(text: str, words: Container[str]) -> set[int]:
 
 
 def without_word(text: str, word: str) -> str:
-    """Return a text without a word and without the space after the word."""
+    """Return a text without the word ``word`` and without the space after it."""
     return re.sub(
         rf"{_COMMENT}|{_STRING}|\b{word}\b ?", lambda m: "" if m[0].rstrip(" ") == word else m[0], text, flags=re.DOTALL
     )

@@ -1,4 +1,6 @@
-"""Removal of unused code of the runtime: static functions without calls, and declarations of undefined functions."""
+"""Removal of unused code from the runtime: static functions that nothing calls, and declarations of missing
+functions.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +11,14 @@ from itertools import accumulate
 
 from phigen.targets.c.tokens import closing_brace, names, next_token, used_names
 
-#: First words of declarations that do not declare a function of the solver.
+#: First words of declarations that declare no function.
 _TYPES = ("typedef", "enum", "struct", "union")
 _NO_FUNCTIONS = ("extern", *_TYPES)
 
 
 @dataclass(frozen=True)
 class Function:
-    """The lines from ``begin`` to ``end`` that declare or define a function, without the comment above."""
+    """The lines from ``begin`` to ``end`` that declare or define a function, without the comment above them."""
 
     name: str
     begin: int
@@ -26,10 +28,10 @@ class Function:
 
 
 def without_unused(lines: Sequence[str], prefix: str) -> list[str]:
-    """Return the lines without unused static functions and without declarations of undefined functions.
+    """Return the lines without unused static functions, and without declarations of functions that are not defined.
 
-    A static function is unused if only unused functions call it. Declarations are removed if the name has the prefix of
-    the solver and the lines contain no definition.
+    A static function is unused if nothing but unused functions calls it. A declaration is only removed if the name of
+    the function begins with ``prefix``, that of the solver.
     """
     declarations = [*declarations_of(lines)]
     functions = [f for f in declarations if f.name.startswith(prefix)]
@@ -46,13 +48,13 @@ def _declared(functions: Iterable[Function]) -> set[int]:
 
 
 def _types(lines: Sequence[str], declarations: Iterable[Function]) -> set[int]:
-    """Return the indices of the lines that declare types, whose members may have the names of functions."""
+    """Return the indices of the lines that declare types. Their members may have the names of functions."""
     types = (d for d in declarations if lines[d.begin].startswith(_TYPES))
     return {k for d in types for k in range(d.begin, d.end)}
 
 
 def _names_used(text: str) -> set[str]:
-    """Return the names in a text, without names of members; in directives all names count."""
+    """Return the names that a text uses, without names of members. In preprocessor directives, all names count."""
     return used_names(text).union(*map(names, _directives(text)))
 
 
@@ -66,7 +68,7 @@ def _directives(text: str) -> Iterator[str]:
 
 
 def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str]) -> set[str]:
-    """Return the static functions that other code calls, directly or through other static functions."""
+    """Return the static functions that are used: other code calls them, directly or through other static functions."""
     words: dict[str, set[str]] = {}
     for f in static:
         words.setdefault(f.name, set()).update(_names_used("\n".join(lines[f.begin : f.end])) if f.defined else ())
@@ -80,18 +82,18 @@ def _reached(called: set[str], static: Iterable[Function], lines: Sequence[str])
 
 
 def functions_of(lines: Sequence[str]) -> Iterator[Function]:
-    """Yield the functions that lines declare or define."""
+    """Yield the functions that the lines declare or define."""
     return (f for f in declarations_of(lines) if f.name)
 
 
 def declarations_of(lines: Sequence[str]) -> Iterator[Function]:
-    """Yield the declarations and definitions outside functions; the name is "" if it is not that of a function."""
+    """Yield all declarations and definitions outside functions; the name is "" unless a function is declared."""
     text, declaration, at = "\n".join(lines), _Declaration(), 0
     line_ends = [*accumulate(len(line) + 1 for line in lines)]
     while token := next_token(text, at):
         at = token.end()
         if token[0] == "}":
-            continue  # the end of extern "C"
+            continue  # the brace that ends extern "C"
         declaration.take(token[0], token.start())
         if declaration.is_linkage:
             declaration = _Declaration()
@@ -108,7 +110,9 @@ def declarations_of(lines: Sequence[str]) -> Iterator[Function]:
 
 @dataclass
 class _Declaration:
-    """A declaration or definition that is being read: its ``first`` word, and the name if it declares a function."""
+    """A declaration or definition while it is read: its ``first`` word, and the name of the function that it declares,
+    if any.
+    """
 
     first: str = ""
     begin: int = 0
@@ -119,7 +123,7 @@ class _Declaration:
     has_body: bool = False
 
     def take(self, token: str, place: int) -> None:
-        """Read the next token outside braces, or an opening brace."""
+        """Process the next token that is outside braces, or an opening brace."""
         if not self.first:
             self.first, self.begin = token, place
             self.is_plain = token in _NO_FUNCTIONS or not token[:1].islower()
@@ -133,17 +137,17 @@ class _Declaration:
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """The marks outside braces that end the declaration."""
+        """The characters that end the declaration: a semicolon or a brace."""
         return ("}",) if self.has_body else (";",)
 
     @property
     def is_linkage(self) -> bool:
-        """Whether it is the beginning of ``extern "C"``."""
+        """Whether the declaration is the head of a block ``extern "C"``."""
         return self.first == "extern" and self.last == "{"
 
 
 def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
-    """Return the lines without these functions, and without comments directly above them."""
+    """Return the lines without the given functions, and without the comments directly above these."""
     gone = {k for f in functions for k in range(f.begin, f.end)}
     for begin in sorted({f.begin for f in functions}):
         first = begin - 1
@@ -157,12 +161,12 @@ def _without(lines: Sequence[str], functions: Iterable[Function]) -> list[str]:
 
 
 def _is_comment(lines: Sequence[str], last: int) -> bool:
-    """Whether a comment on separate lines ends on this line, and is not the title of a chapter."""
+    """Whether a comment of whole lines ends on line ``last``. Titles of chapters do not count."""
     if not lines[last].endswith("*/") or lines[last].startswith("/* ---- "):
         return False
     return lines[_beginning(lines, last)].startswith("/*")
 
 
 def _beginning(lines: Sequence[str], last: int) -> int:
-    """Return the index of the first line of the comment that ends on this line."""
+    """Return the index of the first line of the comment that ends on line ``last``."""
     return next(k for k in range(last, -1, -1) if "/*" in lines[k])

@@ -1,1 +1,1 @@
-"""The target device: one header for OpenCL, CUDA and HIP."""
+"""The target device: a single header that is valid OpenCL C, CUDA and HIP."""

@@ -1,4 +1,4 @@
-"""The dialect of C that devices understand: qualifiers of functions and tables."""
+"""The dialect of C for devices such as graphics cards: qualifiers before functions and tables."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ from collections.abc import Sequence
 
 from phigen.targets.c.unused import declarations_of
 
-#: Line in generated files after which the code is for devices only.
+#: Line in generated files that begins the code for devices. A compiler of the host skips this code.
 DEVICES_ONLY = "#if defined(__OPENCL_VERSION__) || defined(__CUDACC__) || defined(__HIP__)"
 
 _TABLE = "static const "
 
-#: First words of declarations of types, which have no address space.
+#: First words of declarations of types, which need no qualifier for an address space.
 _TYPES = ("typedef", "enum", "struct", "union")
 
 
-#: Texts that declare coefficients as parameters of functions.
+#: Texts with which functions declare coefficients as parameters.
 _COEFFICIENTS = [f"const {real} {end}" for real in ("double", "float") for end in ("*coef,", "*coef)", "coef[")]
 
 
 def qualified(lines: Sequence[str], name: str, *, common: bool = False) -> list[str]:
     """Return the lines of a solver with qualifiers for devices, in the part of the file for devices.
 
-    Functions become `NAME_FUNCTION`, which is static, and tables `NAME_CONSTANT`; kernels have their qualifiers in the
-    runtime. If coefficients may be ``common`` to all members, functions read them in the address space `NAME_COEF`.
-    Raises `ValueError` for objects without an address space: non-constant objects of a file, and static objects of
-    functions.
+    Functions get the qualifier `NAME_FUNCTION`, which includes static, and tables get `NAME_CONSTANT`. Kernels have
+    their qualifiers in the runtime already. If coefficients may be ``common`` to all members, functions read them in
+    the address space `NAME_COEF`. Raises `ValueError` for variables that have no address space on devices: non-constant
+    variables outside functions, and static variables inside functions.
     """
     begin, linkage = lines.index(DEVICES_ONLY), {"static", "inline", f"{name}_APART"}
     spelt = [*lines]

@@ -1,7 +1,7 @@
-"""A program as `NAME_device.h`, one source for OpenCL C, CUDA and HIP.
+"""Emission of a program as `NAME_device.h`, a single source for OpenCL C, CUDA and HIP.
 
-It is the C of the profile small in a dialect: the runtime of ``templates/c/runtime`` with the switch ``DEVICE``, a
-prelude of macros for the differences between the languages, and a kernel for ensembles.
+The file has the code of the profile ``small`` in a dialect of C: a prelude of macros for the differences between the
+languages, the runtime of ``templates/c/runtime`` with the switch ``DEVICE``, and a kernel for ensembles.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ SUFFIX = "_device.h"
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """Return file names and their contents."""
+    """Return the generated file by its name. ``command`` is the command that regenerates it, for the header."""
     name = program.name
     lines = [*header_lines(program, command), *_READING]
     if slow := spilling(program):
@@ -43,7 +43,7 @@ _READING = (
 
 
 def for_devices(program: Program) -> Program:
-    """Return the program without the parts that no kernel calls: derivatives of steps, the modified H, attitudes."""
+    """Return the program without the parts that kernels do not use: derivatives of steps, the modified H, attitudes."""
     left_out: dict[str, Any] = {"adjoint": None, "tangent": None, "tangents": ()}
     parts = {f.name for f in fields(program.step)}
     if swept := program.step.swept:
@@ -55,7 +55,7 @@ def for_devices(program: Program) -> Program:
 
 
 def text_of_device(program: Program) -> str:
-    """Return the text of a file without its first comment.
+    """Return the text of the file without its header comment.
 
     Raises `SpecError` for bodies in relative coordinates.
     """

@@ -1,5 +1,6 @@
-"""Lattices for devices: kernels for each flow and colour, for each sum over bonds or pairs, and for each function of
-states."""
+"""Lattices for devices. There is a kernel for each flow and colour, each sum over bonds or pairs, and each
+observable.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from phigen.targets.c.loops import statements
 from phigen.targets.c.real import rendered
 from phigen.targets.header import plain, sentence
 
-#: The arrays that are arguments of kernels: their types, and their contents.
+#: The arrays that kernels receive as arguments: their types, and comments on their contents.
 _ARRAYS = {
     "neighbours": ("const int", "neighbours[n * count + i]: the number of neighbour n of site i"),
     "weights": ("const double", "weights[n * count + i]: 0 for terms beyond open ends, else 1"),
@@ -43,7 +44,7 @@ _ARRAYS = {
 
 
 def body(program: Program, step: Sweeps, language: str) -> str:
-    """Return the text of a file; ``language`` is its prelude."""
+    """Return the text of the file without its header comment; ``language`` is the prelude of macros."""
     loops = LatticeLoops(program, step)
     arrays = kernel_arrays(loops)
     numbers = [*loops.numbers, *([program.time] if program.time else [])]

@@ -1,4 +1,4 @@
-"""The launches of the kernels of a lattice."""
+"""Data with which the runtime launches the kernels of a lattice on a device."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from phigen.scheme.steps import Gather, Sweeps
 
 
 def launches(program: Program, step: Sweeps) -> LatticeLaunches:
-    """Return the launches of a lattice."""
+    """Return the data for launching the kernels of a lattice."""
     loops = LatticeLoops(program, step)
     parts = tuple(
         tuple(SiteLaunch(s.kernel.name, _sums(s.gather), 0, _colour(s.colour, step), s.inside, s.window) for s in part)

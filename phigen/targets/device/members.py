@@ -1,4 +1,4 @@
-"""Sizes of the kernels of ensembles on devices."""
+"""Sizes for the kernels of ensembles on devices: work groups, shared memory, common coefficients."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from phigen.ir.launches import EnsembleLaunch
 from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import Program
 
-#: Bytes of shared memory of a work group that all cards have, and bytes of a number.
+#: Bytes of shared memory that a work group has on all graphics cards, and bytes of a number.
 _SHARED, _NUMBER = 48 * 1024, 8
 
-#: Sizes of work groups, the largest first. 128 hides memory latency better than 256 if work items use many registers.
+#: Sizes of work groups to try, the largest first. If work items use many registers, 128 hides the latency of memory
+#: better than 256.
 _GROUPS = (128, 64, 32, 16, 8, 4, 2, 1)
 
 
 def predictors(program: Program) -> int:
-    """Return the number of values of the predictors of a member, which are in shared memory."""
+    """Return the number of values that the predictors of a member have. These values are in shared memory."""
     if not program.step.kind.predicted or program.step.kind.collocates or program.noise:
         return 0
     return PredictorPolicy().differences * program.dimension * len(program.fractions)
@@ -26,13 +27,13 @@ def group_size(program: Program) -> int:
     return next((size for size in _GROUPS if size * of_item <= _SHARED), _GROUPS[-1])
 
 
-#: Largest size in bytes of the coefficients that a CUDA kernel receives as an argument: all arguments together have at
-#: most 4,096.
+#: Largest size in bytes of the coefficients that a kernel receives as an argument: in CUDA, all arguments together may
+#: have 4,096 bytes.
 _COMMON_BYTES = 3_840
 
 
 def has_common_coefficients(program: Program) -> bool:
-    """Whether members with the same parameters, step and gauge may share the coefficients of their steps."""
+    """Whether members of an ensemble that have the same parameters, step and gauge can share coefficients."""
     step = program.step
     if step.swept or step.refresh or step.kind.collocates or step.path is not None or program.monitor:
         return False
@@ -41,6 +42,6 @@ def has_common_coefficients(program: Program) -> bool:
 
 
 def ensemble_launch(program: Program) -> EnsembleLaunch:
-    """Return the sizes of the kernel of an ensemble."""
+    """Return the data for launching the kernel of an ensemble."""
     shared = program.step.coefficients * len(program.fractions) if has_common_coefficients(program) else 0
     return EnsembleLaunch(group_size(program), predictors(program), shared, len(program.held))

@@ -1,4 +1,7 @@
-"""Steps that need more registers than graphics cards have, by measurements with the CUDA compiler (docs/devices.md)."""
+"""Warnings about steps that need more registers than graphics cards have.
+
+They rely on measurements with the CUDA compiler, see docs/devices.md.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,11 @@ from phigen.scheme.program import Program
 
 @dataclass(frozen=True)
 class Spills:
-    """A measured system. Steps of its series spill ``size`` bytes of each member into memory on sm_90."""
+    """A system for which the CUDA compiler was measured: its steps by the series keep ``size`` bytes per member in
+    memory.
+
+    These bytes do not fit into the registers of a card with the architecture sm_90.
+    """
 
     name: str
     order: int
@@ -18,13 +25,13 @@ class Spills:
     size: int
 
     def is_within(self, coordinates: int, coefficients: int) -> bool:
-        """Whether the measured system has at most these numbers of coordinates and coefficients."""
+        """Whether the measured system has at most the given numbers of coordinates and coefficients."""
         return self.coordinates <= coordinates and self.coefficients <= coefficients
 
 
-#: Steps with at least as many coordinates and coefficients spill about as much, or more. Steps with fewer than 6
-#: coordinates and at most 40 coefficients stay in registers: this is so in 52 builds of 19 systems of the corpus, of
-#: orders 2 to 6.
+#: Measurements. A step with at least as many coordinates and coefficients spills about as many bytes from registers to
+#: memory, or more. Steps with fewer than 6 coordinates and at most 40 coefficients do not spill: this was so for 52
+#: builds of 19 systems of the corpus, with orders 2 to 6.
 _MEASURED = (
     Spills("spin_chain5", 4, 15, 33, 44_000),
     Spills("so4_manakov", 6, 6, 216, 8_900),
@@ -37,13 +44,14 @@ _MEASURED = (
     Spills("lagrange_top", 2, 6, 6, 350),
 )
 
-#: Factor for single precision: a number takes one register instead of two.
+#: Factor by which single precision reduces the need for registers: a number takes one register instead of two.
 _SINGLE = 2
 
 
 def spilling(program: Program) -> str:
-    """Return a warning that the steps of an ordinary system spill into memory on cards, with a hint; "" if they do
-    not."""
+    """Return a warning with a hint if steps of an ordinary system need more registers than cards have; "" if they do
+    not.
+    """
     step = program.step
     if step.kind.sites:
         return ""

@@ -1,1 +1,1 @@
-"""JavaScript: one ES module, without dependencies."""
+"""The JavaScript target: a single ES module without dependencies."""

@@ -1,4 +1,4 @@
-"""A program as an ES module: `NAME.mjs`."""
+"""Emission of a program as an ES module, `NAME.mjs`."""
 
 from __future__ import annotations
 
@@ -27,21 +27,25 @@ from phigen.targets.rendering import render
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """Return the file name with its contents. Raises the errors of `expect_offered`."""
+    """Return the generated file by its name. Raises `SpecError` if the program needs something that the target
+    lacks.
+    """
     expect_offered(program)
     body = _lattice(program, program.step.swept) if program.step.swept else _system_of_coordinates(program)
     return {f"{program.name}.mjs": sealed(header_lines(program, command), body)}
 
 
 def expect_offered(program: Program) -> None:
-    """Raise `SpecError` if the program has the transpose of steps, which the JavaScript target does not offer."""
+    """Raise `SpecError` if the program has the transpose of steps (``adjoint``), which the JavaScript target does not
+    offer.
+    """
     if program.step.adjoint:
         message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
 
 
 def _lattice(program: Program, step: Sweeps) -> str:
-    """Return the body of the module of a lattice."""
+    """Return the text of the module of a lattice, without its header."""
     from phigen.targets.js import lattice_tables
 
     features = lattice_tables.features(program, step)
@@ -52,7 +56,7 @@ def _lattice(program: Program, step: Sweeps) -> str:
 
 
 def _system_of_coordinates(program: Program) -> str:
-    """Return the body of the module of an ordinary system."""
+    """Return the text of the module of an ordinary system, without its header."""
     choice = {"GAUGE_CHOSEN": bool(program.gauge), "GAUGE_SEARCHED": program.searches_gauge}
     features = switches(program) | choice
     modules = chosen(MODULES, features)
@@ -60,7 +64,7 @@ def _system_of_coordinates(program: Program) -> str:
 
 
 def _functions(program: Program) -> list[str]:
-    """Return definitions of the elementary functions that JavaScript lacks."""
+    """Return the definitions of the elementary functions that kernels call and that JavaScript lacks."""
     anomaly = special.calls_anomaly(program)
     functions = definitions(special.used(program), special.entire_used(program), LANGUAGE.printer, anomaly=anomaly)
     functions += elliptic_definitions(special.elliptic_used(program))
@@ -74,7 +78,7 @@ def _functions(program: Program) -> list[str]:
 
 
 def _model(program: Program) -> str:
-    """Return the model: the constants and kernels of the system."""
+    """Return the text of the constants and kernels of an ordinary system."""
     step = program.step
     text = STEP_MODULES[step.kind.name]
     pieces = [render("js", "system.mjs", _system(program))]
@@ -99,7 +103,7 @@ def _system(program: Program) -> Mapping[str, object]:
 
 
 def _sizes(attitude: Attitude) -> Mapping[str, int]:
-    """Return the sizes of the arrays of an attitude."""
+    """Return the sizes of the arrays of an attitude, as template values."""
     group, rate, rows = attitude.group, attitude.rate, attitude.group.rows
     covector = len(group.matrices) + 1 if attitude.exponential else 0
     return {
@@ -113,7 +117,7 @@ def _sizes(attitude: Attitude) -> Mapping[str, int]:
 
 
 def _table(program: Program) -> Mapping[str, object]:
-    """Return the sizes of the table of coefficients."""
+    """Return the sizes of the table of coefficients, as template values."""
     step, schedule = program.step, program.step.flow_schedule
     return {
         "middles": json.dumps(program.midpoints) if step.refresh else "",
@@ -126,7 +130,7 @@ def _table(program: Program) -> Mapping[str, object]:
 
 
 def _contents(program: Program) -> list[str]:
-    """Return the lines of the comment at the head of a module: an example of use, and the table of contents."""
+    """Return the lines for the header of a module: an example of its use, and its table of contents."""
     lines = [
         f"import {{ Solver, StepError }} from './{program.name}.mjs';",
         f"const solver = new Solver({{ x0: [...],{' t0,' * bool(program.time)} params: {{ ... }} }});",
@@ -150,7 +154,7 @@ def _kernels(program: Program) -> list[Kernel]:
 
 
 def _function(kernel: Kernel) -> str:
-    """Return a kernel as a function that writes its outputs to arrays."""
+    """Return a kernel as the text of a function that writes its outputs to arrays."""
     arrays = {argument: camel(argument) for argument in (*kernel.inputs, *(o.name for o in kernel.outputs))}
     head = f"function {camel(kernel.name)}({', '.join(arrays.values())}) {{"
     lines = statements(zeros_first(kernel_function(kernel, {p: p for p in kernel.inputs.get("params", ())}, arrays)))

@@ -1,8 +1,8 @@
-"""The modules of the JavaScript runtime, with the conditions under which a solver has them.
+"""Modules and functions of the JavaScript runtime, with the conditions under which a solver has them.
 
 Other modules import these modules, and call the functions of `HOOKS`, without a condition. If a function is left out,
-so are the statements that call it. Modules `members_NAME` contain members of the class Solver, which replace the line
-``// #members NAME``.
+the statements that call it are removed. Modules called `members_NAME` contain members of the class Solver, which
+replace the line ``// #members NAME``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from phigen.targets.features import holds
 
 _KINDS = [kind.name for kind in STEP_KINDS.values() if not kind.sites]
 
-#: Modules of ordinary systems, in order, each with its condition on switches.
+#: Modules for ordinary systems in order, each with its condition on switches.
 MODULES = {
     "errors": "",
     "march": "",
@@ -99,7 +99,7 @@ MODULES = {
     "linear": "IMPLICIT",
 }
 
-#: Modules of lattices, in order, each with its condition on switches.
+#: Modules for lattices in order, each with its condition on switches.
 LATTICE_MODULES = {
     "errors": "",
     "march": "",
@@ -127,7 +127,7 @@ LATTICE_MODULES = {
     "site_tangent": "!SPLIT && TANGENT",
 }
 
-#: Modules with members of the class Solver, by the suffix of their names, each with its condition.
+#: Modules that contain members of the class Solver, by the suffix NAME of their names, each with its condition.
 MEMBERS = {
     "constants": "OBSERVED",
     "attitude": "ATTITUDE",
@@ -148,7 +148,7 @@ MEMBERS = {
     "lattice_observed_fields": "OBSERVED_FIELDS",
 }
 
-#: Hooks: functions that are called as statements of their own, each with the condition under which the call is kept.
+#: Hooks: functions that are called as statements of their own. Each has the condition under which its calls remain.
 HOOKS = {
     "addPosition": "POSITION",
     "addPositions": "POSITION",
@@ -193,5 +193,5 @@ HOOKS = {
 
 
 def chosen(table: Mapping[str, str], switches: Mapping[str, bool]) -> list[str]:
-    """Return the names in a table whose conditions hold."""
+    """Return the names in ``table`` whose conditions hold for these switches."""
     return [name for name, condition in table.items() if not condition or holds(condition, switches)]

@@ -1,4 +1,6 @@
-"""Definitions of functions that JavaScript lacks: polynomials for small arguments, otherwise formulas with Math."""
+"""Definitions of elementary functions that JavaScript lacks: polynomials for small arguments, and formulas for all
+others.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,10 @@ from phigen.targets.rendering import render
 def definitions(
     phis: Sequence[str], entire: Sequence[str], printer: Callable[[Scope], Printer], *, anomaly: bool = False
 ) -> list[str]:
-    """Return the definitions of functions of `SPECIAL` and `ENTIRE`, and of the universal anomaly of Kepler motions."""
+    """Return the definitions of functions of `SPECIAL` (``phis``) and `ENTIRE` (``entire``).
+
+    With ``anomaly``, the universal anomaly of Kepler motions is defined as well.
+    """
     texts = [render("js", "phi.mjs", _phi(f)) for f in phis] + [
         render("js", "entire.mjs", _entire(f, printer)) for f in entire
     ]
@@ -43,7 +48,7 @@ def _anomaly() -> str:
 
 
 def _number_lines(numbers: Sequence[float]) -> list[str]:
-    """Return numbers as lines of four, each number followed by a comma."""
+    """Return numbers as lines of text with four numbers each; a comma follows each number."""
     return [" ".join(f"{c!r}," for c in numbers[k : k + 4]) for k in range(0, len(numbers), 4)]
 
 

@@ -24,12 +24,12 @@ _FIXED = "\N{NO-BREAK SPACE}"
 
 
 def features(program: Program, step: Sweeps) -> dict[str, bool]:
-    """Return the switches of the runtime, including those of lattices."""
+    """Return all switches of the runtime for a lattice, by name."""
     return switches(program) | lattice_values.switches(step) | {"SPLIT": step.equation is None}
 
 
 def tables(program: Program, step: Sweeps) -> str:
-    """Return the constants and tables of the system."""
+    """Return the text of the constants and tables of a lattice."""
     values = _tables(program, step)
     listed = [render("js", "lattice.mjs", _facts(program, step))]
     listed += [render("js", f"{part}.mjs", values) for part in ("lattice_tables", "lattice_schedule")]
@@ -39,7 +39,7 @@ def tables(program: Program, step: Sweeps) -> str:
 
 
 def _facts(program: Program, step: Sweeps) -> dict[str, object]:
-    """Return the values for the template of public constants."""
+    """Return the values for the template of the public constants."""
     return {
         "contents": [f" * {line}".rstrip() for line in _contents(program, step)],
         **facts(program, json.dumps, key, "null"),
@@ -51,7 +51,7 @@ def _facts(program: Program, step: Sweeps) -> dict[str, object]:
 
 
 def _tables(program: Program, step: Sweeps) -> dict[str, object]:
-    """Return the tables that the runtime reads."""
+    """Return the tables that the runtime reads, as template values."""
     loops = LatticeLoops(program, step)
     return {
         **lattice_values.tables(program, step, json.dumps),
@@ -71,7 +71,7 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
 
 
 def kernels(program: Program, step: Sweeps) -> Iterator[str]:
-    """Yield the functions of all kernels, with loops over sites, bonds or pairs."""
+    """Yield the text of the functions of all kernels, as loops over sites, bonds or pairs."""
     lattice, names = LatticeLoops(program, step), {camel(kernel.name) for kernel in step.kernels}
     for built in _functions(lattice):
         lowered = by_tables(simultaneous(temporaries(built)), lattice)

@@ -1,4 +1,4 @@
-"""Functions of the loop IR in JavaScript."""
+"""Printing of functions of the loop IR in JavaScript."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DIALECT = Dialect(
 
 
 def function(lowered: ir.Function, names: Iterable[str] = ()) -> str:
-    """Return a function of the loop IR as text; ``names`` are those of other functions in the file."""
+    """Return a function of the loop IR as JavaScript; ``names`` are those of other functions in the file."""
     head = f"function {camel(lowered.name)}({', '.join(lowered.parameters)}) {{"
     if not lowered.body:
         return "\n".join([*comment(lowered.doc), f"{head}}}"])

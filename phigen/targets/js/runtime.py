@@ -1,9 +1,10 @@
-"""The runtime of a solver in JavaScript, assembled for one system from the modules in `templates/js/runtime`.
+"""Assembly of the runtime of a solver in JavaScript from the modules in `templates/js/runtime`.
 
-The modules are valid JavaScript. `phigen.targets.js.files` has the conditions for modules and for calls of functions
-that only some solvers have. Lines ``// #if NAME`` or ``// #if !NAME``, ``// #else`` and ``// #endif`` select parts; in
-comments of several lines ``*`` replaces ``//``. ``// #state NAME`` is replaced by lines of `phigen.targets.js.state`,
-``// #members NAME`` by the members of a class. Imports and exports between the modules are removed.
+The modules are valid JavaScript. `phigen.targets.js.files` has the conditions for modules, and for calls of functions
+that only some solvers have. Lines ``// #if NAME`` or ``// #if !NAME``, ``// #else`` and ``// #endif`` select parts of a
+module; inside comments of several lines, ``*`` takes the place of ``//``. A line ``// #state NAME`` is replaced by
+lines of `phigen.targets.js.state`, and ``// #members NAME`` by members of a class. Imports and exports between the
+modules are removed.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from phigen.targets.policies import JAVASCRIPT
 _IMPORT = re.compile(r'import .* from "\./(\w+)\.mjs";')
 _DIRECTIVE = re.compile(r"\s*(?://|\*) #(if|else|endif)(?: (!?)(\w+))?")
 
-#: The modules whose exports remain in the result.
+#: The modules whose exports remain in the assembled module.
 PUBLIC = ("errors", "solver", "lattice")
 
 
 def assembled(modules: list[str], features: Mapping[str, bool], policies: Mapping[str, Policy]) -> str:
-    """Return the modules as one text, which begins with the constants of the policies that they import."""
+    """Return the modules as a single text, after the constants of the policies that they import."""
     lines = {name: _lines(name, features) for name in modules}
     imported = {match[1]: None for each in lines.values() for line in each if (match := _IMPORT.fullmatch(line))}
     constants = [JAVASCRIPT.text(policies[name]) for name in imported if name in policies]
@@ -45,7 +46,9 @@ def _module(name: str, lines: list[str]) -> str:
 
 
 def resolved(text: str, features: Mapping[str, bool]) -> list[str]:
-    """Return the lines of a text that the features select. Raises `KeyError` for an unknown feature."""
+    """Return the lines of a text that its conditions on ``features`` select. Raises `KeyError` for an unknown
+    feature.
+    """
     lines, open_ = list[str](), [True]
     for line in text.splitlines():
         directive = _DIRECTIVE.fullmatch(line)
@@ -62,7 +65,7 @@ def resolved(text: str, features: Mapping[str, bool]) -> list[str]:
 
 
 def _included(line: str, features: Mapping[str, bool]) -> list[str]:
-    """Return the lines that replace a line; none for a call that the features exclude."""
+    """Return the lines that replace a line of a module; [] for a call of a function that the solver does not have."""
     indent, word, name = _parts(line)
     if word == "#state":
         return [indent + statement for statement in state.part(name, features)]
@@ -73,7 +76,7 @@ def _included(line: str, features: Mapping[str, bool]) -> list[str]:
 
 
 def _parts(line: str) -> tuple[str, str, str]:
-    """Return the indentation of a directive (with the mark of a comment line), and its two words."""
+    """Return the parts of a directive: its indentation, with the mark of a comment line, and its two words."""
     words = line.split()
     indent = line[: len(line) - len(line.lstrip())]
     if len(words) == 3 and words[0] in ("//", "*") and words[1] in ("#state", "#members"):
@@ -82,7 +85,7 @@ def _parts(line: str) -> tuple[str, str, str]:
 
 
 def _members(name: str, features: Mapping[str, bool]) -> list[str]:
-    """Return the members of the class of a module."""
+    """Return the lines that module ``members_NAME`` contributes to the class Solver."""
     lines = _lines(f"members_{name}", features)
     begin = next(k for k, line in enumerate(lines) if line.startswith("export class "))
     return lines[begin + 1 : lines.index("}", begin)]

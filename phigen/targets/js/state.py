@@ -1,5 +1,4 @@
-"""The state of a solver in JavaScript, block by block: its fields, the fields that a failing step restores, its
-options."""
+"""The fields of the class Solver in JavaScript, in blocks, and the options of its constructor."""
 
 from __future__ import annotations
 
@@ -12,7 +11,7 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class Option:
-    """Option of the constructor: name, type in JSDoc, and description of one or several lines."""
+    """Option of the constructor: its name, its type in JSDoc, and a description of one or several lines."""
 
     name: str
     type: str
@@ -21,7 +20,7 @@ class Option:
 
     @property
     def lines(self) -> Iterator[str]:
-        """The lines of JSDoc that describe the option."""
+        """Yield the lines of JSDoc that describe the option."""
         name = f"options.{self.name}" if self.required else f"[options.{self.name}]"
         first, *others = self.description.split("\n")
         yield f"@param {{{self.type}}} {name} {first}"
@@ -32,8 +31,9 @@ class Option:
 class StateFields:
     """Fields of a solver that belong together; ``when`` is a condition on switches, "" for all solvers.
 
-    ``fields`` are lines of the class. ``saved`` are the names of the fields that a failing step restores. ``options``
-    are options of the constructor, ``arguments`` lines that describe arguments of a step.
+    ``fields`` are lines of the class. ``saved`` are the names of the fields that are restored if a step fails.
+    ``options`` are options of the constructor. ``arguments`` are lines of JSDoc that describe additional arguments of a
+    step.
     """
 
     when: str = ""
@@ -43,7 +43,7 @@ class StateFields:
     arguments: tuple[str, ...] = ()
 
 
-#: Blocks in the order of the fields of the class.
+#: Blocks of ordinary systems, in the order of the fields of the class.
 SOLVER = (
     StateFields(
         options=(
@@ -165,7 +165,7 @@ SOLVER = (
 )
 
 
-#: Blocks of lattices, which have options only.
+#: Blocks of lattices, which have options of the constructor only.
 LATTICE = (
     StateFields(
         options=(
@@ -198,7 +198,7 @@ LATTICE = (
 
 
 def _names(blocks: list[StateFields], switches: Mapping[str, bool]) -> Iterator[str]:
-    """Yield the line with the names of the options."""
+    """Yield the line of code that lists the names of the options."""
     yield f'const OPTIONS = "{" ".join(option.name for b in blocks for option in b.options)}".split(" ");'
 
 
@@ -207,7 +207,7 @@ def _saved(blocks: list[StateFields], switches: Mapping[str, bool]) -> Iterator[
     yield f"const SAVED = [{names}];"
 
 
-#: Functions that return the lines for ``#state NAME``, by NAME.
+#: The functions that return the lines for ``#state NAME`` in the runtime, by NAME.
 PARTS: Mapping[str, Callable[[list[StateFields], Mapping[str, bool]], Iterator[str]]] = {
     "fields": lambda blocks, _: (line for b in blocks for line in b.fields),
     "saved": _saved,
@@ -219,8 +219,10 @@ PARTS: Mapping[str, Callable[[list[StateFields], Mapping[str, bool]], Iterator[s
 
 
 def part(name: str, switches: Mapping[str, bool]) -> list[str]:
-    """Return the lines of one of `PARTS` for a solver; names that begin with ``lattice_`` select the blocks of
-    lattices."""
+    """Return the lines for ``#state NAME`` of a solver with these switches.
+
+    Names that begin with ``lattice_`` use the blocks of lattices.
+    """
     records = LATTICE if name.startswith("lattice_") else SOLVER
     blocks = [block for block in records if not block.when or holds(block.when, switches)]
     return list(PARTS[name.removeprefix("lattice_")](blocks, switches))

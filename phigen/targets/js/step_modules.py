@@ -1,4 +1,6 @@
-"""The text of steps in JavaScript, one record for each kind. `phigen.targets.js.emitter` puts it into modules."""
+"""The text of steps in JavaScript: a record for each kind of step, which `phigen.targets.js.emitter` inserts into
+modules.
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,11 @@ from phigen.targets.rendering import render
 
 @dataclass(frozen=True)
 class StepModule:
-    """The text of one kind of step.
+    """The text of one kind of step, as functions of the step.
 
-    ``constants`` precede the kernels, ``series`` follow them. ``kernels`` are those that the runtime calls; kernels of
-    attitudes may replace some of them. The runtime of each kind is listed in `phigen.targets.js.files`.
+    ``constants`` are printed before the kernels, and ``series`` after them. ``kernels`` are the kernels that the
+    runtime calls; kernels of attitudes may replace some of them. `phigen.targets.js.files` lists the modules of the
+    runtime for each kind.
     """
 
     kernels: Callable[[Program, Any], Sequence[Kernel | None]]
@@ -30,7 +33,7 @@ class StepModule:
 
 
 def _implicit(step: Newton | Path) -> list[str]:
-    """Return the constants of an inner solve, and those of a path, which are 0 for other steps."""
+    """Return the constants for solving an implicit step, and those of a path, which are 0 for steps without a path."""
     path, varied = step.path, step.varied_path
     return [
         render(
@@ -56,7 +59,7 @@ def _path_series(program: Program, step: Path) -> list[str]:
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
-    """Return the recurrences of a path, or of a path with its variation."""
+    """Return the text of the recurrences for a path, or for a path with its variation."""
     blocks = PathFunctions(program, path, PathLayout()).blocks()
     lines = {name: [line.removeprefix("  ") for line in statements(function)] for name, function in blocks.items()}
     return render("js", "path.mjs", {**lines, "kind": kind})
@@ -71,7 +74,7 @@ def _explicit_kernels(program: Program, step: Explicit) -> Sequence[Kernel | Non
 
 
 def _collocation(program: Program, step: Gauss) -> list[str]:
-    """Return the coefficients of a Gauss method."""
+    """Return the text of the coefficients of a Gauss method, as lines."""
     table = step.tableau
     values = {
         "unknowns": step.unknowns,
@@ -86,7 +89,7 @@ def _collocation(program: Program, step: Gauss) -> list[str]:
 
 
 def _schedule(step: Splitting, attitude: Attitude | None) -> list[str]:
-    """Return the flows of a step, and the times of the flows."""
+    """Return the text of the order of the flows in a step, and of their durations, as lines."""
     schedule = step.schedule
     values = {
         "times": json.dumps(schedule.times),
@@ -109,7 +112,7 @@ def _splitting_kernels(program: Program, step: Splitting) -> Sequence[Kernel | N
     return [replace(step.prepare, name="prepare_row"), step.refresh, *flows, *step.tangents]
 
 
-#: The text of each kind of step; that of a lattice is `phigen.targets.js.lattice_tables`.
+#: The text of each kind of step. The text of a lattice is in `phigen.targets.js.lattice_tables`.
 STEP_MODULES: Mapping[str, StepModule] = {
     "newton": StepModule(
         kernels=lambda program, step: [step.prepare, step.refresh, step.main],

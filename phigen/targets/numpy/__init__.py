@@ -1,1 +1,1 @@
-"""The NumPy target: one module, NumPy only, vectorised over leading axes."""
+"""The NumPy target: one module that needs only NumPy, with functions for arrays of any number of states."""

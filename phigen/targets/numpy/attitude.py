@@ -9,7 +9,7 @@ from phigen.targets.rendering import render
 
 
 def pieces(program: Program, attitude: Attitude) -> list[str]:
-    """Return the texts of the kernels of attitudes, and of the functions that call them."""
+    """Return the text of the kernels of attitudes, and of the functions that call these kernels."""
     group, step, rows = attitude.group, program.step, attitude.group.rows
     solved = "_path(stage[0], x, solved)[1]" if step.path else "solved"
     shown = f"Attitudes have shape (rows, ..., {rows}, {rows})" if rows else "Attitudes have shape (rows, ..., 4)"
@@ -41,15 +41,18 @@ def pieces(program: Program, attitude: Attitude) -> list[str]:
 
 
 def _turn_of_stage(attitude: Attitude, solved: str, *, collocates: bool) -> str:
-    """Return the expression of the attitude increment of a stage, minus the identity."""
-    if collocates:  # the first axis of the kernel's input is that of the unknowns
+    """Return the expression for the attitude increment of a stage, minus the identity.
+
+    ``solved`` is the expression for the solution of the stage. ``collocates`` says that the step is a Gauss step.
+    """
+    if collocates:  # the first axis of the kernel's input counts the unknowns
         return f"np.stack(_turn(stage[0], np.sum({solved}, axis=-1)), axis=-1)"
     turn = "_along(solved)" if attitude.along else f"_turn(stage[0], x + {solved})"
     return f"_of_covector({turn})" if attitude.group.matrices and not attitude.cayley else turn
 
 
 def _shaped(rows: int, position: bool) -> str:
-    """Return the expression that reshapes rows of group elements to the arrays of attitudes and positions."""
+    """Return the expression that converts rows of group elements to the arrays of attitudes and positions."""
     if rows:
         return f"elements.reshape(shape + ({rows}, {rows}))"
     if not position:
@@ -58,7 +61,11 @@ def _shaped(rows: int, position: bool) -> str:
 
 
 def _ordered(spatial: bool) -> dict[str, str]:
-    """Return the factors of products in order: later factors are on the left if momenta are in space coordinates."""
+    """Return the factors of products of group elements, by the name of the product, in the order in which they are
+    multiplied.
+
+    If momenta are in space coordinates (``spatial``), later factors are on the left.
+    """
     pairs = {
         "uniform_first": ("first", "_uniform(rate, t)"),
         "element_first": ("first", "element"),

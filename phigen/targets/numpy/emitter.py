@@ -16,13 +16,13 @@ from phigen.targets.rendering import render
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """Return the file name with its contents."""
+    """Return the generated file by its name. ``command`` is the command that regenerates it, for the header."""
     body = _body(program)
     return {f"{program.name}.py": sealed(header_lines(program, command), body, "# ", "", "")}
 
 
 def _body(program: Program) -> str:
-    """Return the module without its header."""
+    """Return the text of the module without its header comment."""
     if step := program.step.swept:
         from phigen.targets.numpy import lattice_module
 
@@ -91,12 +91,14 @@ def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
 
 
 def _with_level(prepare: Kernel) -> Kernel:
-    """Return the transpose of ``prepare`` with a second result: the cotangent of the energy level e, or nothing."""
+    """Return the transposed kernel ``prepare`` with a second result: the cotangent of the energy level e, or [] without
+    e.
+    """
     return replace(prepare, outputs=(*prepare.outputs, Output("gauge_bar", ()))[:2])
 
 
 def _of_pullback(program: Program, step: Step) -> dict[str, object]:
-    """Return the values for the templates of the reverse pass."""
+    """Return the values for the templates of the reverse pass through a step."""
     rows = len(step.flow_schedule.times) if step.flow_schedule else 1
     moment = ", t0 + done * h, h" if step.flow_schedule else ""
     said = "the e of a trajectory follows x0\n    and the parameters, unless a gauge is given."

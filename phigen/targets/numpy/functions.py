@@ -1,5 +1,6 @@
-"""Definitions of functions that NumPy lacks: polynomials for small arguments, otherwise formulas with functions of
-NumPy."""
+"""Definitions of elementary functions that NumPy lacks: polynomials for small arguments, and formulas for all
+others.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from phigen.targets.rendering import render
 
 
 def called(program: Program) -> list[str]:
-    """Return the definitions of functions of `SPECIAL` and of `ENTIRE` that kernels call."""
+    """Return the definitions of those functions of `SPECIAL` and `ENTIRE` that the kernels of a program call."""
     phis = [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     entire = [render("numpy", "entire.py", _entire(f)) for f in special.entire_used(program)]
     anomaly = [_anomaly()] if special.calls_anomaly(program) else []
@@ -26,7 +27,7 @@ def called(program: Program) -> list[str]:
 
 
 def _exponentials(program: Program) -> list[str]:
-    """Return the text of the matrix exponential; [] if ``prepare`` does not call it."""
+    """Return the definition of the matrix exponential; [] if the kernel ``prepare`` does not call it."""
     if not special.largest_exponential(program):
         return []
     values = {"adjoint": special.transposes_exponentials(program), **special.exponential_constants()}
@@ -34,7 +35,7 @@ def _exponentials(program: Program) -> list[str]:
 
 
 def _anomaly() -> str:
-    """Return the text of the function that computes the universal anomaly of Kepler motions."""
+    """Return the definition of the function that computes the universal anomaly of Kepler motions."""
     c2, c3 = ([repr(float(c)) for c in reversed(series)] for series in special.stumpff())
     others = list(zip(c2[1:], c3[1:], strict=True))
     values = {"c2_last": c2[0], "c3_last": c3[0], "others": others, **special.anomaly_values()}

@@ -18,7 +18,7 @@ from phigen.targets.numpy.loops import statements
 
 
 def function(program: Program, kernel: Kernel) -> str:
-    """Return a kernel as a function of arrays, which may have any number of axes before that of the coordinates."""
+    """Return a kernel as a function of arrays, which may have any number of axes before the axis of the coordinates."""
     if kernel.exponents:
         return _through_exponentials(program, kernel, kernel.exponents)
     arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
@@ -33,9 +33,9 @@ def function(program: Program, kernel: Kernel) -> str:
 
 
 def over_states(function: ir.Function) -> ir.Function:
-    """Return a kernel's function rewritten for arrays of states, whose last axis is that of the coordinates.
+    """Return the function of a kernel, rewritten for arrays of states whose last axis is that of the coordinates.
 
-    Parameters are in a dictionary. Functions of NumPy return the stored values in lists.
+    Parameters are read from a dictionary. The function returns its outputs as lists.
     """
 
     def read(name: str, value: ir.Value) -> ir.Value:
@@ -51,9 +51,9 @@ def over_states(function: ir.Function) -> ir.Function:
 
 
 def _through_exponentials(program: Program, kernel: Kernel, inner: Kernel) -> str:
-    """Return the transpose of a kernel with matrix exponentials.
+    """Return the transpose of a kernel that computes matrix exponentials, as several functions.
 
-    It consists of functions for the matrices and for their cotangents.
+    There is a function for the matrices, and a function that receives the cotangents of the matrices.
     """
     outer = replace(kernel, name=f"{kernel.name}_of_exponents", exponentials=(), exponents=None)
     names = {i: "parameters" if i == "params" else i for i in kernel.inputs}
@@ -90,7 +90,9 @@ def _result(program: Program, kernel: Kernel, values: Mapping[str, Sequence[str]
 
 
 def _state(kernel: Kernel) -> str:
-    """Return the argument that holds states (..., DIM) and determines the shape of results; "" if there is none."""
+    """Return the name of the argument that holds states (..., DIM) and determines the shape of results; "" if there is
+    none.
+    """
     others = [a for a in kernel.inputs if a not in (TABLE, "params", "gauge", *SCALARS)]
     return next((a for a in others if kernel.inputs[a] and not isinstance(kernel.inputs[a][0], Symbol)), "")
 

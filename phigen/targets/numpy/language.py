@@ -8,7 +8,7 @@ from phigen.symbolic import functions as elementary
 from phigen.targets.language import Language
 from phigen.targets.reserved import PYTHON_RESERVED
 
-#: Functions are those of NumPy, and those that the generated file defines. Values are arrays over members or sites.
+#: Python with NumPy. Functions are those of NumPy and those that the generated file defines; values are arrays.
 LANGUAGE = Language(
     reserved=PYTHON_RESERVED,
     functions={name: f"_{name}" for name in elementary.FUNCTIONS} | elementary.written_in("numpy"),

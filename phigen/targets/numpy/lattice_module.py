@@ -21,12 +21,14 @@ from phigen.targets.numpy.loops import function
 from phigen.targets.policies import PYTHON
 from phigen.targets.rendering import render
 
-#: Templates of implicit steps.
+#: Names of the templates for the implicit steps of lattices by the series.
 _SERIES = ("lattice_series", "lattice_predictors", "lattice_newton")
 
 
 def body(program: Program, step: Sweeps, prepare: str) -> str:
-    """Return the text of the module; ``prepare`` is the text of the functions that compute coefficients."""
+    """Return the text of the module without its header; ``prepare`` is the text of the functions that compute
+    coefficients.
+    """
     values: dict[str, object] = {
         **facts(program, listed, quoted, "None"),
         **lattice_values.tables(program, step, listed),
@@ -44,7 +46,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     values["equation"] = step.equation is not None
     values["adjoint"] = step.adjoint is not None
     flows = "(part, _), _ in sites.schedule" if step.by_colour else "part, _ in SCHEDULE"
-    swept = f"sum(len(PARTS[part]) for {flows})" if any(step.parts) else "1"  # not 0, even if no field changes
+    swept = f"sum(len(PARTS[part]) for {flows})" if any(step.parts) else "1"  # at least 1, even if no field changes
     values["of_step"] = "2 * len(SCHEDULE)" if step.equation else swept
     values["extremes"] = any(ends.extremes for ends in step.others.observed.ends)
     values["pairs"] = step.partners is not None and not graph
@@ -68,7 +70,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
 
 
 def _of_bodies(step: Sweeps) -> dict[str, object]:
-    """Return the values for templates of bodies in relative coordinates."""
+    """Return the values for templates on bodies in relative coordinates."""
     relative = step.relative
     if not relative:
         return {"relative": False}
@@ -83,8 +85,11 @@ def _of_bodies(step: Sweeps) -> dict[str, object]:
 
 
 def _reductions(program: Program) -> dict[str, object]:
-    """Return the indices of observables by the array method that reduces them, and the observables that are means
-    over bonds."""
+    """Return the reductions of observables as values for templates.
+
+    They are the indices of observables, by the array method that reduces their densities, and the observables that are
+    means over bonds.
+    """
     reductions = program.observables.reductions
     methods = ["mean" if r.kind == "mean" and r.over == "sites" else r.kind.replace("mean", "sum") for r in reductions]
     rows = {m: [k for k, method in enumerate(methods) if method == m] for m in dict.fromkeys(methods)}
@@ -99,7 +104,7 @@ def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]], suffix: st
 
 
 def _functions(loops: LatticeLoops) -> Iterator[str]:
-    """Yield the functions of all kernels; sums over bonds or pairs come first."""
+    """Yield the text of the functions of all kernels; those that compute sums over bonds or pairs come first."""
     step, lowering = loops.step, WholeArrays(loops)
 
     def summed(gather: Gather) -> ir.Function:
@@ -125,8 +130,10 @@ def _functions(loops: LatticeLoops) -> Iterator[str]:
 
 
 def _transposes(loops: LatticeLoops, lowering: WholeArrays, kernels: Mapping[str, Kernel]) -> Iterator[str]:
-    """Yield the transposes of all sweeps, or of the kernels of an equation, then the list of the transposes of each
-    part."""
+    """Yield the text of the transposes of all sweeps or, for implicit steps, of the kernels of a stage.
+
+    A list that has the transposes of each part comes last.
+    """
     step = loops.step
 
     def swept(sweep: Sweep) -> ir.Function:

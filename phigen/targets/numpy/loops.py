@@ -23,7 +23,10 @@ def function(lowered: ir.Function) -> str:
 
 
 def statements(lowered: ir.Function, reserved: Iterable[str] = ()) -> tuple[Spelling, list[str]]:
-    """Return the spelling of a function, and the lines of its body."""
+    """Return the lines of the body of a function, and the `Spelling` that has chosen its identifiers.
+
+    ``reserved`` are names that the function must not use.
+    """
     spelling = Spelling(DIALECT, reserved, lowered.body)
     return spelling, [line for s in lowered.body for line in _statement(s, spelling, "    ")]
 

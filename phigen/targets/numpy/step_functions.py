@@ -1,4 +1,6 @@
-"""The text of steps in NumPy, one record for each kind. `phigen.targets.numpy.emitter` puts it into modules."""
+"""The text of steps in NumPy: a record for each kind of step, which `phigen.targets.numpy.emitter` inserts into
+modules.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,12 @@ from phigen.targets.rendering import render
 
 
 class _PathOverMembers(PathLayout):
-    """Places of the values of a path: columns of arrays over members, and lists of the orders of a series."""
+    """The arrays in which the values of a path are: columns of arrays over members, and lists of coefficients by
+    order.
+    """
 
     def covector(self, i: int) -> ir.Value:
-        """Return component i of p."""
+        """Return component i of the covector p, for all members."""
         return ir.Entry(ir.fixed("p"), ir.Several((ir.fixed(":"), ir.Constant(i))))
 
     def fixed(self, i: int) -> ir.Value:
@@ -31,13 +35,15 @@ class _PathOverMembers(PathLayout):
         return ir.fixed(f"f{i}")
 
     def following(self, i: int, k: ir.Value, value: ir.Value) -> ir.Statement:
-        """Return the statement that appends coefficient k. The first coefficients are made arrays, not numbers."""
+        """Return the statement that appends the coefficient of order k to a series. Coefficients of order 0 are
+        converted to arrays.
+        """
         first = k == ir.Constant(0)
         return ir.Append(self.series(i), ir.Binary("+", value, ir.Constant(0.0)) if first else value)
 
 
 def _path_lines(program: Program, path: Recurrences) -> dict[str, list[str]]:
-    """Return the statements of a path by their purpose."""
+    """Return the statements of a path as lines of text, by the name of the block."""
     blocks = PathFunctions(program, path, _PathOverMembers()).blocks()
     printed = {name: statements(function)[1] for name, function in blocks.items()}
     return {name: [line.strip() for line in lines] for name, lines in printed.items()}
@@ -45,18 +51,20 @@ def _path_lines(program: Program, path: Recurrences) -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class StepPart:
-    """Kernels, the templates that use them, and additional values for these templates."""
+    """Kernels of a step, the templates of functions that call them, and additional ``values`` for these templates."""
 
     kernels: Sequence[Kernel | None] = ()
     templates: Sequence[str] = ()
     values: Mapping[str, object] = field(default_factory=dict)
 
     def functions(self, program: Program) -> list[str]:
-        """Return the text of the kernels as functions of NumPy."""
+        """Return the kernels as the text of functions of NumPy."""
         return [function(program, kernel) for kernel in self.kernels if kernel]
 
     def rendered(self, program: Program, prefix: str = "") -> list[str]:
-        """Return the rendered templates, whose names begin with ``prefix``."""
+        """Return the rendered templates. The names of their files are ``prefix`` followed by the names in
+        ``templates``.
+        """
         values = {**values_of(program), **self.values}
         return [render("numpy", f"{prefix}{part}.py", values) for part in self.templates]
 
@@ -65,8 +73,8 @@ class StepPart:
 class StepFunctions:
     """The functions of one kind of step: a stage, its tangent map, and its transpose.
 
-    ``adjoint`` has the additional kernels that the transpose needs. ``chained`` says that the transpose of a step
-    starts from that of the following step.
+    ``adjoint`` has the additional kernels that the transpose needs. ``chained`` says that the iteration for the
+    transpose of a step starts from the solution for the following step.
     """
 
     stage: Callable[[Program, Any], StepPart]
@@ -120,9 +128,10 @@ def _path_adjoint(program: Program, step: Path) -> StepPart:
 
 
 def _varied(program: Program, step: Path, adjoint: PathAdjoint) -> dict[str, object]:
-    """Return the recurrences of a path with its derivatives, column by column, as template values.
+    """Return template values: the recurrences for a path together with its derivatives, which are computed column by
+    column.
 
-    The derivatives are with respect to its start, p, and the coefficients that π depends on.
+    The path is differentiated with respect to its start, the covector p, and the coefficients that π depends on.
     """
     path, slopes, n = step.recurrences, adjoint.slopes, program.dimension
     whole = Recurrences((*path.series, *slopes.series), path.slopes, (*path.fixed, *slopes.fixed))
@@ -189,7 +198,7 @@ def _splitting_values(step: Splitting) -> dict[str, object]:
     }
 
 
-#: The text of each kind of step; that of a lattice is `phigen.targets.numpy.lattice_module`.
+#: The text of each kind of step. The text of a lattice is in `phigen.targets.numpy.lattice_module`.
 STEP_FUNCTIONS: Mapping[str, StepFunctions] = {
     "newton": StepFunctions(
         stage=_newton,
@@ -217,5 +226,5 @@ STEP_FUNCTIONS: Mapping[str, StepFunctions] = {
 
 
 def functions_of(program: Program) -> StepFunctions:
-    """Return the record for the step of a program. Raises `KeyError` for a lattice."""
+    """Return the record for the kind of step of a program. Raises `KeyError` for a lattice, which has no record."""
     return STEP_FUNCTIONS[program.step.kind.name]

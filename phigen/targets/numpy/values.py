@@ -14,7 +14,7 @@ _NOISE_ARGUMENTS = """ The random
     numbers are a function of seed, member (that of the first member, or an array) and the number of the step, from
     step0 on. Prescribed increments (steps, increments) or (steps, members, increments) replace them."""
 
-#: Sentences of docstrings on the gauge, the energy level and steps in tau.
+#: Sentences for docstrings in generated modules: on the gauge, on the energy level, and on steps of equal size in tau.
 _OF_GAUGE = """gauge (one value for each Casimir in GAUGE)
     overrides the choice of the solver: the step is a Poisson map for each fixed gauge."""
 _OF_LEVEL = """gauge overrides e = -H(x0): the step
@@ -25,14 +25,14 @@ _OF_TAU = """
 
 
 def values_of(program: Program) -> dict[str, object]:
-    """Return all values of a program that templates share."""
+    """Return the values that templates of NumPy modules share."""
     said = {"title": plain(program.about.title) or program.name, **facts(program, listed, quoted, "None")}
     policies = {name: PYTHON.text(policy) for name, policy in policies_of(program).items()}
     return {**said, **policies, **_of_fixed(program), **_of_time(program), **_of_noise(program), **_of_step(program)}
 
 
 def _of_fixed(program: Program) -> dict[str, object]:
-    """Return the values on gauges, energy levels, steps in tau, and runs between correctors."""
+    """Return the values for templates on gauges, energy levels, steps in tau, and correctors at the ends of runs."""
     corrected = program.step.corrected
     return {
         "gauge": listed(program.held),
@@ -49,14 +49,16 @@ def _of_fixed(program: Program) -> dict[str, object]:
 
 
 def _of_gauge(program: Program) -> str:
-    """Return the sentence on the gauge. Steps to truncation are not Poisson maps for any gauge, and the sentence
-    says so."""
+    """Return the sentence on the gauge for docstrings.
+
+    If Gauss steps preserve the structure only up to the truncation error, the sentence claims no Poisson map.
+    """
     said = _OF_LEVEL if program.monitor else _OF_GAUGE
     return said.partition(":")[0] + "." if program.truncated else said
 
 
 def _of_time(program: Program) -> dict[str, object]:
-    """Return the arguments and sentences on the time; they are empty if H does not depend on the time."""
+    """Return the arguments and sentences on the time for templates; they are empty if H does not depend on the time."""
     time = bool(program.time)
     return {
         "time": time,
@@ -70,7 +72,7 @@ def _of_time(program: Program) -> dict[str, object]:
 
 
 def _of_step(program: Program) -> dict[str, object]:
-    """Return the values on the kind of step, its coefficients and stages, and its iteration."""
+    """Return the values for templates on the kind of step, its coefficients and stages, and its iteration."""
     step = program.step
     inner, schedule = step.inner_solve or InnerSolve(), step.flow_schedule
     longest = PathPolicy().longest_path
@@ -92,7 +94,9 @@ def _of_step(program: Program) -> dict[str, object]:
 
 
 def _of_noise(program: Program) -> dict[str, object]:
-    """Return the arguments and sentences on noise, and the expressions of stages that depend on time or noise."""
+    """Return the arguments and sentences on noise for templates, and the expressions for coefficients that depend on
+    time or noise.
+    """
     noise = program.noise
     renewed, drawn = bool(program.time or noise), ["drawn(done)"] if noise else []
     now = ", ".join(["s", "t0 + done * h" if program.time else "done * h", "h", *drawn])

@@ -1,1 +1,1 @@
-"""Lattices in C: loops over the sites of rows."""
+"""Lattices in C, computed by loops over the sites of rows."""

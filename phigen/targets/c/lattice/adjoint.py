@@ -1,11 +1,12 @@
 """The transpose of a step of a lattice in C: loops that propagate cotangents backwards through its sweeps.
 
-The reverse pass of a sweep has two traversals, so that every site writes only its own elements, for any number of
-threads. In the first, each site computes its contributions to the cotangents of all values that it has read. It adds
-contributions to its own cotangents, and stores contributions to other sites in arrays, one for each ``handed`` value.
-In the second, each site adds the contributions stored for it. On grids the second traversal can be merged with the
-first one of the next flow of the reverse pass; see `phigen.scheme.sweep_facts.takes`. The kernels of the equation of a
-stage are treated likewise; see `stage_kernels`.
+The reverse pass of a sweep has two traversals of the sites. A site writes only its own elements, so that any number of
+threads can work on a traversal. In the first traversal, each site computes its contributions to the cotangents of all
+values that it has read. It adds contributions to its own cotangents, and stores contributions to other sites in arrays,
+called ``handed``. In the second traversal, each site adds the contributions that other sites have stored for it. On
+grids, the second traversal can be merged with the first traversal of the next flow of the reverse pass; see
+`phigen.scheme.sweep_facts.takes`. Kernels of the implicit equation of a stage have two traversals as well; see
+`stage_kernels`.
 """
 
 from __future__ import annotations
@@ -65,11 +66,10 @@ from phigen.targets.c.real import rendered
 
 @dataclass(frozen=True)
 class Back:
-    """The reverse pass of a part of H or of a kernel: its ``loops``, and the calls for a row segment in both
-    traversals.
+    """The reverse pass of a part of H, or of a kernel of a stage: its ``loops``, and the calls for a row segment.
 
-    ``handed`` is the number of arrays that sites pass to other sites; ``recomputed`` are the fields that the inverse
-    flow recomputes.
+    ``first`` and ``second`` are the calls in the two traversals of the sites. ``handed`` is the number of arrays in
+    which sites store contributions to other sites. ``recomputed`` are the fields that the inverse flow recomputes.
     """
 
     loops: tuple[ir.Function, ...]
@@ -81,14 +81,15 @@ class Back:
 
 @dataclass(frozen=True)
 class _Pulled:
-    """A transposed kernel of a ``sweep`` or of a stage, and the place of its cotangents.
+    """A transposed kernel of a ``sweep`` or of a stage, and the arrays of its cotangents.
 
-    The cotangents of the kernel's values are symbols of the kind ``seed``. They are in the arrays of cotangents
-    numbered ``bars`` or, if ``bars`` is empty, in the variation of the row. ``gather`` has the sums that the kernel
-    reads; ``ends`` are the kernels of these sums, with the parameters that have the opposite sign as seen from b, and
-    their transposes. ``before`` are statements that a row segment executes before the calls. The fields ``recomputed``
-    are recomputed by this kernel, or by another one from sums that the transposes over bonds or pairs compute.
-    ``taken`` are the cotangents that the flow after it passes on.
+    The kernel reads cotangents of its outputs, which are symbols of the kind ``seed``. They are in the arrays of
+    cotangents with the numbers ``bars`` or, if ``bars`` is empty, in the variation of the row. ``gather`` has the sums
+    that the kernel reads. ``ends`` has three items for each of these sums: its kernel, the parameters that change sign
+    at the end b of a bond, and its transpose. ``before`` are statements that a row segment executes before the calls.
+    The fields ``recomputed`` are recomputed by this kernel, or by the kernel ``undo`` from sums that the transposes
+    over bonds or pairs compute. ``taken`` are the contributions of the previous flow of the reverse pass, which this
+    kernel adds.
     """
 
     kernel: Kernel
@@ -104,7 +105,9 @@ class _Pulled:
 
 
 def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
-    """Return the loops, and the functions that make the reverse pass of each part or of each kernel of a stage."""
+    """Return the text of the loops, and of the functions that run the reverse pass of each part or of each kernel of a
+    stage.
+    """
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
     texts = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
     texts += [function(program, adjoint.refresh)] if adjoint.refresh else []
@@ -119,8 +122,10 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
 
 
 def handed_by(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
-    """Return the cotangents that a kernel passes to neighbours, in arrays numbered from ``first`` on; equal values
-    share an array."""
+    """Return the contributions of a kernel to cotangents at neighbours, in arrays with numbers from ``first`` on.
+
+    Contributions with equal values share an array.
+    """
     arrays: dict[int, int] = {}
     contributions = []
     for name, value in kernel.along("site"):
@@ -136,18 +141,18 @@ _ARRAYS = {name: member(name, ir.fixed(name)) for name in ("x", "bar", "handed",
 
 @dataclass(frozen=True)
 class _Reverse(RowLoops):
-    """The reverse pass of one lattice; ``kernels`` are the transposes by name."""
+    """Builder of the reverse pass of one lattice; ``kernels`` are the transposed kernels by name."""
 
     rows: Rows
     kernels: Mapping[str, Kernel]
 
     @property
     def row_drivers(self) -> RowDrivers:
-        """The builder of the functions that call the loops for the rows of a lattice."""
+        """The builder of the functions that call loops for the row segments of a lattice."""
         return drivers(self)
 
     def drivers(self, parts: Sequence[Back]) -> Iterator[str]:
-        """Yield the drivers of the two traversals."""
+        """Yield the text of the row drivers of the two traversals."""
         step = self.layout.step
         receives = takes(self.program, step)
         find_givers: ir.Block = ()
@@ -176,7 +181,7 @@ class _Reverse(RowLoops):
             yield self._driver("Contributions of other sites to the cotangents of sites", "hand_rows", second)
 
     def _driver(self, title: str, name: str, cases: Mapping[int, RowSegment]) -> str:
-        """Return the text of a driver that makes one traversal of some parts."""
+        """Return the text of a row driver that runs one traversal; ``cases`` are its parts, by number."""
         step, back = self.layout.step, name == "back_rows"
         far = ["coef", *["far"] * bool(self.rows.limited)]
         arrays = ["x", "bar", "handed", *["received"] * (back and takes(self.program, step))]
@@ -188,8 +193,10 @@ class _Reverse(RowLoops):
         return commented(build.driver(name, title, parameters, [*cases.values()], [*cases], vectors=True), self.program)
 
     def of_parts(self) -> Iterator[Back]:
-        """Yield the traversals of all sweeps of each part; there is only one if the next flow adds the
-        contributions."""
+        """Yield the traversals of all sweeps of each part of H.
+
+        The second traversal is left out if the next flow of the reverse pass adds the contributions.
+        """
         program, layout, step = self.program, self.layout, self.layout.step
         recomputed, back = can_recompute_fields(program, step), transposes(program, step)
         around = {
@@ -229,7 +236,9 @@ class _Reverse(RowLoops):
             yield replace(both, first=(*both.first, *copied), second=second)
 
     def of_equation(self) -> Iterator[Back]:
-        """Yield both traversals of each kernel of the reverse pass of a stage; the first one computes the sums."""
+        """Yield both traversals of each kernel in the reverse pass of a stage. The first of these also computes the
+        sums.
+        """
         layout, fields, gather = self.layout, self.program.coordinates, self.layout.partners.field
         transposed = [
             restricted(layout.step.sites, fields, self.kernels[of + BACK], outputs, name)
@@ -248,10 +257,10 @@ class _Reverse(RowLoops):
             yield self._transpose_traversals(name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
     def _transpose_traversals(self, name: str, whom: str, pulled: Sequence[_Pulled], *, apart: bool = True) -> Back:
-        """Return the traversals of some kernels.
+        """Return the traversals of some transposed kernels.
 
-        Unless ``apart``, the second traversal is merged with the first traversal of the next flow; otherwise it is
-        called ``name``.
+        If ``apart``, the second traversal adds contributions in a separate loop called ``name``. Otherwise the first
+        traversal of the next flow adds them. ``whom`` says in the comment of the loop which sites have contributed.
         """
         layout, loops = self.layout, list[ir.Function]()
         first, second = list[ir.Statement](), list[ir.Statement]()
@@ -264,7 +273,9 @@ class _Reverse(RowLoops):
             return ir.Call(loop.name, (*[COEF] * coefficients, at(sites), of_segment))
 
         def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], recomputed: Sequence[str]) -> ir.Block:
-            """Return the calls of a kernel, for each form of functions."""
+            """Return the calls of a transposed kernel for a row segment, with both forms of elementary functions if
+            these are needed.
+            """
             sums, blocks = one.gather.names if one.gather else (), dict[str, ir.Block]()
             on_sites = self.sites.transposed(kernel, one.gather, one.sweep, recomputed)
             summed = len(sums) * any(o.name == "gathered_bar" for o in kernel.outputs)
@@ -301,19 +312,26 @@ class _Reverse(RowLoops):
         return Back(tuple(loops), tuple(first), tuple(second), arrays, tuple(recomputed))
 
     def _cleared(self, handed: Sequence[Handed]) -> Iterator[ir.Statement]:
-        """Yield the statements that clear the arrays of contributions to other sites, if loops omit some of the
-        sites."""
+        """Yield the statements that clear the arrays of contributions to other sites.
+
+        They are needed if loops omit some of the sites.
+        """
         for array in sorted({h.array for h in handed}):
             row = self.row_drivers.first_of_row(_HANDED, array)
             yield ir.Clear(row, BEGIN, ir.Binary("-", STOP, BEGIN))
 
     def _ends_back(self, gather: Gather | None) -> Iterator[tuple[Ends, frozenset[str], Kernel]]:
-        """Yield the loops over bonds or pairs of a gather, as in `over_ends`, and their transposes."""
+        """Yield the loops over bonds or pairs that compute the sums of a gather (see `over_ends`), each with its
+        transpose.
+        """
         for (ends, opposite), first in zip(over_ends(gather), gather.ends, strict=False) if gather else ():
             yield ends, opposite, replace(self.kernels[first.kernel.name + BACK], name=ends.kernel.name + BACK)
 
     def _gathered(self, sweep: Sweep) -> Iterator[ir.Statement]:
-        """Yield the calls of loops that sum over bonds or pairs; loops of equal code are called once."""
+        """Yield the calls of the loops that compute the sums over bonds or pairs which a sweep reads.
+
+        If several loops have equal code, the first of them is called.
+        """
         names = dict[object, str]()
         for other in (s for part in self.layout.step.parts for s in part):
             for loop in self.sums(other.gather, swept=True):
@@ -348,20 +366,20 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
 
 
 def _values_read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
-    """Return the fields and parameters whose values before a sweep are read by a transposed kernel."""
+    """Return the fields and parameters whose values before a sweep some transposed kernel reads."""
     used = {s for kernel in kernels for s in {*kernel.inputs.get("site", ())} & {*symbols_of(*kernel.roots)}}
     return {(step.sites.ends.get(s) or step.sites.places[s])[0] for s in used}
 
 
 def _sums(program: Program, step: Sweeps) -> str:
-    """Return the number of sums of each row segment, as C."""
+    """Return the number of sums over sites that each row segment stores, as text in C."""
     if step.equation and step.partners:
         return f"(int){program.name}_COEFFICIENTS + {program.name}_NUMBERS"
     return f"{program.name}_COEFFICIENTS"
 
 
 def _parameter_functions(program: Program, step: Sweeps, layout: Layout) -> str:
-    """Return the functions that add the derivatives with respect to parameters to those of the caller."""
+    """Return the text of the functions that add derivatives with respect to parameters to the arrays of the caller."""
     bars = {p: layout.bar(p) for p in (*step.sites.parameters, *step.sites.at_bonds)}
     added = sums_of_derivatives(program.parameters, members(program), bars)
     return "\n".join(commented(one, program) for one in added)

@@ -1,4 +1,4 @@
-"""The memory layout of a lattice, and the parts of the runtime that it needs."""
+"""The memory layout of a lattice in C, and the switches of the runtime for lattices."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ from phigen.scheme.sweep_inverse import can_recompute_fields
 from phigen.targets import lattice_values
 from phigen.targets.c.language import members
 
-#: Largest number of differences in the predictors of all stages together. More differences gain little, and each is an
-#: array over sites.
+#: Largest number of differences in the predictors of all stages together. Further differences gain little, and each
+#: needs an array over all sites.
 MOST_REMEMBERED = 14
 
 
 @dataclass(frozen=True)
 class Layout(RowLayout):
-    """The memory layout of rows of a lattice; ``halo`` is the number of sites copied at each end of a row."""
+    """The layout of the rows of a lattice in memory. ``halo`` is the number of sites that are copied beyond each end of
+    a row.
+    """
 
     halo: int = 0
     slopes: bool = True  # whether the code has kernels of variations; otherwise it takes differences of sweeps
@@ -47,32 +49,37 @@ class Layout(RowLayout):
         return self.lattice.step
 
     def bar(self, array: str) -> int:
-        """Return the number of the array of cotangents of a field, or of a parameter at sites or bonds."""
+        """Return the number of the array of cotangents that belongs to a field, or to a parameter at sites or bonds."""
         return [*self.lattice.arrays, *self.step.sites.at_bonds].index(array)
 
     @property
     def partners(self) -> Partners:
-        """The sums over bonds or pairs, with their variations if these are computed; None without bonds or pairs."""
+        """The kernels of sums over bonds or pairs. Those of variations are left out unless the code has kernels of
+        variations.
+        """
         partners = self.step.others
         return partners if self.slopes else replace(partners, varied=Gather((), ()))
 
     def gathered(self, kernel: Kernel) -> Gather:
-        """Return the sums over bonds or pairs that a kernel of a stage reads."""
+        """Return the sums over bonds or pairs that a kernel of the implicit equation of a stage reads."""
         return self.partners.varied if kernel.reads_variations else self.partners.field
 
     @property
     def graph(self) -> bool:
-        """Whether bonds are given at run time."""
+        """Whether sites are connected by bonds that are given at run time."""
         return self.partners.graph
 
     @property
     def sums_up(self) -> bool:
-        """Whether observables at a site sum over bonds in separate loops; this is so if no stage needs these sums."""
+        """Whether observables compute sums over bonds in inner loops of their own.
+
+        This is so if no stage needs the sums, so that they are not stored for all sites.
+        """
         return self.graph and self.step.equation is None
 
 
 def layout_of(program: Program, step: Sweeps) -> Layout:
-    """Return the layout of a lattice."""
+    """Return the memory layout of a lattice."""
     lattice, sites = LatticeLoops(program, step), step.sites
     offsets = [offset for _, offset in sites.places.values()]
     offsets += [tuple(map(int, s.key[1:])) for s in lattice.seams]
@@ -88,7 +95,7 @@ def _banded(program: Program, step: Sweeps) -> bool:
 
 
 def switches(layout: Layout) -> dict[str, bool]:
-    """Return the switches of the runtime for lattices."""
+    """Return the switches of the C runtime for lattices, by name."""
     program, step = layout.program, layout.step
     banded, weights = _banded(program, step), layout.lattice.weights
     return lattice_values.switches(step) | {

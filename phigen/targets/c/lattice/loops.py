@@ -1,4 +1,6 @@
-"""Kernels of lattices in C, as loops over the sites of a row, and the order of the passes that make them."""
+"""Kernels of lattices in C as loops over the sites of a row segment, and the order of the passes that produce these
+loops.
+"""
 
 from __future__ import annotations
 
@@ -26,20 +28,22 @@ from phigen.targets.c.layout import comment
 from phigen.targets.c.loops import function
 from phigen.targets.header import plain, sentence
 
-#: Pattern of the name of a part of H.
+#: Pattern of the name of a part of H in comments.
 _PART = re.compile(r"\bH_\d+")
 
-#: Number of doubles in the buffer of the densities of observables, unless there are more observables: two pages, a
-#: quarter of the L1 cache.
+#: Number of doubles in the buffer for densities of observables: two memory pages, a quarter of the L1 cache. It is
+#: larger if there are more observables.
 _BUFFER = 1024
 
-#: Versions of elementary functions by form; see `phigen.ir.passes.forms`.
+#: The versions of elementary functions that are called, by form (`phigen.ir.passes.forms`).
 Forms = Mapping[str, Mapping[str, str]]
 
 
 def printed(program: Program, loop: ir.Function, purposes: Iterable[str] = (), *, inline: bool = True) -> str:
-    """Return the C function of a loop with a comment: the purposes of all loops of equal code, by default its own
-    purpose."""
+    """Return the text of a loop with a comment that states its purpose.
+
+    ``purposes`` are the purposes of all loops with the same code; by default, the comment has the purpose of the loop.
+    """
     sentences = [plain(sentence(purpose)) for purpose in _merged_purposes(purposes or (loop.doc,))]
     lines = [line for text in sentences for line in comment(text, "   ")]
     lines[0] = f"/* {lines[0].strip()}"
@@ -47,7 +51,9 @@ def printed(program: Program, loop: ir.Function, purposes: Iterable[str] = (), *
 
 
 def _merged_purposes(purposes: Iterable[str]) -> Iterator[str]:
-    """Yield the purposes of a loop; parts of H with the same purpose are named in one sentence."""
+    """Yield the purposes of a loop. Purposes that differ only in the part of H become one sentence that names all
+    parts.
+    """
     grouped: dict[str, dict[str, None]] = {}
     for purpose in purposes:
         part, _, manner = purpose.rpartition(": ")
@@ -59,18 +65,20 @@ def _merged_purposes(purposes: Iterable[str]) -> Iterator[str]:
 
 
 def code(loop: ir.Function) -> tuple[tuple[str, ...], ir.Block]:
-    """Return the parameters and statements of a loop. They are equal for loops with equal effect."""
+    """Return the parameters and statements of a loop. If these are equal, two loops do the same."""
     return loop.parameters, loop.body
 
 
 def share(densities: Kernel) -> int:
-    """Return the number of sites whose densities of observables are computed in one pass."""
+    """Return the number of sites for which the densities of observables are computed in one pass, so that they fit the
+    buffer.
+    """
     return max(1, _BUFFER // len(densities.roots))
 
 
 @dataclass(frozen=True)
 class RowLoops:
-    """The loops over sites of one lattice, by rows."""
+    """Builder of the loops over sites of one lattice, by rows."""
 
     layout: Layout
 
@@ -86,39 +94,48 @@ class RowLoops:
 
     @property
     def sites(self) -> LatticeLoops:
-        """The builder of loops over sites, before their lowering to rows."""
+        """The builder of loops on the level of sites, before they are lowered to rows."""
         return self.layout.lattice
 
     @property
     def versions(self) -> Mapping[str, str]:
-        """The versions of functions in loops with a single form: those for lanes, and in short code full-range ones."""
+        """The versions of elementary functions in loops that have a single form.
+
+        These are the versions for SIMD lanes; in short code, only those that are correct for all arguments.
+        """
         return IN_LANES if self.fast else FULL_RANGE
 
     def forms(self, rows: Rows | None, loops: Iterable[ir.Function]) -> Forms:
-        """Return the forms to be generated: suffixes of function names, with versions of elementary functions.
+        """Return the forms in which loops are generated: suffixes of names, with versions of elementary functions.
 
-        There are a small-argument and a full-range form if one of the ``loops`` needs both. Without ``rows`` there is
-        one form.
+        There is a form for small arguments and a form for all arguments, if one of the ``loops`` calls a function that
+        needs both. Without ``rows`` there is a single form.
         """
         if rows is None:
             return {"": self.versions}
         return forms_of(loops, rows.small_argument, rows.limited, self.versions)
 
     def after_passes(self, loop: ir.Function, form: str, versions: Mapping[str, str]) -> Iterator[ir.Function]:
-        """Yield the loop after the passes over sites. Fast code has a second loop, for sites near open ends."""
+        """Yield the loop after the passes on the level of sites. Fast code has a second loop, for sites near open
+        ends.
+        """
         doc = "as above, with full-range functions" if form == "_far" else loop.doc
         loop = replace(loop, name=loop.name + form, doc=doc)
         for part in divided_at_ends(loop) if self.fast else [loop]:
             yield calling(simultaneous(temporaries(part)), versions)
 
     def sweep(self, sweep: Sweep, form: str, versions: Mapping[str, str]) -> list[ir.Function]:
-        """Return the loops that update some fields of the sites of a row, or their variation."""
+        """Return the loops of a sweep, which update some fields of the sites of a row, or the variations of these
+        fields.
+        """
         loops = self.after_passes(self.sites.sweep(sweep), form, versions)
         compensated = self.program.compensated
         return [row_loops.sweep(loop, self.layout, passed=not self.fast, compensated=compensated) for loop in loops]
 
     def stage(self, kernel: Kernel, form: str, versions: Mapping[str, str], *, adds: bool) -> list[ir.Function]:
-        """Return the loops of a kernel of a stage, which assign or add to the arrays of the row."""
+        """Return the loops of a kernel of a stage, which assign their results to the arrays of the row, or add them if
+        ``adds``.
+        """
         fields = self.program.coordinates
         outputs = [Symbol("out", f) for f in fields]
         if kernel.role is Role.OWN_SLOPE:
@@ -129,7 +146,7 @@ class RowLoops:
     def sums(self, gather: Gather | None, *, swept: bool = False) -> Iterator[ir.Function]:
         """Yield the loops that sum over all bonds of a site, or its pairs with other sites.
 
-        Sums that a sweep reads (``swept``) may have further arguments, see `bond_arguments`.
+        If a sweep reads the sums (``swept``), the loops may have additional arguments, see `bond_arguments`.
         """
         partners = self.layout.partners
         of_parts = [sums for _, sums in partners.of_parts]
@@ -141,10 +158,10 @@ class RowLoops:
             yield over or row_loops.over_pairs(one, self.layout)
 
     def bond_arguments(self, ends: Ends, oriented: frozenset[str]) -> tuple[str, ...]:
-        """Return additional arguments of short loops over bonds, with which several parts of H can share a loop.
+        """Return the additional arguments of a loop over bonds, in short code where several parts of H share this loop.
 
-        The arguments are the address of the parameters at bonds, the sign of the direction of bonds, and whether the
-        sites of the chosen colour are at the other end of the bonds.
+        They are the arrays of parameters at bonds, the direction in which bonds are read (1 or −1), and a flag: whether
+        the sites of the chosen colour are at the opposite ends of bonds.
         """
         if self.fast or self.layout.step.adjoint or not self.layout.graph:
             return ()
@@ -159,9 +176,9 @@ class RowLoops:
     def transposed_sums(
         self, ends: Ends, oriented: frozenset[str], kernel: Kernel, first: int, *, summed: bool
     ) -> Iterator[ir.Function]:
-        """Yield the transposes of loops that sum over bonds or pairs; see `transposed_at_ends`.
+        """Yield the transposes of a loop that sums over bonds or pairs, one for each end; see `transposed_at_ends`.
 
-        The cotangents of the sums are in the arrays numbered from ``first`` on.
+        The cotangents of the sums are in the arrays with numbers from ``first`` on.
         """
         places = self.layout.step.sites.ends
         for end, bonds, transpose in transposed_at_ends(places, ends, oriented, kernel, summed=summed):
@@ -181,7 +198,8 @@ class RowLoops:
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function that fills arrays over the sites with the values of a kernel.
 
-        Sums over bonds or pairs are computed before or, if nothing else needs them, at each site.
+        Sums over bonds or pairs are computed for all sites before. If nothing else needs these sums, each site computes
+        its own.
         """
         gather, several = self.layout.partners.sums_of(kernel), kernel.role is Role.OBSERVABLES
         apart = ir.Constant(share(kernel)) if several else row_loops.SITES

@@ -1,4 +1,4 @@
-"""Lattices in C: the public declarations, and the tables that the runtime reads."""
+"""Lattices in C: public declarations, and tables that the runtime reads."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from phigen.targets.header import plain
 
 
 def declarations(program: Program, step: Sweeps) -> str:
-    """Return the public declarations: sizes and parameters."""
+    """Return the text of the public declarations: sizes and the parameter struct."""
     member, layout = members(program), layout_of(program, step)
     listed = [_declared(p, member[p.name]) for p in program.parameters]
     arrays = len(layout.lattice.arrays)
@@ -73,12 +73,12 @@ def declarations(program: Program, step: Sweeps) -> str:
 
 
 def _differences(program: Program) -> int:
-    """Return the number of differences of y − x in the predictor of a stage."""
+    """Return the number of past differences of y − x from which the predictor of a stage extrapolates."""
     return max(1, min(LatticeSweepPolicy().differences, MOST_REMEMBERED // len(program.fractions)))
 
 
 def _gathered(layout: Layout) -> int:
-    """Return the number of sums over bonds or pairs that are stored for all sites."""
+    """Return the number of sums over bonds or pairs that a solver stores for all sites."""
     partners, swept = layout.partners, [sweep.gather for sweep in layout.step.sweeps if sweep.gather]
     seen = () if layout.sums_up else partners.gathers
     return max([1, *(len(g.names) for g in (*swept, *seen))])
@@ -97,14 +97,14 @@ def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
         stage = stage * dimension + has["KRYLOV"]  # plus an array for sums over row segments
     fields = dimension + 2 * dimension * has["COMPENSATED"]  # the state before a step, and compensation terms
     fields += bool(layout.step.sites.seams)  # plus an array for the kinds of sites
-    fields += 2 * has["MONITOR"]  # plus arrays for densities and the clock
+    fields += 2 * has["MONITOR"]  # plus arrays for densities and for the clock
     if layout.step.relative and has["JACOBI"]:  # positions relative to the first body, and their variations
         fields += len(layout.step.relative.axes) * (1 + layout.program.extras.tangent)
     return len(layout.lattice.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
 
 
 def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
-    """Return the members of the struct of derivatives with respect to parameters."""
+    """Return the members of the struct that holds derivatives with respect to parameters."""
     declared = [f"double {'*' * (p.at != 'all')}{member[p.name]};" for p in program.parameters]
     return declared or ["char unused;"]
 
@@ -112,16 +112,18 @@ def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
 def rows_of(step: Sweeps) -> int:
     """Return the number of rows of coefficients.
 
-    There is one row for each flow. If the last flow is merged with the first of the next step, there is one more.
+    There is one row for each flow of a step. There is one more row if the last flow of a step is merged with the first
+    flow of the next step.
     """
     return len(step.schedule.times) if step.equation else len(_flows(step))
 
 
 def _flows(step: Sweeps) -> list[tuple[int, int]]:
-    """Return the flows of a step.
+    """Return the flows for which there are coefficients, as pairs (part, row of the schedule).
 
-    Without noise, the first flow occurs once more, merged with the last flow of the step before. With noise, flows are
-    not merged, since each has different increments. Flows before and after a run come last.
+    Without noise, the first flow occurs once more at the end, for the merger of the last flow of a step with the first
+    flow of the next step. With noise, flows are not merged, since each flow has its own increments. Flows before and
+    after a run come last.
     """
     flows = step.schedule.flows
     if step.corrected:
@@ -130,7 +132,9 @@ def _flows(step: Sweeps) -> list[tuple[int, int]]:
 
 
 def _by_flow(step: Sweeps, values: Sequence[float], joined: float) -> list[float]:
-    """Return the values of the rows of the schedule for each flow; the last one, ``joined``, is for merged flows."""
+    """Return ``values``, which the schedule has by rows, for each flow of `_flows`; the merged flow gets the value
+    ``joined``.
+    """
     by_flow = [values[row] for _, row in _flows(step)]
     return by_flow if step.sites.increments or step.corrected else [*by_flow[:-1], joined]
 
@@ -148,7 +152,7 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
 
 
 def model(program: Program, step: Sweeps) -> str:
-    """Return the tables, and the functions that are called before the steps."""
+    """Return the text of the tables, and of the functions that are called before the first step."""
     layout = layout_of(program, step)
     has = switches(layout)
     values = {
@@ -227,8 +231,7 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
 
 
 def _tables_of_sites(layout: Layout, has: Mapping[str, bool]) -> dict[str, object]:
-    """Return the tables that are the same in all steps: the shape of the lattice, the neighbours that kernels read,
-    the sweeps."""
+    """Return the tables that are the same in all steps: the shape of the lattice, neighbours of sites, and sweeps."""
     step, sites, several, fields = layout.step, layout.step.sites, not layout.single_row, layout.program.coordinates
     stages = [_braced(step.stage(k, fields)) for k in range(len(step.parts))] if has["BY_HAND"] else []
     return {
@@ -250,7 +253,7 @@ def _tables_of_sites(layout: Layout, has: Mapping[str, bool]) -> dict[str, objec
 
 
 def _tables_of_flows(step: Sweeps) -> dict[str, object]:
-    """Return the tables with an entry for each flow."""
+    """Return the tables that have an entry for each flow, as template values."""
     schedule = step.schedule
     joined = schedule.times[schedule.flows[0][1]] + schedule.times[schedule.flows[-1][1]]
     multiples = _by_flow(step, schedule.multiples, schedule.multiples[0]) if schedule.multiples else ()
@@ -265,14 +268,17 @@ def _tables_of_flows(step: Sweeps) -> dict[str, object]:
 
 
 def _moments(step: Sweeps) -> list[float]:
-    """Return the times at which time-dependent coefficients are evaluated, as fractions of the step, one for each
-    row."""
+    """Return the times at which coefficients that depend on the time are evaluated, one for each row of coefficients.
+
+    They are in units of the step, from the start of the step.
+    """
     return _by_flow(step, step.schedule.moments, 0.0)
 
 
 def _reduction(reduction: Reduction) -> tuple[int, int]:
-    """Return the codes in the runtime for the reduction of an observable, and for the set over which a mean is
-    taken."""
+    """Return the codes that the runtime has for a reduction, such as a sum, and for the set over which a mean is
+    taken.
+    """
     return REDUCTIONS.index(reduction.kind), OVER.index(reduction.over)
 
 

@@ -1,4 +1,4 @@
-"""The sweeps of a step of a lattice in C: the loops over sites of each part, and the functions that call them."""
+"""The sweeps of a step of a lattice in C: loops over the sites for each part of H, and the functions that call them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,9 @@ from phigen.targets.c.loops import commented
 
 
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
-    """Return all kernels as loops over sites, and the functions that make the flow of each part of H."""
+    """Return the text of all kernels as loops over sites, and of the functions that apply the flow of each part of
+    H.
+    """
     layout = layout_of(program, step)
     loops, equation = RowLoops(layout), step.equation
     texts = [
@@ -71,14 +73,14 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
 
 
 def parameters(program: Program, step: Sweeps) -> str:
-    """Return the functions that copy parameters at sites and bonds to the arrays that loops read."""
+    """Return the text of the functions that copy parameters at sites and bonds to the arrays that loops read."""
     arrays = layout_of(program, step).lattice.arrays
     listed = copies(program.parameters, members(program), arrays, step.sites.at_bonds)
     return "".join(commented(copy, program) + "\n" for copy in listed)
 
 
 def drivers(loops: RowLoops) -> RowDrivers:
-    """Return the builder of the row drivers of a lattice."""
+    """Return the builder of the row drivers of a lattice; see `phigen.ir.row_drivers`."""
     by_hand = switches(loops.layout)["BY_HAND"]
     return RowDrivers(loops.layout, loops.layout.halo, may_be_empty=by_hand, one_loop=not loops.fast)
 
@@ -87,9 +89,10 @@ def drivers(loops: RowLoops) -> RowDrivers:
 class _Call:
     """Call of a loop for some sites of a row segment.
 
-    The loop reads the fields in the ``order``, and the parameters at bonds in the order ``bonds``, if these are not
-    empty. The record of the segment receives the ``colour`` and the first kind of the ``window`` of a sweep. ``shared``
-    is the name of the loop if several parts of H call it; ``others`` are equivalent loops.
+    If ``order`` or ``bonds`` is not empty, the loop reads the fields, or the parameters at bonds, in this order. Before
+    the call, the record of the segment receives the ``colour`` of the sweep, and the first kind of site in its
+    ``window``. ``shared`` is the name of the loop if several parts of H call it. ``others`` are calls that may replace
+    this one.
     """
 
     loop: ir.Function
@@ -103,14 +106,14 @@ class _Call:
     others: tuple[_Call, ...] = ()
 
 
-#: The calls of the flow of a part of H, by form of functions.
+#: The calls that apply the flow of a part of H, by the form of elementary functions (`phigen.ir.passes.forms`).
 Calls = dict[str, list[_Call]]
 Names = Mapping[tuple[tuple[str, ...], ir.Block], str]
 
 
 @dataclass(frozen=True)
 class _PartLoops:
-    """The loops and drivers of all parts of H; without ``rows`` they are those of derivatives."""
+    """The loops and row drivers of all parts of H. Without ``rows``, they are those of the derivatives of flows."""
 
     loops: RowLoops
     rows: Rows | None
@@ -118,16 +121,16 @@ class _PartLoops:
 
     @property
     def varied(self) -> bool:
-        """Whether the parts update variations of fields."""
+        """Whether the parts update variations of fields, not the fields."""
         return self.rows is None
 
     @property
     def by_part(self) -> bool:
-        """Whether each part has a separate driver, which is faster for short rows."""
+        """Whether each part has its own row driver. This is faster for short rows."""
         return self.loops.fast and not self.loops.layout.single_row and not self.varied
 
     def texts(self) -> Iterator[str]:
-        """Yield the loops and the drivers; loops of equal code are printed once."""
+        """Yield the text of the loops and of the row drivers. Loops with equal code are printed once."""
         program, layout, step = self.loops.program, self.loops.layout, self.loops.layout.step
         calls_of_parts = [self._calls_of_part(part) for part in self.parts]
         alike = _alike(calls_of_parts)
@@ -163,7 +166,11 @@ class _PartLoops:
         yield commented(build.driver(name, title, parameters, cases, threads=threads), program)
 
     def _gathering(self, remainder: int, threads: int) -> str:
-        """Return the driver of the sums over pairs of bodies in relative coordinates, for ``driver(threads=…)``."""
+        """Return the text of the row driver for sums over pairs of bodies in relative coordinates.
+
+        ``remainder`` is the index of the part of H that reads the sums. The driver uses several threads for more than
+        ``threads`` sites, unless this is 0.
+        """
         layout, program = self.loops.layout, self.loops.program
         gathers = [sweep.gather for sweep in self.parts[remainder] if sweep.gather]
         calls = tuple(ir.Call(e.kernel.name, (COEF, SEGMENT)) for gather in gathers for e in gather.ends)
@@ -177,9 +184,9 @@ class _PartLoops:
         return commented(drivers(self.loops).driver(name, title, parameters, [case], threads=threads), program)
 
     def _calls_of_part(self, part: Sequence[Sweep]) -> Calls:
-        """Return the calls for a row segment that make the flow of a part of H, for each form.
+        """Return the calls that apply the flow of a part of H to a row segment, for each form of elementary functions.
 
-        Short code uses one loop for several orders of the fields.
+        In short code, one loop serves for several orders of the fields.
         """
         layout, program = self.loops.layout, self.loops.program
         forms = self.loops.forms(self.rows, [self.loops.sites.sweep(sweep) for sweep in part])
@@ -189,7 +196,8 @@ class _PartLoops:
             calls_of_forms[form] = []
             for sweep in part:
                 calls = [*self._calls(sweep, form, versions)]
-                # transposes gather with separate loops
+                # Loops with sums are not shared in this way if there are transposes, which have separate loops for
+                # sums.
                 for order in () if sweep.gather and layout.step.adjoint else tried:
                     other = turned(layout.step.sites, fields, order, sweep)
                     for k, call in enumerate(self._calls(other, form, versions) if other else ()):
@@ -199,7 +207,7 @@ class _PartLoops:
         return calls_of_forms
 
     def _calls(self, sweep: Sweep, form: str, versions: Mapping[str, str]) -> Iterator[_Call]:
-        """Yield the calls of the loops of a sweep, in their order in a row segment."""
+        """Yield the calls of the loops of a sweep, in the order in which a row segment executes them."""
         layout, program = self.loops.layout, self.loops.program
         meant = over_ends(sweep.gather) if sweep.gather else []
 
@@ -231,12 +239,14 @@ class _PartLoops:
             yield _Call(loop, sites, colour=colour, window=window, shared=shared + end)
 
     def _segment(self, k: int, forms: Mapping[str, Sequence[_Call]], names: Names) -> RowSegment:
-        """Return the statements of a part of H; ``names`` are the names of loops by their code."""
+        """Return the statements that apply the flow of part ``k`` to a row segment; ``names`` has the names of loops by
+        their code.
+        """
         layout, coloured = self.loops.layout, self.loops.layout.step.by_colour
         setup = [row_drivers.member("varied", ir.fixed("v"))] * self.varied
         setup += [row_drivers.member("chosen", row_drivers.FLOW)] * bool(coloured and coloured[k])
         near = [*_near_seams(layout, self.parts[k])] if self.by_part else []
-        if layout.step.relative:  # separate drivers compute the sums
+        if layout.step.relative:  # separate row drivers compute the sums
             names_of_sums = {e.kernel.name for s in self.parts[k] if s.gather for e in s.gather.ends}
             forms = {f: [c for c in called if c.loop.name not in names_of_sums] for f, called in forms.items()}
         calls = [call for called in forms.values() for call in called]
@@ -249,9 +259,9 @@ class _PartLoops:
 
 
 def _alike(calls_of_parts: Sequence[Calls]) -> dict[tuple[tuple[str, ...], ir.Block], list[_Call]]:
-    """Return the calls of all loops, by the code that is printed for the loops.
+    """Return the calls of all loops, by the code of the loop.
 
-    A call of a loop that another loop can replace becomes a call of that loop.
+    If a loop can be replaced by a loop that is there already, its call is replaced by a call of that loop.
     """
     alike: dict[tuple[tuple[str, ...], ir.Block], list[_Call]] = {}
     for calls_of_forms in calls_of_parts:
@@ -265,13 +275,15 @@ def _alike(calls_of_parts: Sequence[Calls]) -> dict[tuple[tuple[str, ...], ir.Bl
 
 
 def _place(numbered: tuple[int, _Call]) -> tuple[str, bool]:
-    """Return the sort key of a loop in the code: a loop for sites near open ends follows that for other sites."""
+    """Return the sort key of a loop in the file: a loop for sites near open ends comes after the loop for other
+    sites.
+    """
     name = numbered[1].loop.name
     return name.removesuffix(NEAR_ENDS), name.endswith(NEAR_ENDS)
 
 
 def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[ir.Statement]:
-    """Yield the statements that skip rows and sites away from the seams at which the terms of a part begin."""
+    """Yield the statements that skip rows and sites away from the seams on which the terms of a part begin."""
     window, last = max((s.window or 0 for s in part), default=0), len(layout.step.sites.axes) - 1
     rows, near = ir.Constant(window & ~(1 << last)), ir.Member(ROW, "near")
     if rows.value:
@@ -281,7 +293,7 @@ def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[ir.Statement]
 
 
 def _statements(called: Sequence[_Call], names: Names) -> Iterator[ir.Statement]:
-    """Yield the statements that call loops, each with the fields in the order of the loop."""
+    """Yield the statements that call loops. Before a call, the record of the segment receives what the loop reads."""
     order: tuple[str, ...] = ()
     colour: int | None = 0
     window: int | None = 0
@@ -301,14 +313,14 @@ def _statements(called: Sequence[_Call], names: Names) -> Iterator[ir.Statement]
 
 
 def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of the parameters at bonds in other orders."""
+    """Yield the declarations of arrays of the parameters at bonds in other orders."""
     listed = layout.step.sites.at_bonds
     for order in dict.fromkeys(order for order in used if order):
         yield _arrays(order, [ir.entry(ir.Member(S, "at_bonds"), listed.index(p)) for p in order])
 
 
 def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of the arrays over the sites with the fields in other orders."""
+    """Yield the declarations of arrays over the sites with the fields in other orders."""
     for order in dict.fromkeys(order for order in used if order):
         increments = turned_increments(layout.step.sites, layout.lattice.arrays, order)
         other = {**dict(zip(layout.lattice.arrays, order, strict=False)), **increments}
@@ -321,11 +333,11 @@ def _arrays(order: tuple[str, ...], arrays: Sequence[ir.Value]) -> ir.Declare:
 
 
 def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[tuple[ir.Function, row_drivers.Sites]]:
-    """Return the loops, each with the sites for which it is called; a loop may occur twice.
+    """Return the loops with the sites for which each is called. A loop may occur twice.
 
-    Without open ends there is one loop, for all sites. With boundary seams it is for the sites away from them, or for
-    those near them at both ends of a row. With open ends there may be two loops: for sites away from the ends, and for
-    sites near them.
+    Without open ends there is one loop, for all sites. If a sweep is restricted by boundary seams, the loop is called
+    for the sites away from seams, or twice for the sites near seams at both ends of a row. With open ends there may be
+    two loops: one for sites away from the ends, and one for sites near them.
     """
     if sweep and beside_seams(sweep):
         return [(loops[0], sites) for sites in ((AWAY,) if sweep.inside else (FIRST_SITES, LAST_SITES))]
@@ -336,9 +348,9 @@ def calls_of(loops: Sequence[ir.Function], sweep: Sweep | None = None) -> list[t
 
 
 def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end: Kernel | None = None) -> Iterator[str]:
-    """Yield the loops and the driver of a kernel of the equation of a stage.
+    """Yield the text of the loops, and of the row driver, of a kernel of the implicit equation of a stage.
 
-    The driver of the equation also makes the ``end`` of a stage, which updates x.
+    The driver of the equation also applies the kernel ``end``, which updates x at the end of a stage.
     """
     program, layout = loops.program, loops.layout
     adds, varied = kernel.role is Role.FOLLOW, kernel.reads_variations
