@@ -47,9 +47,9 @@ def _definition(name: str, text: str) -> str:
 
 
 STAGES = Choice(
-    "With one stage, code has no loop over stages, no array of one, and no argument for it. OF is a place in an array,"
-    " and with STAGES its declaration; IN and TO go from a pointer to the first of several structs, which ADDRESS makes"
-    " of their array.",
+    "If a step has one stage, code has no loop over stages, no arrays over stages, and no argument for the stage."
+    " OF(array, stage) is an entry of an array over stages, or declares the array. ADDRESS points to the first of its"
+    " structs; IN and TO lead from this pointer to a member of the struct of a stage, and to this struct.",
     ("COMPOSED",),
     {
         "EACH_STAGE": ("for (int stage = 0; stage < PHI_STAGES; ++stage)", ""),
@@ -77,19 +77,20 @@ STAGES = Choice(
 )
 
 SWEPT = Choice(
-    "The corrections of the stages of a step are solved for by a sweep over them.",
+    "If a block is solved by a sweep over the stages of each step: the matrix that passes corrections to the next"
+    " stage.",
     ("SWEPT",),
     {"TURN_OF_BLOCK": ("phi_lanes turn[PHI_DIM * PHI_DIM];", ""), "AND_TURN": (", turn", "")},
 )
 
 ORDERS = Choice(
-    "The error of half of an increment, as a power of the size of a stage.",
+    "The error of half an increment of a stage is proportional to this power of the size c of the stage.",
     ("CENTRED",),
     {"POWER_OF_STAGE(c)": ("c * c * c", "c * c")},
 )
 
 VALUES = Choice(
-    "The value of the unknown of a stage in the step that was made last, and the arguments of its predictor.",
+    "The solution of a stage in the last step, from which predictors start, and an argument of predictors.",
     ("RECURRENCES", "PREDICTED"),
     {
         "LAST_VALUE": (
@@ -106,7 +107,7 @@ VALUES = Choice(
 LATTICE_TIME = "s->t_before_h + (double)(steps - s->steps_before_h) * s->h"
 
 TIME = Choice(
-    "H depends on the time, which functions of the model and starts of runs then receive.",
+    "If H depends on the time: the time as an argument of functions of the model, and at the start of runs.",
     ("TIMED",),
     {
         "AND_T(t)": (", t", ""),
@@ -126,19 +127,20 @@ TIME = Choice(
 )
 
 PASSING = Choice(
-    "Steps of a lattice are equal in tau, and it sums up the physical time of its flows.",
+    "The time of a lattice. With a monitor, steps are equal in tau, and a clock adds up the physical times of the"
+    " flows.",
     ("MONITOR",),
     {"TIME_AFTER(s, steps)": ("s->clock[0] + s->clock[1]", LATTICE_TIME)},
 )
 
 LATE = Choice(
-    "Coefficients of a lattice read how late a flow is along a tangent vector, where its time depends on the state.",
+    "With a monitor, the duration of a flow varies along a tangent vector; coefficients without variation receive 0.",
     ("LATE",),
     {"AND_ON_TIME": (", phi_on_time", "")},
 )
 
 GAUGE = Choice(
-    "A trajectory holds a gauge fixed, which coefficients depend on.",
+    "If the coefficients of a trajectory depend on its gauge, which is constant: arguments and copies of the gauge.",
     ("GAUGE",),
     {
         "AND_GAUGE(gauge)": (", gauge", ""),
@@ -152,7 +154,8 @@ GAUGE = Choice(
 )
 
 LEVEL = Choice(
-    "Steps are equal in tau: the energy level e has a derivative, and the time of a step depends on the state.",
+    "With a monitor, steps are equal in tau. The physical time of a step depends on the state, and derivatives by the"
+    " energy level e are computed.",
     ("MONITOR",),
     {
         "AND_DOUBLE(e_bar)": (", double *e_bar", ""),
@@ -175,7 +178,7 @@ LEVEL = Choice(
 )
 
 OWN = Choice(
-    "Each member of an ensemble has a start of its own in time, or a gauge.",
+    "The initial time of each member of an ensemble, or its gauge.",
     ("TIMED", "GAUGE"),
     {
         "OWN_POINTER": ("const double *t0,", "const double *gauge,", ""),
@@ -193,7 +196,7 @@ OWN = Choice(
 )
 
 NOISE = Choice(
-    "Noise is drawn once in a step; a run receives the numbers that select its random numbers.",
+    "With noise, increments are drawn once in a step; a run receives the seed and the numbers of member and step.",
     ("NOISE",),
     {
         "AND_DW(dw)": (", dw", ""),
@@ -206,7 +209,7 @@ NOISE = Choice(
 )
 
 PARAMETERS = Choice(
-    "A solver starts with parameters that the model allows, and whose coefficients are finite.",
+    "The check of parameters at the start: the model allows them, and all coefficients are finite.",
     ("PARAMETERS",),
     {
         "TRY_PARAMETERS(s)": ("phi_prepare(&s.params PHI_AND_GAUGE(s.gauge), PHI_PROBE_STEP, PHI_OF(s.coef, 0));", ""),
@@ -226,25 +229,26 @@ PARAMETERS = Choice(
 )
 
 UNUSED_PARAMETERS = Choice(
-    "Nothing depends on parameters, so that there are no derivatives by them.",
+    "If nothing depends on parameters, derivatives by parameters are an unused argument.",
     ("PARAMETERS || MONITOR",),
     {"NO_PARAMETERS(bar)": ("", "(void)bar;")},
 )
 
 UNUSED_GROUP = Choice(
-    "A gauge is of no use to derivatives by parameters, if there are none.",
+    "If there is a gauge but no parameter, the reverse pass of a group of members does not read the group.",
     ("GAUGE && !PARAMETERS && !MONITOR",),
     {"NO_GROUP(group)": ("(void)group;", "")},
 )
 
 KICKS = Choice(
-    "Flows of a splitting whose coefficients depend on h squared too.",
+    "If coefficients of the flows of a splitting also depend on the square of h: the multiple of the square as an"
+    " argument.",
     ("KICKS",),
     {"KICK(k, h)": ("const double kick[1] = { phi_multiples[k] * (h * h) };", ""), "AND_KICK": (", kick", "")},
 )
 
 TAPE = Choice(
-    "What the tape of the reverse pass has of a step, and how the pass goes through a step.",
+    "What one step writes to the tape of the reverse pass, and the call of the reverse pass of one step.",
     ("SPLITTING", "GAUSS"),
     {
         "RECORD_OF_STEP": (
@@ -277,19 +281,19 @@ PACKS = Choice(
 )
 
 RECOMPUTED = Choice(
-    "The reverse pass recomputes states by inverse flows, in segments of at least 16 steps.",
+    "If the reverse pass recomputes states by inverse flows, a segment between checkpoints has at least 16 steps.",
     ("RECOMPUTED",),
     {"STEPS_OF_SEGMENT(steps)": ("16 + steps", "steps")},
 )
 
 RENEWED = Choice(
-    "Coefficients depend on the time of a stage.",
+    "If coefficients depend on the time: the time in the middle of the stage in each lane.",
     ("RENEWED",),
     {"NOTE_TIME_OF_LANE(g, at)": ("g->t[lane] = at->t + PHI_OF(phi_middles, stage) * at->h;", "")},
 )
 
 PATHS = Choice(
-    "Stages are paths, whose reverse pass begins where the forward one ended.",
+    "If stages are paths, the reverse pass of a path begins at the state where the path ended.",
     ("PATH",),
     {
         "NOTE_START(bar, g)": ("bar->end[i] = g->start[i][lane];", ""),
@@ -298,7 +302,7 @@ PATHS = Choice(
 )
 
 GAINS = Choice(
-    "Corrections of the increments of a block, which sparse elimination has found already.",
+    "The corrections of the increments of a block of steps. Sparse elimination has computed them already.",
     ("SPARSE",),
     {
         "GAIN(model)": ("", "phi_lanes gained[PHI_DIM]; phi_gain(model, model->residual, gained);"),
@@ -307,8 +311,8 @@ GAINS = Choice(
 )
 
 RUN = Choice(
-    "The function that makes steps one by one, with its last argument: increments of the noise, or where the states"
-    " before the flows of each step go.",
+    "The function that makes steps one by one. Its last argument are the increments of the noise, or the tape for the"
+    " states before all flows.",
     ("BLOCKS", "NOISE", "SPLITTING && ADJOINT"),
     {
         "RUN": (
@@ -328,7 +332,7 @@ RUN = Choice(
 )
 
 STEP = Choice(
-    "One step of a run. That of a method with one explicit stage is written out.",
+    "One step of a run, and what happens after it. If the method has one explicit stage, the step is written in place.",
     ("EXPLICIT && !COMPOSED", "CORRECTED && ADJOINT", "SPLITTING && ADJOINT", "COMPOSED || SPLITTING"),
     {
         "NAME_INCREMENT": ("double increment[PHI_DIM];", *[""] * 4),
@@ -350,8 +354,8 @@ STEP = Choice(
 )
 
 CORRECTORS = Choice(
-    "The tape of a step has the flows of a run of one step; the reverse pass goes through those of a corrector at the"
-    " ends of runs, which are where rows are.",
+    "With correctors, the tape of a step has room for the flows before and after a run. The reverse pass goes through"
+    " these flows at the rows of a run, where correctors were applied.",
     ("CORRECTED && ADJOINT",),
     {
         "AND_TAPE": (", tape", ""),
@@ -372,7 +376,7 @@ CORRECTORS = Choice(
 )
 
 ENDS = Choice(
-    "What is done before the first step of a run, and after the last, with its status: correctors, and the attitude.",
+    "What a run does before its first step and after its last step: correctors, and the update of the public attitude.",
     ("CORRECTED", "ATTITUDE && !BLOCKS"),
     {
         "BEFORE_RUN": ("const phi_solver before = *s;", "", ""),
@@ -396,7 +400,7 @@ CHAPTERS = Choice(
 )
 
 ATTITUDE = Choice(
-    "The body turns by the Casimirs taken from H too.",
+    "If Casimirs are subtracted from H, the attitude has an additional rotation, the gauge rotation.",
     ("RATE_OF_GAUGE",),
     {
         "AND_ASIDE(pointer)": (", PHI_AT_FIRST(pointer)", ""),
@@ -406,13 +410,13 @@ ATTITUDE = Choice(
 )
 
 POSITION = Choice(
-    "A body has a position beside its attitude.",
+    "If the state of motion of a body includes its position: the position as an argument.",
     ("POSITION",),
     {"AND_POSITION(position)": (", position", "")},
 )
 
 FRAME = Choice(
-    "Momenta are constant in space or in the body; the product of the factors of steps grows on the other side.",
+    "The order of products of group elements. It depends on whether momenta are in space or in body coordinates.",
     ("SPATIAL",),
     {
         "INTO_CONSTANT_FRAME(q, element)": (
@@ -434,7 +438,8 @@ ASIDE = Choice(
 )
 
 SIDES = Choice(
-    "What a factor, given less 1, adds to an element of a group: one of a step, and one from the other side.",
+    "The change of a group element by a factor, which is passed minus 1: the factor of a step, and the factor of the"
+    " gauge rotation, which is on the opposite side.",
     ("POSITION && SPATIAL", "POSITION", "SPATIAL"),
     {
         "ADDED_FACTOR(element, factor, change)": (
@@ -453,7 +458,8 @@ SIDES = Choice(
 )
 
 ROWS = Choice(
-    "The row of a lattice that r is the number of, or that a piece is of. One row has no number and no place.",
+    "The row of a lattice with the number r, or the row of a segment. A lattice of a single row needs no number and no"
+    " offset.",
     ("ONE_ROW",),
     {
         "EACH_ROW": ("", "for (size_t r = 0; r < s->rows; ++r)"),
@@ -469,7 +475,7 @@ ROWS = Choice(
 )
 
 HALO = Choice(
-    "What lies beside the sites of a row: nothing, where no site reads of others along it.",
+    "The halo beyond the ends of a row. There is none if sites read no neighbours along the row.",
     ("HALO",),
     {
         "MEMORY_OF(first)": ("first - PHI_LEAD", "first"),
@@ -484,19 +490,19 @@ HALO = Choice(
 )
 
 WIDTH = Choice(
-    "The doubles of a row, of which those of the sites are a multiple of 8.",
+    "The number of doubles of a row, with its halo; sites and halo after them are rounded up to a multiple of 8.",
     ("HALO",),
     {"WIDE(sites)": ("PHI_LEAD + (sites + PHI_HALO + 7) / 8 * 8", "sites")},
 )
 
 COLOURS = Choice(
-    "Sizes of lattices that are multiples of the periods of their colours.",
+    "The check that sizes of a lattice are multiples of the periods of its colours.",
     ("PERIODIC_COLOURS",),
     {"OR_MISFIT(a)": ("|| sizes[a] % phi_periods[a] != 0", "")},
 )
 
 GRAPHS = Choice(
-    "The sites of a graph are connected by bonds.",
+    "If the lattice is a graph: its bonds as arguments, and their checks.",
     ("GRAPH",),
     {
         "SIZES": ("const size_t sizes[PHI_AXES], const phi_bonds *bonds", "const size_t sizes[PHI_AXES]"),
@@ -510,13 +516,13 @@ GRAPHS = Choice(
 )
 
 TABLES = Choice(
-    "The bytes of tables beside the fields: of bonds, or of the rows beside each row.",
+    "The bytes of tables in the memory of a lattice: of bonds, or of the neighbouring rows of each row.",
     ("GRAPH", "!ONE_ROW"),
     {"AND_TABLES": ("+ phi_graph_size(sizes[0], bonds)", "+ rows * PHI_LINES * sizeof(ptrdiff_t)", "")},
 )
 
 MATRIX = Choice(
-    "The equation of a stage is solved by elimination, in a matrix.",
+    "If the equation of a stage is solved by elimination: the memory for the matrix.",
     ("BANDED",),
     {
         "AND_MATRIX(sites)": ("+ phi_matrix_size(sites)", ""),
@@ -525,19 +531,19 @@ MATRIX = Choice(
 )
 
 JOINED = Choice(
-    "Steps of flows are joined: what is behind the last flow of a step may stay open.",
+    "In a splitting, the last flow of a step is merged with the first flow of the next step; here no flow is pending.",
     ("SERIES",),
     {"NOT_OPEN(s)": ("", "s->open = 0;"), "NOT_FAR(s)": ("", "s->far = 0;")},
 )
 
 MOMENTA = Choice(
-    "Bodies have momenta, from which velocities follow if there is a mass.",
+    "If bodies have momenta, velocities follow only for masses above 0.",
     ("MOMENTA",),
     {"OR_NO_MASS(mass)": ("|| !(mass > 0.0)", "")},
 )
 
 FAR = Choice(
-    "Whether arguments of functions may be large, where functions have another form for them.",
+    "If functions have versions for small arguments: the flag far, which is 1 if arguments may be large.",
     ("NEAR",),
     {
         "AND_FAR(far)": (", far", ""),
@@ -547,8 +553,8 @@ FAR = Choice(
 )
 
 MEMORY = Choice(
-    "Arrays, and the parameters by default. Languages of devices have no functions for memory, tables in another"
-    " address space, and no pointer to the defaults. COPY copies a number of entries, in C the size of an array.",
+    "Copies of arrays, tables, and the default parameters. Languages for devices have no functions for memory, have"
+    " tables in another address space, and have no pointer to the defaults.",
     ("DEVICE",),
     {
         "COPY(to, from, array, count)": ("phi_copy(to, from, count)", "memcpy(to, from, sizeof array)"),
@@ -578,7 +584,7 @@ MEMORY = Choice(
 )
 
 DEVICE_STARTS = Choice(
-    "Members of an ensemble on a device have a start of their own in time, or a gauge.",
+    "The initial time of each member of an ensemble on a device, or its gauge.",
     ("TIMED", "GAUGE"),
     {
         "OWN_STARTS": (
@@ -596,7 +602,8 @@ DEVICE_STARTS = Choice(
 )
 
 DEVICE_COEFFICIENTS = Choice(
-    "The coefficients of a step. On a device they may be those of all members, which the kernel then receives.",
+    "The coefficients of a step. On a device, all members may share coefficients, which are then an argument of the"
+    " kernel.",
     ("COMMON",),
     {
         "COEFFICIENTS_OF(s)": ("phi_COEF_OF(s)", "s->coef"),
@@ -607,7 +614,7 @@ DEVICE_COEFFICIENTS = Choice(
 )
 
 COMMON_GAUGE = Choice(
-    "The gauge of all members on a device.",
+    "The gauge that all members on a device have, as an argument.",
     ("GAUGE",),
     {
         "GAUGE_ARGUMENT": ("PHI_GLOBAL const double *gauge, ", ""),
@@ -622,7 +629,7 @@ DEVICE_NOISE = Choice(
 )
 
 DEVICE_MEMORY = Choice(
-    "Shared memory of a device that the predictors of a work item use.",
+    "The shared memory of a device in which the predictors of members are stored.",
     ("PREDICTED && !GAUSS",),
     {
         "LENT_MEMORY": ("PHI_SHARED_ARRAY double memory[PHI_LENT * PHI_GROUP];", ""),
@@ -631,13 +638,14 @@ DEVICE_MEMORY = Choice(
 )
 
 DEVICE_PREDICTOR = Choice(
-    "What a predictor of a device forgets.",
+    "The statement that makes a predictor on a device start again.",
     ("GAUSS",),
     {"FORGET_ORDER(history)": ("", "history->order = 0;")},
 )
 
 STAGE_PREDICTORS = Choice(
-    "Gauss steps with their stages in lanes choose a predictor, of one step or two. Others have one, of the last step.",
+    "Gauss steps with stages in lanes choose one of several predictors, which read one or two steps. All other Gauss"
+    " steps have one predictor, which reads the last step.",
     ("STAGED",),
     {
         "PREDICT(past, z)": (
@@ -650,7 +658,7 @@ STAGE_PREDICTORS = Choice(
 )
 
 SWEEPS = Choice(
-    "Sweeps of a Gauss step iterate some unknowns, and read integrals of their increments; or they do so with all.",
+    "Sweeps of a Gauss step iterate over some of the unknowns, of whose increments they read integrals, or over all.",
     ("REDUCED",),
     {
         "ITERATED_COUNT": ("PHI_ITERATED", "PHI_UNKNOWNS"),
@@ -670,14 +678,15 @@ SWEEPS = Choice(
 )
 
 LIFTS = Choice(
-    "Weight of squared changes of group elements, which are near 1, or near frames that move along.",
+    "The weight of squared changes of group elements in the error measure. Group elements have the size 1, or that of"
+    " their frames.",
     ("LIFTED",),
     {"ELEMENT_SCALE(s)": ("phi_element_scale(s)", "1.0")},
 )
 
 _SHIFT = "for (int i = 0; i < PHI_DIM; ++i) {}.difference[0][i] += s->x[i] - from[i];"
 SHIFTED = Choice(
-    "The shift of the predictors with the state, if this is set or kicked.",
+    "If the state is set or kicked, predictors are shifted by the change of the state.",
     ("RECURRENCES", "PREDICTED && !GAUSS && COMPOSED", "PREDICTED && !GAUSS"),
     {
         "SHIFT_PREDICTORS(s, from)": (
@@ -690,7 +699,7 @@ SHIFTED = Choice(
 )
 
 PREDICTORS = Choice(
-    "Each stage has a predictor of its own, if there are any.",
+    "If stages of a lattice have predictors: the stage as an argument.",
     ("SWEEP_PREDICTORS",),
     {"AND_PREDICTOR": ("PHI_AND_STAGE", "")},
 )
