@@ -96,7 +96,7 @@ def _orders(text: str) -> tuple[int, ...]:
 
 
 def _expect_comparable(spec: Spec) -> None:
-    """Raise `SpecError` for systems without a conserved energy by which methods could be compared."""
+    """Raise `SpecError` for systems whose energy is not conserved: methods are compared by their energy errors."""
     for key, is_present in (("noise", spec.noise), ("time", spec.time), ("forces", spec.forces)):
         if is_present:
             place = ("damping",) if key == "forces" and ("damping",) in spec.locations else (key,)

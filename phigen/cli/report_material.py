@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from phigen.runtime.trajectory import Trajectory
     from phigen.study.verification import Verification
 
-#: Number of steps at the beginning of a run that the viewer of the page shows without gaps.
+#: Number of steps at the beginning of a run whose states are all stored, for the viewer of the page.
 _OPENING = 4_000
 
 
@@ -118,7 +118,7 @@ def _recorded(recorder: Recorder, console: Console) -> StepError | None:
 def _opening(
     compilation: Compilation, solver: Solver, experiment: Experiment, other_methods: Sequence[str], console: Console
 ) -> dict[str, Trajectory]:
-    """Return trajectories of the first steps, without gaps, by the solver and by other methods.
+    """Return trajectories of the first steps by the solver and by other methods, with the state after every step.
 
     The result is empty if the run is short and its trajectory has every step already.
     """

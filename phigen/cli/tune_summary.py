@@ -121,7 +121,7 @@ def is_measured(finalist: Finalist, tuning: Tuning) -> bool:
 
 
 def gauge_of(curve: Curve) -> str:
-    """Return the gauge of a method as text."""
+    """Return how the gauge of a method is chosen, as in the spec; "none" without a gauge, "" for classical methods."""
     if curve.setting is None:
         return ""
     return curve.setting.gauge if curve.gauged else "none"

@@ -305,9 +305,9 @@ def _problems(
 
 
 def _complaint(path: Path, entry: ManifestEntry | None, vendored: VendoredSolver) -> tuple[str, bool]:
-    """Return the problem with a file, "" if there is none, and whether correcting the problem needs ``--force``.
+    """Return the problem with a file, "" if there is none, and whether its correction needs ``--force``.
 
-    That is the case for files that were edited by hand.
+    Files that were edited by hand need ``--force``.
     """
     content = path.read_bytes() if path.is_file() else None
     stated, expected = entry.files.get(path.name) if entry else None, vendored.files.get(path.name)

@@ -257,7 +257,8 @@ def _listed(array: Any) -> list[float]:
 
 
 def _numbers(spec: Spec, run: Run, start: Start) -> int:
-    """Return how many values in lists the page would contain for the run."""
+    """Return the total length of all lists of values, such as initial values and bonds, that the page needs for the
+    run."""
     arrays = [_given(v, start, name, spec) for name, v in _initial(spec, run).items()]
     arrays += [_array(spec, run, start, p) for p in spec.parameters if _values(spec, run, start, p.name) is None]
     return sum(len(g.get("listed", ())) for g in arrays) + start.bonds.size
