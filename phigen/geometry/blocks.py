@@ -1,5 +1,5 @@
-"""Blocks of π: groups of coordinates without brackets between them, such as several bodies, or a spin and a
-particle."""
+"""Blocks of π: groups of coordinates that have no brackets with other groups, such as the coordinates of one of several
+bodies."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from phigen.symbolic.expression import symbols_of
 def blocks(coordinates: Sequence[str], poisson: Matrix) -> list[list[int]]:
     """Return the finest partition of the coordinates into blocks, as sorted lists of indices from 0.
 
-    Coordinates of different blocks commute, and brackets in a block only depend on coordinates of this block. A
-    coordinate that commutes with all others and occurs in no bracket is a block of its own.
+    Coordinates of different blocks commute, and brackets within a block depend on coordinates of this block only. A
+    coordinate that commutes with all others and occurs in no bracket is a block by itself.
     """
     index = {c: i for i, c in enumerate(coordinates)}
     part = list(range(len(coordinates)))

@@ -1,4 +1,4 @@
-"""Search for Casimirs by the form of a Poisson tensor.
+"""Search for Casimirs of a Poisson tensor, by a method for each form of the tensor.
 
 Candidates come from these sources, in this order:
 
@@ -8,8 +8,8 @@ Candidates come from these sources, in this order:
 - polynomials of increasing degree, by linear algebra
 - traces tr X^m, on the dual of a matrix algebra with a non-degenerate trace form
 
-Candidates that depend on declared or earlier Casimirs are dropped. `phigen.geometry.checks` proves that each one is a
-Casimir.
+A candidate that depends on declared or earlier Casimirs is dropped. `phigen.geometry.checks` proves that each result is
+a Casimir.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from phigen.geometry.trace_casimirs import trace_casimirs
 from phigen.spec.model import NambuForm, PoissonForm, ProductForm, PullbackForm
 from phigen.symbolic.expression import Expression, call, gradient, number, power, product, substitute, symbol, total
 
-#: Largest degree of polynomials in the search.
+#: Largest degree of the polynomials among which Casimirs are searched.
 DEGREE = 4
 
 
@@ -41,9 +41,10 @@ def found_casimirs(
     declared: Mapping[str, Expression],
     used_names: Collection[str],
 ) -> tuple[dict[str, Expression], tuple[str, ...]]:
-    """Return Casimirs that are independent of the declared ones, by free names C1, C2, …, and notes.
+    """Return Casimirs that are independent of the declared ones, by the unused names C1, C2, …, and notes for the user.
 
-    The search ends when the number of Casimirs is the corank of π. Notes say which parts of the search were omitted.
+    The search ends when there are as many Casimirs as the corank of π. The notes say which parts of the search were
+    omitted.
     """
     slopes = [gradient(c, coordinates) for c in declared.values()]
     ranks = generic_ranks([poisson, slopes])
@@ -73,7 +74,7 @@ def found_casimirs(
 def _candidates(
     coordinates: Sequence[str], poisson: Matrix, shape: Shape, form: PoissonForm, notes: list[str]
 ) -> Iterator[Expression]:
-    """Yield candidates for Casimirs; append to ``notes`` which parts of the search were omitted."""
+    """Yield functions that may be Casimirs; append a note to ``notes`` for each part of the search that is omitted."""
     if isinstance(form, NambuForm):
         yield from form.casimirs
         return
@@ -92,7 +93,7 @@ def _candidates(
             yield from _monomial(coordinates, a)
             return
         case LiePoisson(algebra):
-            # Polynomials of degree up to 3 first, as they are sparse. Traces have many terms, but are not limited in
+            # Sparse polynomials of degree up to 3 come first. The traces after them have many terms, but may have any
             # degree.
             yield from polynomial_casimirs(coordinates, poisson, shape, 3, [])
             representation = known_representation(algebra)
@@ -112,7 +113,10 @@ def _linear(coordinates: Sequence[str], matrix: Matrix) -> Iterator[Expression]:
 
 
 def _monomial(coordinates: Sequence[str], a: Matrix) -> Iterator[Expression]:
-    """Yield x^u for vectors u in the kernel of A; with parameters in u, ½ Σ u_i log x_i² instead."""
+    """Yield the Casimirs of a log-canonical π with the matrix A: x^u for the vectors u of a basis of the kernel of A.
+
+    If u contains parameters, ½ Σ u_i log x_i² takes the place of x^u.
+    """
     field, vectors = _kernel(a)
     for vector in vectors:
         if field.is_rational:

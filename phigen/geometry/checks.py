@@ -1,4 +1,5 @@
-"""Statements about the mathematics of a system: skew symmetry, Jacobi identity, Casimirs, invariants, rank."""
+"""Statements about the mathematics of a system, with verdicts: skew symmetry, Jacobi identity, Casimirs, invariants,
+rank."""
 
 from __future__ import annotations
 
@@ -12,13 +13,16 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: Name of the statement from which strong order 1 follows.
+#: Name of the statement that the noise sources commute, so that the strong order is 1.
 COMMUTING = "the sources of noise commute, hence strong order 1"
 
 
 def check(system: System) -> list[Statement]:
-    """Return all statements about a system: Casimirs and invariants in the order of the spec, then the Casimirs that
-    were found."""
+    """Return the statements about π, the Casimirs, the invariants and the rank of a system; not those about forces and
+    noise.
+
+    Declared Casimirs come first, in the order of the spec, then those that were found.
+    """
     return [
         skew_symmetry(system),
         jacobi_identity(system),
@@ -37,7 +41,7 @@ def skew_symmetry(system: System) -> Statement:
 
 
 def casimir_statements(system: System) -> Iterator[Statement]:
-    """Decide π∇C = 0 for each Casimir C, declared or found."""
+    """Yield for each Casimir C, declared or found, the statement π∇C = 0."""
     for name, casimir in system.casimirs.items():
         flow = hamiltonian_vector_field(system.poisson, gradient(casimir, system.coordinates))
         residuals = [(f"{{{c}, {name}}}", f) for c, f in zip(system.coordinates, flow, strict=True)]
@@ -46,7 +50,8 @@ def casimir_statements(system: System) -> Iterator[Statement]:
 
 
 def invariant_statements(system: System) -> Iterator[Statement]:
-    """Decide {F, H} + ∂_t F = 0 for each declared invariant F."""
+    """Yield for each declared invariant F the statement dF/dt = 0: {F, H} + ∂_t F = 0 or, with forces, along their
+    vector field."""
     flow = system.vector_field()
     for name, invariant in system.invariants.items():
         slopes = gradient(invariant, system.coordinates)
@@ -58,7 +63,7 @@ def invariant_statements(system: System) -> Iterator[Statement]:
 
 
 def force_statements(system: System) -> Iterator[Statement]:
-    """Yield statements about forces: the rates of change of Casimirs, and that the damping reduces the energy."""
+    """Yield the statements about forces: how each Casimir changes, and that damping changes H at the rate −λ |π∇H|²."""
     if system.forces is None:
         return
     for name, casimir in system.casimirs.items():
@@ -77,8 +82,11 @@ def force_statements(system: System) -> Iterator[Statement]:
 
 
 def noise_statements(system: System) -> Iterator[Statement]:
-    """Yield statements about noise: whether its sources commute, which gives the strong order, and a stationary
-    density."""
+    """Yield the statements about noise: whether its sources commute, which gives the strong order, and a stationary
+    density.
+
+    The density exp(−H/θ) is stated only if it is proved to be stationary.
+    """
     if not system.noise:
         return
     commute = _commutation(system)
@@ -105,7 +113,7 @@ def noise_statements(system: System) -> Iterator[Statement]:
 
 
 def commuting(system: System) -> bool:
-    """Whether the flows of all sources of noise commute, as far as phigen can decide it."""
+    """Whether the flows of all sources of noise commute; False if phigen cannot decide it."""
     return _commutation(system).holds
 
 
@@ -116,7 +124,7 @@ def _commutation(system: System) -> Statement:
 
 
 def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
-    """Return a label, and an expression that is 0 if the flows of noise sources i and j commute.
+    """Return a label, and an expression that is 0 if and only if the flows of the noise sources i and j commute.
 
     The expression is the sum of the squares of the components of π∇{σ_i g_i, σ_j g_j}.
     """
@@ -130,9 +138,11 @@ def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
 def _temperature(
     system: System, slope: Sequence[Expression], diffusive_rate: Sequence[Expression], spread: Sequence[Expression]
 ) -> Expression | None:
-    """Return a temperature T for which 2T(πζ + f) + Σ σ²(XH)X has no component along ∇H, at one point.
+    """Return a temperature T for which the density exp(−H/T) may be stationary, from one sample point; None if there is
+    none.
 
-    ``slope`` is ∇H, ``diffusive_rate`` is πζ + f, and ``spread`` is Σ σ²(XH)X. Returns None if no such T was found.
+    At this point the component of 2T(πζ + f) + Σ σ²(XH)X along ∇H is 0. ``slope`` is ∇H, ``diffusive_rate`` is πζ + f,
+    and ``spread`` is Σ σ²(XH)X, where X = π∇g for each source.
     """
     loss = total(a * b for a, b in zip(slope, diffusive_rate, strict=True))
     gained = total(a * b for a, b in zip(slope, spread, strict=True))
@@ -146,7 +156,7 @@ def _temperature(
 
 def _ratio(numerator: Expression, denominator: Expression) -> Expression:
     """Return the quotient of two expressions, with common factors cancelled."""
-    for _ in range(2):  # The first round rewrites squares of roots, which only the ring of the second round recognises.
+    for _ in range(2):  # the ring of round 2 knows the squares of roots from round 1
         tower = Tower(symbols_of(numerator, denominator), [numerator, denominator])
         a, b = (tower.simplified(e) for e in tower.convert_all([numerator, denominator]))
         common = a.gcd(b)
@@ -155,7 +165,7 @@ def _ratio(numerator: Expression, denominator: Expression) -> Expression:
 
 
 def rank_statement(system: System) -> Statement:
-    """State the rank of π at generic points, and the number of independent Casimirs."""
+    """Return the statement about the rank of π at generic points, and about the number of independent Casimirs."""
     slopes = [gradient(c, system.coordinates) for c in system.casimirs.values()]
     ranks = generic_ranks([system.poisson, slopes], system.positive)
     if ranks is None:

@@ -1,9 +1,10 @@
-"""Units of the errors of energy, Casimirs and invariants, which are the same for measurements, tables and figures.
+"""Units of the errors of energy, Casimirs and invariants, for measurements, tables and figures.
 
-An error is relative to the value at the start. If this value is much smaller than its terms, it depends on the choice
-of the zero of energy, so the error is relative to the terms. For a system, the terms are Σ |x_i ∂_i H| at the start:
-the change of H by a relative change of all coordinates, independent of constants in H. For a lattice, they are the sum
-of the absolute energies of the sites. If the terms are 0 too, the error is absolute.
+An error is relative to the value of the quantity at the start. If this value is much smaller than the terms that it is
+the sum of, as for an energy near its arbitrary zero, the error is relative to the size of the terms. For a system, this
+size is Σ |x_i ∂_i H| at the start: the change of H by a relative change of all coordinates, which does not depend on
+constants in H. For a lattice it is the sum of the absolute energies of the sites. If this size is 0 too, the error is
+absolute.
 """
 
 from __future__ import annotations
@@ -19,32 +20,34 @@ from phigen.geometry.system import System
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression, gradient
 
-#: Ratio of a value to its terms below which the value counts as 0.
+#: Ratio of a value to the size of its terms below which the value counts as 0.
 SMALL = 1e-3
 
-#: Energy error, in its unit, above which users are warned: an error of a tenth of the energy is not a small
-#: perturbation.
+#: Relative energy error above which users are warned: a tenth of the energy is not a small perturbation.
 LARGE_ENERGY_ERROR = 0.1
 
 RELATIVE, TERMS, SITES, ABSOLUTE = "relative", "of its terms", "of its sites", "absolute"
 
-#: Name of the quantity that every system has.
+#: Name of the energy among the conserved quantities of a system.
 ENERGY = "energy"
 
 
 def rounding(steps: int) -> float:
-    """Return a bound for the round-off error of a quantity after ``steps`` steps, relative to its terms; it grows as
-    √steps."""
+    """Return a bound for the round-off error of a quantity after a number of steps, relative to the size of its terms.
+
+    The bound grows as √steps.
+    """
     return 1e-15 * (20 + math.sqrt(steps))
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Unit of the errors of a quantity: its ``size``, and its ``kind``, one of `RELATIVE`, `TERMS`, `SITES`,
-    `ABSOLUTE`.
+    """The unit in which errors of a quantity are measured: its ``size``, and its ``kind``.
 
-    ``terms`` is the sum of terms at the start in this unit, to which rounding errors are proportional. ``moves`` says
-    that time, forces or noise change the quantity, so that its changes are not errors.
+    The kind is `RELATIVE` to the value at the start, `TERMS` or `SITES` (relative to the size of terms or of the
+    energies of sites at the start), or `ABSOLUTE`. ``terms`` is the size of the terms in this unit, to which rounding
+    errors are proportional. ``moves`` says that time, forces or noise change the quantity, so that its changes are no
+    errors.
     """
 
     size: float = 1.0
@@ -54,13 +57,16 @@ class Unit:
 
     @property
     def adjective(self) -> str:
-        """The kind of errors in this unit as an adjective: ``relative`` or ``absolute``."""
+        """The word for errors in this unit: ``relative`` or ``absolute``."""
         return ABSOLUTE if self.kind == ABSOLUTE else RELATIVE
 
     def errors(self, values: Floats, start: float) -> Floats:
-        """Return the errors (rows,) of values (rows,) of the quantity in this unit; ``start`` is the value at the
-        start."""
-        with np.errstate(invalid="ignore"):  # values may be infinite or NaN
+        """Return the errors, in this unit, of values of the quantity along a trajectory; both arrays have the shape
+        (rows,).
+
+        ``start`` is the value of the quantity at the start.
+        """
+        with np.errstate(invalid="ignore"):  # values may be infinite or NaN, without warnings
             errors: Floats = np.abs(values - start) / self.size
         return errors
 
@@ -68,26 +74,29 @@ class Unit:
 def units(
     quantities: Iterable[Expression], coordinates: Sequence[str], parameters: Mapping[str, float], start: Floats
 ) -> list[Unit]:
-    """Return the unit of each quantity, on a trajectory from the state ``start`` (DIM,)."""
+    """Return the unit of each quantity, for a trajectory that starts at the state ``start`` of shape (DIM,)."""
     point_values = {**parameters, **dict(zip(coordinates, np.asarray(start).tolist(), strict=True))}
     values = (value_and_terms(q, coordinates, point_values) for q in quantities)
     return [unit_of(float(value), float(terms)) for value, terms in values]
 
 
 def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> dict[str, Unit]:
-    """Return the units of energy and Casimirs of a system by name, on a trajectory from the state ``start`` (DIM,)."""
+    """Return the units of the energy and of the Casimirs of a system, by name, for a trajectory from ``start``
+    (DIM,)."""
     quantities = {ENERGY: system.hamiltonian, **system.casimirs}
     return dict(zip(quantities, units(quantities.values(), system.coordinates, parameters, start), strict=True))
 
 
 def moving(system: System) -> list[str]:
-    """Return the names of the quantities, energy and Casimirs, that time, forces or noise change."""
+    """Return the names of the quantities that time, forces or noise change: the energy and some Casimirs."""
     return [ENERGY, *system.pushed] if system.driven else []
 
 
 def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
-    """Return the unit of a quantity by its value and its sum of terms at the start; ``kind`` is the kind of the
-    terms."""
+    """Return the unit of a quantity from its ``value`` and the size of its ``terms`` at the start of a trajectory.
+
+    ``kind`` is the kind of the unit if the value is nearly 0: `TERMS` or `SITES`.
+    """
     if abs(value) > SMALL * terms and math.isfinite(value):
         return Unit(abs(value), RELATIVE, max(1.0, terms / abs(value)))
     return Unit(terms, kind) if 0 < terms < math.inf else Unit()
@@ -96,21 +105,25 @@ def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
 def value_and_terms(
     quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]
 ) -> tuple[Floats, Floats]:
-    """Return a quantity Q and Σ |x_i ∂_i Q|, at one state or at each state of a trajectory."""
+    """Return the values of a quantity Q and the sizes Σ |x_i ∂_i Q| of its terms, at one state or at each state of a
+    trajectory."""
     value, *slopes = evaluate([quantity, *gradient(quantity, coordinates)], values)
     with np.errstate(all="ignore"):
         return value, np.asarray(sum(np.abs(values[c] * slope) for c, slope in zip(coordinates, slopes, strict=True)))
 
 
 def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]) -> float:
-    """Return the largest of |Q| and Σ |x_i ∂_i Q| along a trajectory, to which rounding errors are proportional."""
+    """Return the largest of |Q| and Σ |x_i ∂_i Q| along a trajectory; rounding errors of Q are proportional to this
+    number."""
     value, terms = value_and_terms(quantity, coordinates, values)
     return float(np.max(np.maximum(np.abs(value), terms))) or 1.0
 
 
 def stated(units_by_name: Mapping[str, Unit]) -> str:
-    """Return the sentence that states the units of errors in a figure or table; ``units_by_name`` has the unit of each
-    quantity."""
+    """Return the sentence that tells the reader of a figure or table the units of errors.
+
+    ``units_by_name`` has the unit of each quantity.
+    """
     errors = "Errors and changes" if any(unit.moves for unit in units_by_name.values()) else "Errors"
     relative = any(unit.kind == RELATIVE for unit in units_by_name.values())
     clauses = [f"{errors} are relative to the value at the start"] if relative else []

@@ -1,4 +1,4 @@
-"""Tests whether the formulas of a system are defined: they do not divide by 0, and have values at some points."""
+"""Tests whether the formulas of a system are defined: that they do not divide by 0, and have values at some points."""
 
 from __future__ import annotations
 
@@ -11,22 +11,24 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: Number of sample points, and factors by which their coordinates are multiplied: points of size 1, near 0, and far
-#: away.
+#: Number of sample points, and factors by which their coordinates are multiplied. So points of size 1, points near 0
+#: and points far away are tried.
 POINTS = 64
 SCALES = (Fraction(1), Fraction(1, 32), Fraction(30))
-#: Absolute value above which an expression is not 0; the rounding errors of an expression that is 0 are much smaller.
+#: Absolute value above which an expression is certainly not 0: rounding errors of an expression that is 0 are much
+#: smaller.
 _NONZERO = 1e-6
 
 Point = Mapping[str, float]
 
 
 def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Statement]:
-    """Yield a statement for each part of a system that seems to be undefined everywhere: H, π, each Casimir and
-    invariant.
+    """Yield a statement for each part of a system that seems to be undefined everywhere.
 
-    ``starts`` has the coordinates and parameters at the starts of runs. A part is refuted if it divides by 0, or if it
-    has no value at the sample points and at the starts. Without starts, missing values leave it undecided.
+    The parts are H, π, the forces, the noise, and each Casimir and invariant. ``starts`` has the values of coordinates
+    and parameters at the starts of runs. The statement that a part is defined is refuted if the part divides by 0, or
+    if it has no value at all sample points and starts. If there are no starts, missing values leave the statement
+    undecided.
     """
     for name, roots in _parts(system).items():
         divisor = _divided_by_zero(roots, system.positive)
@@ -39,7 +41,8 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
 
 
 def undefined_starts(system: System, starts: Mapping[str, Point]) -> Iterator[Statement]:
-    """Yield a statement for each run, by name, at whose start some part of the system has no value."""
+    """Yield a statement for each run at whose start some part of the system has no value; ``starts`` has the starts by
+    run."""
     parts = _parts(system)
     for run, point in starts.items():
         undefined = [name for name, roots in parts.items() if not _is_defined(roots, point)]
@@ -48,12 +51,13 @@ def undefined_starts(system: System, starts: Mapping[str, Point]) -> Iterator[St
 
 
 def start_is_defined(run: str) -> str:
-    """Return the name of the statement about the start of a run."""
+    """Return the name of the statement that all formulas have values at the start of a run."""
     return f"everything is defined where {run} starts"
 
 
 def _parts(system: System) -> dict[str, Sequence[Expression]]:
-    """Return the expressions of each part of a system, by a description of the part."""
+    """Return the expressions of a system by the name of the part: H, forces, noise, π, each Casimir and each
+    invariant."""
     parts: dict[str, Sequence[Expression]] = {"H": [system.hamiltonian]}
     if system.forces:
         parts["the force"] = [*system.forces.covector, *system.forces.vector]
@@ -63,8 +67,7 @@ def _parts(system: System) -> dict[str, Sequence[Expression]]:
 
 
 def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> str:
-    """Return a description of a divisor, or of an argument of a logarithm, that is 0 everywhere; "" if there is
-    none."""
+    """Return a text about a divisor, or an argument of a logarithm, that is 0 everywhere; "" if there is none."""
     for e in topological(list(roots)):
         if e.op == "log" or (e.op == "pow" and e.value < 0):
             (argument,) = e.args
@@ -77,7 +80,7 @@ def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> 
 
 
 def _may_be_zero(e: Expression, positive: Collection[str]) -> bool:
-    """Whether the value at the first sample point in the domain is compatible with 0."""
+    """Whether the value of an expression at a sample point is 0 up to rounding; only then is a proof tried."""
     names = symbols_of(e)
     for k in range(POINTS):
         try:

@@ -33,7 +33,7 @@ from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.matrix_algebras import algebra_of_sparse_matrices
 from phigen.symbolic.expression import number
 
-#: Sparse matrix: (row, column), counted from 0 → entry.
+#: Sparse matrix: (row, column), both from 0, → nonzero entry.
 Entries = dict[tuple[int, int], Fraction]
 
 
@@ -80,13 +80,16 @@ def _su(n: int) -> tuple[int, list[Entries]]:
     imaginary = [_unit(i, j) | _unit(j, i) for i, j in _upper(n)]
     imaginary += [_unit(k, k) | _unit(k + 1, k + 1, -1) for k in range(n - 1)]
     basis = [_complexified(m, {}) for m in real] + [_complexified({}, m) for m in imaginary]
-    if n == 2:  # −iσ_1/2, −iσ_2/2, −iσ_3/2
+    if n == 2:  # basis −iσ_1/2, −iσ_2/2, −iσ_3/2 with the Pauli matrices σ
         basis = [{position: -v / 2 for position, v in m.items()} for m in (basis[1], basis[0], basis[2])]
     return 2 * n, basis
 
 
 def _complexified(real: Entries, imaginary: Entries) -> Entries:
-    """Return the real matrix (a −b; b a) of a + ib; rows and columns are in the order re, im, re, im, …"""
+    """Return the real 2n×2n matrix of the complex n×n matrix a + ib, with the block (a −b; b a) for each entry.
+
+    Rows and columns alternate between real and imaginary parts.
+    """
     real_entries = {}
     for (i, j), v in real.items():
         real_entries[2 * i, 2 * j] = real_entries[2 * i + 1, 2 * j + 1] = v
@@ -113,7 +116,8 @@ def _aff(n: int) -> tuple[int, list[Entries]]:
     return n + 1, [_unit(i, j) for i, j in _all(n)] + [_unit(i, n) for i in range(n)]
 
 
-#: name → (smallest size, function for the dimension of a size, function for size and entries of the matrices)
+#: Name of a family → (smallest size n, the dimension as a function of n, the size and the entries of the basis matrices
+#: as a function of n).
 FAMILIES: dict[str, tuple[int, Callable[[int], int], Callable[[int], tuple[int, list[Entries]]]]] = {
     "so": (2, lambda n: n * (n - 1) // 2, _so),
     "se": (2, lambda n: n * (n + 1) // 2, _se),
@@ -127,8 +131,10 @@ FAMILIES: dict[str, tuple[int, Callable[[int], int], Callable[[int], tuple[int, 
 
 
 def dimension(family: str, size: int) -> int:
-    """Return the dimension of a named algebra. Raises `SpecError` for an unknown family, or a size that the family
-    lacks."""
+    """Return the dimension of the Lie algebra with this family and size, such as so(4).
+
+    Raises `SpecError` for an unknown family, and for a size for which the family has no algebra.
+    """
     if family not in FAMILIES:
         families = ", ".join(f"{name}(n)" for name in FAMILIES)
         raise SpecError([Diagnostic(f"unknown Lie algebra {family}({size})", hint=f"known families: {families}")])
@@ -141,7 +147,10 @@ def dimension(family: str, size: int) -> int:
 
 
 def named(family: str, size: int) -> LieAlgebra:
-    """Return a named algebra with its defining representation. Raises the errors of `dimension`."""
+    """Return the Lie algebra with this family and size, such as so(4), with its defining matrices.
+
+    Raises the errors of `dimension`.
+    """
     dimension(family, size)
     matrix_size, basis = FAMILIES[family][2](size)
     matrices = [{position: number(v) for position, v in sorted(m.items())} for m in basis]
@@ -149,7 +158,7 @@ def named(family: str, size: int) -> LieAlgebra:
 
 
 def families_of_dimension(dimension: int) -> list[tuple[str, int]]:
-    """Return the (family, size) of all named algebras with this dimension."""
+    """Return the pairs (family, size) of all named Lie algebras with this dimension."""
     families = []
     for name, (smallest, dimension_of, _) in FAMILIES.items():
         step = 2 if name == "sp" else 1

@@ -1,4 +1,4 @@
-"""Arithmetic of structure constants: the field Q, or Q(parameters) if the constants contain parameters."""
+"""Arithmetic for structure constants: the rational numbers Q or, if the constants contain parameters, Q(parameters)."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from phigen.symbolic.expression import Expression, number, topological
 from phigen.symbolic.horner import horner
 from phigen.symbolic.tower import rational
 
-#: Element of a `Field`: ``flint.fmpq`` or `Ratio`. Both have + − * / and comparison with 0.
+#: Element of a `Field`: ``flint.fmpq`` or `Ratio`. Both types have + − * / and can be compared with 0.
 Scalar = Any
 
 _ARITHMETIC = frozenset({"number", "symbol", "add", "sub", "neg", "mul"})
 
 
 class Ratio:
-    """Quotient of polynomials over Q in lowest terms; the leading coefficient of the denominator is 1."""
+    """Quotient of two polynomials over Q in lowest terms; the leading coefficient of the denominator is 1."""
 
     __slots__ = ("denominator", "numerator")
 
@@ -66,11 +66,11 @@ class Ratio:
 
 
 class Field(Arithmetic[Scalar]):
-    """The smallest field Q(symbols) that contains some expressions.
+    """The smallest field Q(symbols) that contains some expressions, with elements of the type `Scalar`.
 
-    Functions of parameters (``sqrt(l)``) and constants such as ``pi`` are further independent symbols. Relations
-    between them are not used, so an element that is 0 only by such a relation counts as non-zero. This only affects the
-    recognition of algebraic structures; statements about them are proved in a `Tower`.
+    Functions of parameters, such as ``sqrt(l)``, and constants such as ``pi`` count as independent symbols. So an
+    element that is 0 only by a relation between them counts as nonzero. This affects only the recognition of algebraic
+    structures; statements about them are proved in a `Tower`.
     """
 
     def __init__(self, expressions: Iterable[Expression] = ()) -> None:
@@ -93,13 +93,14 @@ class Field(Arithmetic[Scalar]):
         return rational if self.is_rational else Ratio(self._context.constant(rational), self._context.constant(1))
 
     def convert(self, e: Expression) -> Scalar:
-        """Return an expression as an element of the field. Raises `KeyError` if it contains other symbols."""
+        """Return an expression as an element of the field. Raises `KeyError` if the expression contains foreign
+        symbols."""
         if e.is_number:
             return self.number(e.value)
         return self.values([e])[0]
 
     def visit(self, node: Expression, args: list[Scalar]) -> Scalar:
-        """Return the element of a node of the expression, from the elements of its arguments."""
+        """Return the element for a node of an expression, from the elements for its arguments."""
         if id(node) in self._index:
             return Ratio(self._context.gens()[self._index[id(node)]], self._context.constant(1))
         return super().visit(node, args)
@@ -109,7 +110,7 @@ class Field(Arithmetic[Scalar]):
         return self.number(value)
 
     def variable(self, name: str) -> Scalar:
-        """Raise `KeyError`, since `visit` has converted all symbols that the field contains."""
+        """Raise `KeyError` for a symbol that the field does not contain; all other symbols are converted by `visit`."""
         raise KeyError(name)
 
     def power(self, base: Scalar, exponent: Fraction) -> Scalar:
@@ -119,7 +120,8 @@ class Field(Arithmetic[Scalar]):
         return base ** int(exponent)
 
     def function(self, name: str, args: list[Scalar]) -> Scalar:
-        """Raise `KeyError`: the field has no functions."""
+        """Raise `KeyError` for a function that the field does not contain; all other functions are converted by
+        `visit`."""
         raise KeyError(name)
 
     def expression(self, element: Scalar) -> Expression:

@@ -1,8 +1,8 @@
 """Forces in addition to the Hamiltonian: ẋ = π(∇H + ζ) + f, with a covector field ζ and a vector field f.
 
-πζ is tangent to the symplectic leaves, so ζ conserves all Casimirs; every field tangent to the leaves has this form.
-Damping by the double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². f may be any field, and usually changes
-Casimirs.
+πζ is tangent to the symplectic leaves, and every field tangent to the leaves has this form; so ζ conserves all
+Casimirs. Damping by the double bracket is ζ = λ π∇H, for which dH/dt = −λ |π∇H|². The vector field f is arbitrary, and
+changes Casimirs in general.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from phigen.symbolic.expression import ZERO, Expression
 
 @dataclass(frozen=True)
 class Forces:
-    """Forces of a system: ``covector`` is ζ, including the damping, and ``vector`` is f, both by coordinate.
+    """The forces of a system: the ``covector`` field ζ and the ``vector`` field f, each with one expression per
+    coordinate.
 
-    ``damping`` is λ, or 0 without damping. ``undamped`` is ζ without the damping.
+    ζ includes the damping λπ∇H; ``undamped`` is ζ without it. ``damping`` is λ, or 0 without damping.
     """
 
     covector: tuple[Expression, ...]
@@ -28,7 +29,7 @@ class Forces:
 
 
 def forces_of(spec_forces: SpecForces, coordinates: Sequence[str], field: Sequence[Expression]) -> Forces | None:
-    """Return the forces of a spec, None without forces; ``field`` is π∇H."""
+    """Return the forces of a spec, or None without forces; ``field`` is π∇H, which the damping needs."""
     if not spec_forces:
         return None
     damping = spec_forces.damping or ZERO

@@ -1,4 +1,4 @@
-"""The Poisson tensor π_ij = {x_i, x_j} for each form of π in specs."""
+"""The matrix π_ij = {x_i, x_j}, from each of the forms in which specs can state a Poisson structure."""
 
 from __future__ import annotations
 
@@ -23,16 +23,19 @@ from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, symbol, 
 
 
 def structure(form: PoissonForm, coordinates: Sequence[str]) -> tuple[Matrix, Shape]:
-    """Return π of a form, and its shape. Raises the errors of `algebra_of_form` and `poisson_matrix`."""
+    """Return the matrix π of a form of specs, and its shape, such as constant or Lie–Poisson.
+
+    Raises the errors of `algebra_of_form` and `poisson_matrix`.
+    """
     algebra = algebra_of_form(form, coordinates)
     matrix = poisson_matrix(form, coordinates, algebra)
     return matrix, LiePoisson(algebra) if algebra and algebra.constants else recognise(coordinates, matrix)
 
 
 def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAlgebra | None = None) -> Matrix:
-    """Return the n×n matrix π of a form; ``algebra`` is the result of `algebra_of_form`.
+    """Return the n×n matrix π for a form of specs; ``algebra`` is the result of `algebra_of_form`, if it is known.
 
-    Raises `SpecError` if a size does not match the number of coordinates.
+    Raises `SpecError` if the size of a matrix does not match the number of coordinates.
     """
     n = len(coordinates)
     match form:
@@ -58,15 +61,17 @@ def poisson_matrix(form: PoissonForm, coordinates: Sequence[str], algebra: LieAl
 
 
 def algebra_of_form(form: PoissonForm, coordinates: Sequence[str]) -> LieAlgebra | None:
-    """Return the Lie algebra of a ``lie_algebra`` form, multiplied by its sign; None for other forms.
+    """Return the Lie algebra of a ``lie_algebra`` form, with the negated bracket for ``sign: minus``; None for other
+    forms.
 
     Raises `SpecError` for an unknown family, for a dimension other than the number of coordinates, and for matrices or
-    constants that `phigen.geometry.matrix_algebras` refuses.
+    structure constants that do not define a Lie algebra.
     """
     if not isinstance(form, LieAlgebraForm):
         return None
     if form.family:
-        # The dimension is checked before the matrices are built, which would take minutes for so(1000), a typing error.
+        # The dimension is checked before the matrices are built: for a typing error such as so(1000) that would take
+        # minutes.
         _expect_dimension(f"{form.family}({form.size})", families.dimension(form.family, form.size), len(coordinates))
         algebra = families.named(form.family, form.size)
     elif form.matrices:
@@ -89,7 +94,10 @@ def _canonical(coordinates: Sequence[str], q: Sequence[str], p: Sequence[str]) -
 
 
 def _product(coordinates: Sequence[str], blocks: Sequence[tuple[tuple[str, ...], PoissonForm]]) -> Matrix:
-    """Return the block-diagonal π of several forms. Raises `SpecError` if a block depends on coordinates of another."""
+    """Return the block-diagonal π of several forms, each for some of the coordinates.
+
+    Raises `SpecError` if a block depends on coordinates of another block.
+    """
     index = {c: i for i, c in enumerate(coordinates)}
     n = range(len(coordinates))
     entries = [[ZERO for _ in n] for _ in n]
@@ -128,10 +136,10 @@ def _nambu(coordinates: Sequence[str], casimirs: Sequence[Expression]) -> Matrix
 def _minor(
     rows: Sequence[Sequence[Expression]], columns: Sequence[int], minors: dict[tuple[int, ...], Expression]
 ) -> Expression:
-    """Return the determinant of the last k rows in k columns, where k is the number of ``columns``.
+    """Return the determinant of the last k rows, restricted to k ``columns``, by expansion along the first of these
+    rows.
 
-    It is expanded along the first of these rows. ``minors`` caches minors by their columns: there are 2ⁿ minors, while
-    the expansion without a cache has n! terms.
+    ``minors`` stores the results by their columns: there are 2ⁿ of them, while an expansion without this has n! terms.
     """
     if not columns:
         return ONE

@@ -1,6 +1,6 @@
-"""Direct sums of Lie algebras in a basis that mixes the summands, such as so(4) = so(3) ⊕ so(3).
+"""Decomposition of a Lie algebra into a direct sum of ideals, in a basis that mixes them, as for so(4) = so(3) ⊕ so(3).
 
-The projections onto the summands commute with every ad_X. So they lie in the centroid, the space of linear maps T with
+The projections onto the ideals commute with every ad_X. So they lie in the centroid, the space of linear maps T with
 T[X, Y] = [TX, Y]. They follow from primary decompositions of elements of the centroid over Q.
 """
 
@@ -17,17 +17,17 @@ from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.linear import kernel
 from phigen.symbolic.tower import rational
 
-#: Largest dimension n of an algebra for which the centroid is computed, since it has n² unknowns.
+#: Largest dimension n of an algebra that is decomposed: the linear equations for its centroid have n² unknowns.
 LARGEST = 12
 
 Rows = tuple[tuple[Fraction, ...], ...]
 
 
 def ideal_projections(algebra: LieAlgebra) -> list[Rows]:
-    """Return projections e_1, …, e_r onto ideals of which the algebra is the direct sum: Σ e_a = 1, e_a e_b = 0.
+    """Return the projections e_1, …, e_r onto ideals of which the algebra is the direct sum: Σ e_a = 1, e_a e_b = 0.
 
-    Each is a matrix by rows in the basis E_i, whose column j is the image of E_j. The only projection is the identity
-    for indecomposable and for large algebras, and if structure constants contain parameters.
+    Each projection is a matrix by rows in the basis E_i; its column j is the image of E_j. The result is the identity
+    alone if the algebra is indecomposable or large, or if its structure constants contain parameters.
     """
     n = algebra.dimension
     parts = [_identity(n)]
@@ -47,17 +47,17 @@ def _refined(part: Any, idempotent: Any) -> list[Any]:
 
 
 def _centroid(algebra: LieAlgebra) -> list[Any]:
-    """Return a basis of the linear maps T with T[E_i, E_j] = [TE_i, E_j] for all i, j."""
+    """Return a basis of the centroid, the matrices T with T[E_i, E_j] = [TE_i, E_j] for all i, j."""
     n, field = algebra.dimension, algebra.field
     constants = [[{k: field.convert(c) for k, c in algebra.bracket(i, j).items()} for j in range(n)] for i in range(n)]
     equations = []
     for i in range(n):
         for j in range(n):
             rows: list[dict[int, Scalar]] = [{} for _ in range(n)]
-            for k, c in constants[i][j].items():  # Add T[E_i, E_j]; the unknown m·n + k is T_mk.
+            for k, c in constants[i][j].items():  # T[E_i, E_j]; the unknown number m·n + k is the entry T_mk
                 for m in range(n):
                     rows[m][m * n + k] = rows[m].get(m * n + k, field.zero) + c
-            for a in range(n):  # Subtract [TE_i, E_j] = Σ_a T_ai [E_a, E_j].
+            for a in range(n):  # minus [TE_i, E_j] = Σ_a T_ai [E_a, E_j]
                 for m, c in constants[a][j].items():
                     rows[m][a * n + i] = rows[m].get(a * n + i, field.zero) - c
             equations += [row for row in rows if row]
@@ -65,7 +65,7 @@ def _centroid(algebra: LieAlgebra) -> list[Any]:
 
 
 def _idempotents(element: Any) -> list[Any]:
-    """Return the projections onto the primary components of a matrix over Q; [] if there is only one component."""
+    """Return the projections onto the primary components of a matrix over Q; [] if the matrix has only one."""
     minimal = element.minpoly()
     _, factors = minimal.factor()
     if len(factors) < 2:

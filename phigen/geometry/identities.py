@@ -1,4 +1,5 @@
-"""Functions that are polynomials by an identity, such as x·(sin(y)**2 + cos(y)**2) or (x**2 - 1)/(x - 1)."""
+"""Recognition of functions that are polynomials by an identity, such as x·(sin(y)**2 + cos(y)**2) or (x**2 - 1)/(x -
+1)."""
 
 from __future__ import annotations
 
@@ -11,20 +12,21 @@ from phigen.symbolic.numeric import DomainError, evaluate_precisely, evaluate_wi
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 
-#: Largest degree of polynomials that are recognised: those of constant, linear and log-canonical tensors have degree ≤
-#: 2.
+#: Largest degree of polynomials that are recognised. The entries of constant, linear and log-canonical tensors π have
+#: degree ≤ 2.
 DEGREE = 2
-#: Points of expansion (a, a + b, a + 2b, …) as pairs (a, b). Many functions have rational values at the first two.
+#: Points (a, a + b, a + 2b, …) at which Taylor polynomials are tried, as pairs (a, b). Many functions have rational
+#: values at the first two points.
 _BASES = ((0, 0), (1, 0), (2, 1))
-#: Number of lines that are tried until the function has values on one of them.
+#: Largest number of lines that are tried in search of one on which the function has values.
 _LINES = 8
 
 
 def polynomial_by_identity(e: Expression, coordinates: Sequence[str]) -> Expression | None:
-    """Return the polynomial in the coordinates, of degree ≤ `DEGREE`, that equals the expression; else None.
+    """Return the polynomial in the coordinates, of degree ≤ `DEGREE`, that equals an expression; None if there is none.
 
-    The coefficients are Taylor coefficients at a point. The equality is proved in the ring of the functions that occur;
-    without a proof, the result is None.
+    Its coefficients are Taylor coefficients at a point. The equality is then proved in the ring of the functions that
+    occur; without a proof, the result is None.
     """
     moving = [c for c in symbols_of(e) if c in coordinates]
     if not _flat_on_a_line(e, moving):
@@ -40,9 +42,10 @@ def polynomial_by_identity(e: Expression, coordinates: Sequence[str]) -> Express
 
 
 def _flat_on_a_line(e: Expression, moving: Sequence[str]) -> bool:
-    """Whether the finite difference of order `DEGREE` + 1 vanishes on a line.
+    """Whether the finite difference of order `DEGREE` + 1 along a line is 0, as for a polynomial of degree ≤ `DEGREE`.
 
-    This test is cheap, and excludes nearly all functions that are no polynomials.
+    This test is cheap, and excludes nearly all functions that are not polynomials. ``moving`` are the coordinates in
+    ``e``.
     """
     names = symbols_of(e)
     for k in range(_LINES):
@@ -61,7 +64,7 @@ def _flat_on_a_line(e: Expression, moving: Sequence[str]) -> bool:
 
 
 def _expansion(e: Expression, moving: Sequence[str]) -> Expression | None:
-    """Return the Taylor polynomial of degree 2 about the first point of `_BASES` where it exists; None if there is
+    """Return the Taylor polynomial of degree 2 at the first point of `_BASES` where it exists; None if there is
     none."""
     slopes = gradient(e, moving)
     parts = [e, *slopes, *(c for slope in slopes for c in gradient(slope, moving))]
@@ -79,7 +82,7 @@ def _expansion(e: Expression, moving: Sequence[str]) -> Expression | None:
 def _values_at(
     parts: Sequence[Expression], base: Mapping[str, Fraction], parameters: Sequence[str]
 ) -> list[Expression]:
-    """Return the expressions at a point of the coordinates; [] if one of them has no value there."""
+    """Return the expressions at the point ``base`` of the coordinates; [] if one of them has no value there."""
     try:
         evaluate_precisely(parts, {**sample_point(parameters, parameters, 0), **base}, DIGITS)
     except DomainError:

@@ -1,4 +1,4 @@
-"""Decision of the Jacobi identity of a Poisson tensor, in the ring that contains its entries."""
+"""Decision whether a Poisson tensor satisfies the Jacobi identity, in the ring that contains its entries."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from phigen.symbolic.verdict import Statement, decide_elements
 
 
 def jacobi_identity(system: System) -> Statement:
-    """Decide Σ_a (∂_a π_ij π_ak + ∂_a π_jk π_ai + ∂_a π_ki π_aj) = 0 for all i < j < k, with symbolic parameters.
+    """Decide Σ_a (∂_a π_ij π_ak + ∂_a π_jk π_ai + ∂_a π_ki π_aj) = 0 for all i < j < k, with parameters as symbols.
 
-    A refutation names the first triple i, j, k with a point where the sum is not zero.
+    If the identity is refuted, the statement names the first triple i, j, k, with a point where the sum is not 0.
     """
     names = system.coordinates
     entries = [e for row in system.poisson for e in row]
@@ -27,9 +27,9 @@ def jacobi_identity(system: System) -> Statement:
 
 
 def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
-    """Yield the names and values of the cyclic sums other than 0, as `Poly`.
+    """Yield the nonzero cyclic sums of the Jacobi identity, with the names of their three coordinates.
 
-    They are computed from products of non-zero factors, of which large structures have few.
+    Only products of two nonzero factors are computed, of which large structures have few.
     """
     names = system.coordinates
     n = range(len(names))
@@ -44,7 +44,7 @@ def _residuals(system: System, tower: Tower) -> Iterator[tuple[str, Poly]]:
                 for a in sorted(index[s] for s in tower.names_in(entry) if s in index):
                     slope = tower.derivative(entry, names[a])
                     for k, second_factor in rows[a].items() if slope != 0 else ():
-                        # each triple once, in one of its cyclic orders
+                        # only one of the cyclic orders of each triple
                         if k not in (i, j) and (i < j < k or j < k < i or k < i < j):
                             indices = (min(i, j, k), i + j + k - min(i, j, k) - max(i, j, k), max(i, j, k))
                             sums[indices] = sums.get(indices, tower.zero) + tower.product(slope, second_factor)

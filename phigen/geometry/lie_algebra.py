@@ -1,7 +1,7 @@
-"""Lie algebras by structure constants, with faithful matrices if known.
+"""Lie algebras, given by structure constants, with faithful matrices if these are known.
 
-The structure constants are defined by [E_i, E_j] = Σ_k c_ij^k E_k; on the dual, {x_i, x_j} = Σ_k c_ij^k x_k. ``sign:
-minus`` in a spec negates all c_ij^k; the matrices −ρ(E_i) then represent the negated algebra.
+The structure constants c_ij^k are defined by [E_i, E_j] = Σ_k c_ij^k E_k. On the dual, {x_i, x_j} = Σ_k c_ij^k x_k.
+With ``sign: minus`` in a spec, all c_ij^k are negated; this algebra is represented by the matrices −ρ(E_i).
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from functools import cached_property
 from phigen.geometry.field import Field, Scalar
 from phigen.symbolic.expression import Expression, symbol, total
 
-#: Sparse vector, by index, and sparse matrix, by (row, column), of non-zero scalars.
+#: Sparse vector and sparse matrix: index, or (row, column), → nonzero scalar.
 Vector = dict[int, Scalar]
 SparseMatrix = dict[tuple[int, int], Scalar]
 
 
 @dataclass(frozen=True)
 class Representation:
-    """Matrices ρ(E_i) with ρ([E_i, E_j]) = [ρ(E_i), ρ(E_j)], each by its non-zero entries: (row, column) → value."""
+    """Matrices ρ(E_i) with ρ([E_i, E_j]) = [ρ(E_i), ρ(E_j)]; each maps (row, column) → nonzero entry."""
 
     name: str
     size: int
@@ -31,8 +31,8 @@ class Representation:
 class LieAlgebra:
     """Lie algebra over Q(parameters) with a basis E_1 … E_n.
 
-    ``constants[(i, j)][k]`` is c_ij^k for i < j, without values 0; c_ji^k = −c_ij^k. ``representation`` is a faithful
-    one if the source of the algebra, such as the spec, has one.
+    ``constants[(i, j)][k]`` is c_ij^k for i < j; zeros are left out, and c_ji^k = −c_ij^k. ``representation`` is
+    faithful, and set if the spec or the named family provides matrices. ``labels`` are names of the E_i for messages.
     """
 
     name: str
@@ -42,7 +42,7 @@ class LieAlgebra:
     labels: tuple[str, ...] = field(default=())
 
     def bracket(self, i: int, j: int) -> Mapping[int, Expression]:
-        """Return [E_i, E_j] as a map k → c_ij^k."""
+        """Return [E_i, E_j] as a map k → c_ij^k, without zeros."""
         if i == j:
             return {}
         if i < j:
@@ -65,7 +65,7 @@ class LieAlgebra:
         return tuple(tuple(total(c * x[k] for k, c in sorted(self.bracket(i, j).items())) for j in n) for i in n)
 
     def opposite(self) -> LieAlgebra:
-        """Return the algebra with the negated bracket, represented by −ρ(E_i)."""
+        """Return the algebra with the negated bracket, which is represented by the matrices −ρ(E_i)."""
         rep = self.representation
         if rep is not None:
             negated = tuple({position: -v for position, v in m.items()} for m in rep.matrices)

@@ -1,4 +1,4 @@
-"""Exact linear algebra for sparse vectors over a `Field`."""
+"""Exact linear algebra for sparse vectors with entries in a `Field`."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ Key = TypeVar("Key", bound=Any)
 @dataclass
 class _Row(Generic[Key]):
     pivot: Key
-    entries: dict[Key, Scalar]  # entries of the row, 1 at its pivot
-    combination: dict[int, Scalar]  # coefficients of the original vectors
+    entries: dict[Key, Scalar]  # key → entry; 1 at the pivot
+    combination: dict[int, Scalar]  # the row as a combination of the given vectors
 
 
 class Span(Generic[Key]):
-    """Span of sparse vectors (key → non-zero scalar), with coordinates of its elements in terms of these vectors.
+    """The span of some sparse vectors (key → nonzero scalar), with coordinates of its elements in terms of these
+    vectors.
 
-    ``dependent`` has the positions of vectors that are combinations of earlier ones.
+    ``dependent`` has the positions of those vectors that are linear combinations of earlier ones.
     """
 
     def __init__(self, field: Field, vectors: Iterable[Mapping[Key, Scalar]]) -> None:
@@ -42,7 +43,8 @@ class Span(Generic[Key]):
         return len(self._rows)
 
     def coordinates(self, vector: Mapping[Key, Scalar]) -> dict[int, Scalar] | None:
-        """Return c with vector = Σ c[i]·vectors[i], without values 0; None if the vector is not in the span."""
+        """Return the coefficients c with vector = Σ c[i]·vectors[i], without zeros; None if the vector is not in the
+        span."""
         remainder, combination = self._reduce(vector)
         return None if remainder else {i: -c for i, c in sorted(combination.items())}
 
@@ -68,7 +70,8 @@ class Span(Generic[Key]):
     def _reduce(self, vector: Mapping[Key, Scalar]) -> tuple[dict[Key, Scalar], dict[int, Scalar]]:
         remainder = {k: v for k, v in vector.items() if v != 0}
         combination: dict[int, Scalar] = {}
-        # No row contains the pivot of another row, so only the pivots that occur in the vector need to be eliminated.
+        # A row does not contain the pivots of other rows. So each pivot in the vector is eliminated once, and no new
+        # pivots appear.
         for row, factor in [(self._by_pivot[k], v) for k, v in remainder.items() if k in self._by_pivot]:
             add_multiple(remainder, row.entries, -factor)
             add_multiple(combination, row.combination, -factor)
@@ -76,7 +79,7 @@ class Span(Generic[Key]):
 
 
 def add_multiple(target: dict[Key, Scalar], source: Mapping[Key, Scalar], factor: Scalar) -> None:
-    """Add ``factor``·``source`` to ``target`` in place; entries that become 0 are removed."""
+    """Add ``factor``·``source`` to the sparse vector ``target`` in place; entries that become 0 are removed."""
     for k, v in source.items():
         value = target[k] + factor * v if k in target else factor * v
         if value == 0:
@@ -88,7 +91,7 @@ def add_multiple(target: dict[Key, Scalar], source: Mapping[Key, Scalar], factor
 def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> list[dict[int, Scalar]]:
     """Return a basis of the vectors v of length ``size`` with Σ_k row[k]·v[k] = 0 for all rows.
 
-    Each basis vector is 1 at its last non-zero position, where the other basis vectors are 0.
+    Each basis vector is 1 at its last nonzero position; all other basis vectors are 0 at this position.
     """
     echelon: dict[int, dict[int, Scalar]] = {}
     for row in sorted(rows, key=len):
@@ -116,7 +119,7 @@ def kernel(field: Field, rows: Sequence[Mapping[int, Scalar]], size: int) -> lis
 
 
 def coprime_integers(vector: Mapping[Any, Scalar]) -> dict[Any, int]:
-    """Return the multiple of a vector over Q with coprime integers as entries; the entry with the smallest key is
+    """Return the multiple of a vector over Q whose entries are coprime integers; the entry with the smallest key is
     positive."""
     exact = {k: rational(v) for k, v in sorted(vector.items())}
     scale = lcm(*(v.denominator for v in exact.values()))
@@ -127,10 +130,10 @@ def coprime_integers(vector: Mapping[Any, Scalar]) -> dict[Any, int]:
 
 
 def inverse_matrix(rows: Sequence[Sequence[Expression]]) -> tuple[tuple[Expression, ...], ...]:
-    """Return the inverse of a square matrix of expressions, in lowest terms. Raises ZeroDivisionError if it is
-    singular.
+    """Return the inverse of a square matrix of expressions, with entries in lowest terms.
 
-    Functions of symbols count as independent symbols, as in `Field`.
+    Functions of symbols count as independent symbols, as in `Field`. Raises `ZeroDivisionError` if the matrix is
+    singular.
     """
     field = Field(e for row in rows for e in row)
     n = len(rows)

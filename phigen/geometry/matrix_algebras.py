@@ -1,4 +1,4 @@
-"""Lie algebras from matrices and from structure constants, after checks that these define a Lie algebra."""
+"""Lie algebras from matrices and from structure constants in specs, after a check that these define a Lie algebra."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Matrix = tuple[tuple[Expression, ...], ...]
 
 
 def from_matrices(matrices: Sequence[Matrix]) -> LieAlgebra:
-    """Return the Lie algebra whose basis are these square matrices; entries may contain parameters.
+    """Return the Lie algebra with these square matrices as its basis; their entries may contain parameters.
 
-    Raises `SpecError` for matrices of different sizes, for a linearly dependent matrix, and for a commutator outside
-    the span, with the pair of matrices.
+    Raises `SpecError` for matrices of different sizes, for a linearly dependent matrix, and for two matrices whose
+    commutator is outside the span.
     """
     size = len(matrices[0])
     for i, m in enumerate(matrices):
@@ -35,7 +35,11 @@ def from_matrices(matrices: Sequence[Matrix]) -> LieAlgebra:
 def algebra_of_sparse_matrices(
     name: str, size: int, matrices: Sequence[Mapping[tuple[int, int], Expression]]
 ) -> LieAlgebra:
-    """Return the Lie algebra of `from_matrices` for matrices given by their non-zero entries (row, column) → value."""
+    """Return the Lie algebra with these matrices as its basis, each given by its nonzero entries: (row, column) →
+    value.
+
+    Raises `SpecError` for a linearly dependent matrix, and for two matrices whose commutator is outside the span.
+    """
     field = Field(e for m in matrices for e in m.values())
     converted = [{position: field.convert(e) for position, e in m.items()} for m in matrices]
     span = Span(field, converted)
@@ -77,10 +81,10 @@ def product(a: SparseMatrix, b: SparseMatrix) -> SparseMatrix:
 def from_structure_constants(
     dimension: int, structure: Mapping[int, Mapping[int, Mapping[int, Expression]]]
 ) -> LieAlgebra:
-    """Return the algebra with [E_i, E_j] = Σ_k structure[i][j][k] E_k, with indices from 0.
+    """Return the Lie algebra with [E_i, E_j] = Σ_k structure[i][j][k] E_k, with indices from 0.
 
-    A pair may be given in one order or in both. Raises `SpecError` for indices out of range, for pairs that contradict
-    antisymmetry, and if the Jacobi identity fails, with the triple.
+    The bracket of a pair may be given in one order or in both. Raises `SpecError` for indices out of range, for
+    brackets that contradict antisymmetry, and for the first triple for which the Jacobi identity fails.
     """
     indices = [i for i, row in structure.items() for j, ks in row.items() for i in (i, j, *ks)]
     if indices and max(indices) >= dimension:
@@ -127,9 +131,9 @@ def _expect_jacobi(algebra: LieAlgebra) -> None:
 
 
 def failing_jacobi(algebra: LieAlgebra) -> tuple[tuple[int, int, int], int, Expression] | None:
-    """Return the first triple for which the Jacobi identity fails, with a component of the sum and its value.
+    """Return the first triple for which the Jacobi identity fails, with the index and the value of a nonzero component.
 
-    Returns None if the identity holds.
+    Returns None if the identity is not refuted for any triple.
     """
     for triple in combinations(range(algebra.dimension), 3):
         for component, residual in jacobi_residuals(algebra, *triple).items():
@@ -139,7 +143,7 @@ def failing_jacobi(algebra: LieAlgebra) -> tuple[tuple[int, int, int], int, Expr
 
 
 def jacobi_residuals(algebra: LieAlgebra, i: int, j: int, k: int) -> dict[int, Expression]:
-    """Return [[E_i, E_j], E_k] + cyclic by component, without components that are literally 0."""
+    """Return [[E_i, E_j], E_k] + cyclic as a map: component → value, without components that are literally 0."""
     terms: dict[int, list[Expression]] = {}
     for a, b, c in ((i, j, k), (j, k, i), (k, i, j)):
         for m, v in algebra.bracket(a, b).items():

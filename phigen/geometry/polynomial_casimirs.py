@@ -1,4 +1,4 @@
-"""Polynomial Casimirs of a polynomial π, by exact linear algebra for their coefficients."""
+"""Search for polynomial Casimirs of a polynomial π, by exact linear algebra for their coefficients."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from phigen.geometry.shapes import LiePoisson, Matrix, Shape, Terms, coordinate_
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.horner import horner
 
-#: Largest number of unknown coefficients in a linear system, without and with parameters in π.
+#: Largest number of unknown coefficients of the linear equations, if π contains no parameters, and if it contains some.
 UNKNOWNS, UNKNOWNS_WITH_PARAMETERS = 800, 60
 
 Exponents = tuple[int, ...]
@@ -25,7 +25,8 @@ def polynomial_casimirs(
     """Yield a basis of the polynomial Casimirs without constant terms, of degree 1, then 2, … up to ``degree``.
 
     If all terms of π have the same degree, the Casimirs are homogeneous; otherwise those of degree d may contain terms
-    of lower degree. Degrees whose linear system is too large are skipped, which is added to ``notes``.
+    of lower degree. If the linear equations for a degree are too large, the search ends, and a note is added to
+    ``notes``.
     """
     n = len(coordinates)
     candidates = (
@@ -57,7 +58,10 @@ def polynomial_casimirs(
 
 
 def _linear_terms(algebra: LieAlgebra) -> list[Terms]:
-    """Return the result of `coordinate_terms` for the entries of a Lie–Poisson tensor, from its structure constants."""
+    """Return the entries of a Lie–Poisson tensor as polynomials, row by row, from the structure constants.
+
+    The form of the result is that of `coordinate_terms`.
+    """
     n = range(algebra.dimension)
     units = [tuple(int(k == m) for m in n) for k in n]
     return [{units[k]: c for k, c in sorted(algebra.bracket(i, j).items(), reverse=True)} for i in n for j in n]
@@ -78,8 +82,10 @@ def _monomials(n: int, degree: int) -> list[Exponents]:
 
 
 def _equations(entries: list[list[dict[Exponents, Scalar]]], monomials: list[Exponents]) -> list[dict[int, Scalar]]:
-    """Return the linear equations for the coefficients as sparse rows, one for each row of π and each monomial in
-    it."""
+    """Return the linear equations for the coefficients of the ``monomials`` in a Casimir, as sparse rows.
+
+    There is one equation for each row of π and each monomial that occurs in it.
+    """
     rows: dict[tuple[int, Exponents], dict[int, Scalar]] = {}
     for column, monomial in enumerate(monomials):
         for j, exponent in enumerate(monomial):

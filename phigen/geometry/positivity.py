@@ -1,4 +1,4 @@
-"""Statements that an expression is positive, or not negative: by its form, or at the starts of runs."""
+"""Statements that an expression is positive, or nowhere negative: by its form, or at the starts of runs."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement
 
-#: Signs of real values that can follow from the form of an expression.
+#: Signs of the real values of an expression that can follow from its form.
 POSITIVE, NOT_NEGATIVE = "positive", "not negative"
 _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIVE, "E": POSITIVE}
 
 
 def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequence[Mapping[str, float]]) -> Statement:
-    """Decide whether ``e`` is positive where it is defined, except for zeros; ``positive`` names positive symbols.
+    """Return the statement that ``e`` is positive, except where it is not defined or, if only its form decides, where
+    it is 0.
 
-    The statement is refuted if ``e`` is not positive at one of ``starts``, proved if its form shows the sign, and else
-    checked at the starts.
+    The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. It is proved if the form of
+    ``e`` shows the sign, given that the symbols ``positive`` are positive. Otherwise it is checked at the starts.
     """
     for point in starts:
         try:
@@ -41,7 +42,10 @@ def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequ
 def not_negative(
     name: str, e: Expression, positive: Collection[str], points: Sequence[Mapping[str, float]]
 ) -> Statement | None:
-    """Decide whether ``e`` is nowhere negative: by its form, else at ``points``; None without points."""
+    """Return the statement that ``e`` is nowhere negative, decided by its form or else at some ``points``.
+
+    Returns None if the form does not decide it and there are no points.
+    """
     if _sign_of_negative(e, positive) == POSITIVE:
         return Statement(name, REFUTED, "negative by its form", shortened(e))
     if sign_of(e, positive):
@@ -68,13 +72,13 @@ def _sign_of_negative(e: Expression, positive: Collection[str]) -> str | None:
 
 
 def sign_of(e: Expression, positive: Collection[str]) -> str | None:
-    """Return the sign that follows from the form of an expression, for positive symbols ``positive``; None if none
-    follows."""
+    """Return the sign of an expression, if it follows from its form; else None. The symbols ``positive`` are
+    positive."""
 
     def visit(e: Expression, args: list[str | None]) -> str | None:
         if e.op == "number":
             return POSITIVE if e.value > 0 else NOT_NEGATIVE if e.value == 0 else None
-        if e.op == "neg":  # the argument is a negative number, or a product with one
+        if e.op == "neg":  # decided only if the argument is a negative number or a product with one
             return _sign_of_negative(e.args[0], positive)
         if e.op == "symbol":
             return POSITIVE if e.value in positive else None
@@ -85,11 +89,11 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
                 return args[0] or NOT_NEGATIVE
             return None if None in args else NOT_NEGATIVE if NOT_NEGATIVE in args else POSITIVE
         if e.op == "pow":
-            # A fractional power has a value only for arguments ≥ 0, and that is not negative.
+            # A power with an even denominator has a value only for arguments ≥ 0; this value is not negative.
             exponent = Fraction(e.value)
             is_even = exponent.denominator % 2 == 0 or exponent.numerator % 2 == 0
             sign = args[0] or (NOT_NEGATIVE if is_even else None)
-            # 1/0 has no value, so the inverse of a non-negative value is positive
+            # 1/0 has no value, so the inverse of a value that is not negative is positive
             return POSITIVE if sign and exponent < 0 else sign
         return _ALWAYS.get(e.op)
 

@@ -1,4 +1,4 @@
-"""Structures that are defined in other coordinates y = ψ(x): the inverse of ψ, and π in the coordinates x."""
+"""Poisson structures that a spec states in other coordinates y = ψ(x): the inverse of ψ, and π in the coordinates x."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from phigen.symbolic.verdict import decide_zero
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Change of coordinates y = ψ(x).
+    """A change of coordinates y = ψ(x).
 
-    ``forward`` is ψ as expressions in x, ``backward`` is ψ⁻¹ as expressions in y, and ``jacobian[i][a]`` is ∂x_i/∂y_a
-    at y = ψ(x).
+    ``forward`` is ψ as expressions in x, and ``backward`` is ψ⁻¹ as expressions in y. ``jacobian[i][a]`` is ∂x_i/∂y_a
+    at y = ψ(x), as an expression in x.
     """
 
     forward: tuple[Expression, ...]
@@ -41,9 +41,9 @@ class Coordinates:
 
 
 def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coordinates:
-    """Return the change of coordinates of a pull-back form, with the inverse of its map.
+    """Return the change of coordinates of a ``pullback`` form, with the inverse of its map.
 
-    Raises `SpecError` if the spec has no inverse and phigen finds none, or if the inverse in the spec is wrong.
+    Raises `SpecError` if the inverse in the spec is wrong, or if the spec has none and phigen finds none.
     """
     _expect_size(form, coordinates)
     backward = form.inverse or _inverse(form, coordinates)
@@ -58,7 +58,7 @@ def change_of_coordinates(form: PullbackForm, coordinates: Sequence[str]) -> Coo
 
 
 def pulled_back(form: PullbackForm, inner: Matrix, coordinates: Sequence[str]) -> Matrix:
-    """Return π_ij = Σ ∂x_i/∂y_a {y_a, y_b} ∂x_j/∂y_b as a function of x; ``inner`` is the matrix {y_a, y_b}."""
+    """Return π_ij = Σ ∂x_i/∂y_a {y_a, y_b} ∂x_j/∂y_b as functions of x; ``inner`` is the matrix {y_a, y_b}."""
     change = change_of_coordinates(form, coordinates)
     foreign = [s for s in symbols_of(*(e for row in inner for e in row)) if s in coordinates]
     if foreign:
@@ -83,9 +83,9 @@ def _expect_size(form: PullbackForm, coordinates: Sequence[str]) -> None:
 
 
 def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...]:
-    """Return x as a function of y, solved one coordinate after another, each from an equation without other unknowns.
+    """Return x as a function of y: one coordinate after another is solved from an equation without other unknowns.
 
-    Raises `SpecError` if there is no such equation for a coordinate.
+    Raises `SpecError` if at some point there is no such equation.
     """
     of_affine = _of_affine_map(form, coordinates)
     if of_affine is not None:
@@ -138,7 +138,8 @@ def _next_solved(
 
 
 def _solved_for(e: Expression, value: Expression, x: str) -> Expression | None:
-    """Return x from e(x) = value: directly if e is linear in x, else by inverting one operation after another.
+    """Return the solution x of e(x) = value: directly if e is linear in x, else by inverting one operation after
+    another.
 
     Returns None if an operation has no known inverse.
     """
@@ -169,6 +170,6 @@ def _solved_for(e: Expression, value: Expression, x: str) -> Expression | None:
 
 
 def _simplified(e: Expression) -> Expression:
-    """Return the expression in normal form, if this takes fewer operations; else unchanged."""
+    """Return an expression in the normal form of its ring, or unchanged if it has fewer operations."""
     tower = Tower(symbols_of(e), [e])
     return min(tower.expression(tower.convert(e)), e, key=lambda f: sum(1 for node in topological([f]) if node.args))

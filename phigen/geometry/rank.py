@@ -1,4 +1,5 @@
-"""Generic rank: the rank of a matrix of expressions, computed at exact rational points modulo primes."""
+"""Generic rank of a matrix of expressions: its rank at sample points with rational coordinates, computed modulo
+primes."""
 
 from __future__ import annotations
 
@@ -13,21 +14,21 @@ from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.numeric import DomainError, evaluate_exactly, evaluate_with_scale, is_rational
 from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 
-#: Number of points at which a rank is computed; the largest rank counts.
+#: Number of points at which the rank is computed; the largest of these ranks is the result.
 POINTS = 3
 ATTEMPTS = 64
 #: Primes modulo which ranks are computed. A rank modulo a prime never exceeds the rank over Q, and is smaller only for
-#: unlucky primes, so the larger of the ranks modulo two primes is taken.
+#: few primes. So the larger one of the ranks modulo the two primes is taken.
 PRIMES = (2**61 - 1, 2**63 - 25)
 
 Rows = Sequence[Sequence[Expression]]
 
 
 def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> list[int] | None:
-    """Return the rank of each matrix at generic points; None if no point in the domain was found.
+    """Return the rank of each matrix at generic points; None if no point was found at which all entries have values.
 
-    The rank at a point never exceeds the generic rank, and is smaller only at unlucky points. So the result is the
-    largest rank at `POINTS` points. Entries that are no rational functions are evaluated to `DIGITS` digits.
+    The rank at a point never exceeds the generic rank, and is smaller at exceptional points only. So the result is the
+    largest rank at `POINTS` points. If entries are not rational functions, they are evaluated to `DIGITS` digits.
     """
     roots = [e for m in matrices for row in m for e in row]
     names, exact = symbols_of(*roots), is_rational(*roots)
@@ -42,7 +43,7 @@ def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> l
             ranks_at_points.append([rank([[next(in_turn) for _ in row] for row in m]) for m in matrices])
         except DomainError:
             continue
-        if len(ranks_at_points) == POINTS or not names:  # a matrix of numbers has the same rank at all points
+        if len(ranks_at_points) == POINTS or not names:  # without symbols, one point is enough
             break
     return [max(ranks) for ranks in zip(*ranks_at_points, strict=True)] if ranks_at_points else None
 
@@ -52,7 +53,7 @@ def _exact_rank(rows: Sequence[Sequence[Fraction]]) -> int:
         return 0
     ranks = []
     for prime in PRIMES:
-        with suppress(ValueError):  # raised if a denominator has no inverse modulo the prime
+        with suppress(ValueError):  # raised if the prime divides a denominator
             ranks.append(int(nmod_mat(len(rows), len(rows[0]), _residues(rows, prime), prime).rank()))
     if not ranks:
         raise DomainError("denominators that the primes divide")
@@ -64,9 +65,10 @@ def _residues(rows: Sequence[Sequence[Fraction]], prime: int) -> list[int]:
 
 
 def _numerical_rank(rows: Sequence[Sequence[tuple[Any, Any]]]) -> int:
-    """Return the rank of a matrix of pairs (value, scale), by elimination with full pivoting.
+    """Return the rank of a matrix by elimination with full pivoting; each entry is a pair (value, scale).
 
-    Values that are tiny relative to the largest scale count as 0.
+    The scale bounds the terms of which the value is the sum. Values that are tiny relative to the largest scale count
+    as 0.
     """
     left = [[value for value, _ in row] for row in rows]
     threshold = max((scale for row in rows for _, scale in row), default=1) * 10**-ZERO_DIGITS

@@ -1,11 +1,11 @@
-"""Faithful matrix representations of a Lie algebra, derived from its structure constants.
+"""Faithful matrix representations of Lie algebras, found from the structure constants.
 
-Each indecomposable part has its own representation: the first in this list that is faithful and that the caller
-accepts.
+Each indecomposable part of an algebra gets a representation of its own. It is the first one in this list that is
+faithful and that the caller accepts:
 
 - the defining matrices of a named family with the same structure constants, or with the negated ones
 - the adjoint representation, if the centre is 0
-- the adjoint representation with nilpotent characters, if the centre is outside [g, g]
+- the adjoint representation with nilpotent characters, if no element of the centre except 0 lies in [g, g]
 - the affine representation of a two-step nilpotent algebra
 """
 
@@ -21,18 +21,21 @@ from phigen.geometry.linear import Span, kernel
 from phigen.symbolic.expression import Expression
 
 Sparse = dict[tuple[int, int], Scalar]
-#: Largest dimension of an algebra that is compared with named families.
+#: Largest dimension of an algebra whose structure constants are compared with those of named families.
 _LARGEST_MATCHED = 45
 
 
 def known_representation(algebra: LieAlgebra) -> Representation | None:
-    """Return the representation in the source of the algebra, or that of a named family with the same constants; else
-    None."""
+    """Return the matrices that the spec gives for an algebra, or those of a named family with the same structure
+    constants.
+
+    Returns None if there are none.
+    """
     return algebra.representation or next(_matching_families(algebra), None)
 
 
 def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
-    """Yield faithful representations in order of preference, without the one in the source of the algebra."""
+    """Yield faithful representations in the order of preference; the matrices that a spec gives are not among them."""
     yield from _matching_families(algebra)
     field = algebra.field
     adjoint = _adjoint(algebra, field)
@@ -45,8 +48,8 @@ def candidates(algebra: LieAlgebra) -> Iterator[Representation]:
 
 
 def indecomposable_parts(algebra: LieAlgebra) -> list[list[int]]:
-    """Return the finest partition of the basis such that each part spans an ideal, as sorted lists of indices from
-    0."""
+    """Return the finest partition of the basis elements in which each part spans an ideal, as sorted lists of indices
+    from 0."""
     part = list(range(algebra.dimension))
     for (i, j), row in algebra.constants.items():
         merged = {part[m] for m in (i, j, *row)}
@@ -56,7 +59,7 @@ def indecomposable_parts(algebra: LieAlgebra) -> list[list[int]]:
 
 
 def restricted(algebra: LieAlgebra, part: Sequence[int]) -> LieAlgebra:
-    """Return the ideal that some basis elements span, with these elements as its basis."""
+    """Return the ideal that the basis elements with the indices ``part`` span, with these elements as its basis."""
     position = {i: new_index for new_index, i in enumerate(part)}
     constants = {
         (position[i], position[j]): {position[k]: c for k, c in row.items()}
@@ -80,7 +83,7 @@ def _matching_families(algebra: LieAlgebra) -> Iterator[Representation]:
 
 
 def _plain(algebra: LieAlgebra) -> dict[tuple[int, int], dict[int, Expression]]:
-    # Equal constants are one object each, so the maps of two algebras can be compared by ==.
+    # Equal expressions are the same object, so the constants of two algebras can be compared by ==.
     return {ij: dict(row) for ij, row in algebra.constants.items() if row}
 
 
@@ -90,7 +93,7 @@ def _adjoint(algebra: LieAlgebra, field: Field) -> list[Sparse]:
 
 
 def _rows_of(matrices: Sequence[Sparse], field: Field) -> list[dict[int, Scalar]]:
-    """Return the linear equations for v in Σ v_i·matrices[i] = 0."""
+    """Return the linear equations for the coefficients v in Σ v_i·matrices[i] = 0, as sparse rows."""
     rows: dict[tuple[int, int], dict[int, Scalar]] = {}
     for i, m in enumerate(matrices):
         for position, v in m.items():
@@ -103,12 +106,13 @@ def _with_characters(
 ) -> Iterator[Representation]:
     """Yield the adjoint representation, extended by 2×2 blocks (0 χ; 0 0) that make it faithful on the centre.
 
-    There is one block for each dimension of the centre; χ is a linear form that vanishes on [g, g]. A nilpotent block
-    adds nothing to PE_iP, while a diagonal block would add a cubic term.
+    There is one block for each dimension of the centre; χ is a linear form that vanishes on [g, g]. Nilpotent blocks
+    add nothing to P E_i P in the Cayley transform, while diagonal blocks would add cubic terms. Nothing is yielded if
+    there are too few such forms.
     """
     derived = [{k: field.convert(c) for k, c in row.items()} for row in algebra.constants.values()]
     forms: list[dict[int, Scalar]] = []
-    central_values: list[dict[int, Scalar]] = []  # values on the centre of the forms chosen so far
+    central_values: list[dict[int, Scalar]] = []  # for each chosen form: index of a central vector → value
     for form in kernel(field, derived, algebra.dimension):
         values = {m: v for m, z in enumerate(centre) if (v := _pairing(form, z, field)) != 0}
         if values and not Span(field, [*central_values, values]).dependent:
@@ -133,7 +137,7 @@ def _pairing(form: dict[int, Scalar], vector: dict[int, Scalar], field: Field) -
 
 
 def _two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> Iterator[Representation]:
-    """Yield X ↦ (½ad_X X; 0 0) on g ⊕ R, which represents g if [[g, g], g] = 0."""
+    """Yield the matrices (½ad_X X; 0 0) for X in g, on the space g ⊕ R; they represent g if [[g, g], g] = 0."""
     derived = [set(row) for row in algebra.constants.values()]
     touched = sorted({k for row in derived for k in row})
     if any(adjoint[k] for k in touched) and not _is_two_step(algebra, adjoint, field):

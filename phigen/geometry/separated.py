@@ -1,4 +1,4 @@
-"""Recognition of π_ij = g_i(x_i) A_ij g_j(x_j) with constant A, which is constant in the coordinates ∫
+"""Recognition of π_ij = g_i(x_i) A_ij g_j(x_j) with constant A; such a π is constant in the coordinates ∫
 dx_i/g_i(x_i)."""
 
 from __future__ import annotations
@@ -13,16 +13,17 @@ from phigen.symbolic.tower import Poly, Tower
 
 @dataclass(frozen=True)
 class Separated:
-    """Factors of π_ij = g_i(x_i) A_ij g_j(x_j): ``factors[i]`` is g_i, and ``matrix`` is A."""
+    """The factors of π_ij = g_i(x_i) A_ij g_j(x_j): ``factors[i]`` is g_i, and ``matrix`` is A."""
 
     factors: tuple[Expression, ...]
     matrix: Matrix
 
 
 def separated(coordinates: Sequence[str], poisson: Matrix) -> Separated | None:
-    """Return the factors g_i and A of π, with constant factors in A; None if π does not have this form.
+    """Return the functions g_i and the matrix A with π_ij = g_i(x_i) A_ij g_j(x_j); None if π does not have this form.
 
-    Each entry is factored into irreducible polynomials over Q in coordinates, parameters and function values.
+    Constant factors belong to A. Each entry is factored into irreducible polynomials over Q in coordinates, parameters
+    and function values.
     """
     upper = {(i, j): poisson[i][j] for j in range(len(coordinates)) for i in range(j)}
     parameters = [s for s in symbols_of(*upper.values()) if s not in coordinates]
@@ -45,7 +46,8 @@ def separated(coordinates: Sequence[str], poisson: Matrix) -> Separated | None:
 
 
 def _parts(tower: Tower, element: Poly, coordinates: Sequence[str]) -> dict[int, list[tuple[Poly, int]]] | None:
-    """Return the irreducible factors by the index of the coordinate on which they depend, with −1 for constants.
+    """Return the irreducible factors of an entry of π, by the index of the coordinate on which they depend; −1 for
+    constants.
 
     Returns None if a factor depends on several coordinates.
     """

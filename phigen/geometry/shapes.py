@@ -1,4 +1,5 @@
-"""Shapes of Poisson tensors: recognition of the kind of a matrix π, for any notation of its entries.
+"""Shapes of Poisson tensors, such as constant or Lie–Poisson, recognised from the matrix π in whatever way it is
+written.
 
 Coefficients may contain parameters, and functions of parameters.
 """
@@ -14,7 +15,7 @@ from phigen.symbolic.expression import ZERO, Expression, symbols_of
 from phigen.symbolic.tower import Poly, Tower
 
 Matrix = tuple[tuple[Expression, ...], ...]
-#: Polynomial: the exponents of the coordinates → coefficient, an expression in the parameters.
+#: Polynomial in the coordinates: exponents → coefficient, which is an expression in the parameters.
 Terms = dict[tuple[int, ...], Expression]
 
 
@@ -30,7 +31,8 @@ class Constant:
 
 @dataclass(frozen=True)
 class Canonical:
-    """Shape of a constant π with {q_i, p_i} = 1 and all other brackets 0; the remaining coordinates are Casimirs."""
+    """Shape of a constant π with {q_i, p_i} = 1; all other brackets are 0, and the coordinates in ``rest`` are
+    Casimirs."""
 
     q: tuple[str, ...]
     p: tuple[str, ...]
@@ -44,7 +46,7 @@ class Canonical:
 
 @dataclass(frozen=True)
 class LogCanonical:
-    """Shape {x_i, x_j} = a_ij x_i x_j with constant a_ij."""
+    """Shape {x_i, x_j} = a_ij x_i x_j with constants a_ij, the matrix ``a``."""
 
     a: Matrix
 
@@ -54,7 +56,7 @@ class LogCanonical:
 
 @dataclass(frozen=True)
 class LiePoisson:
-    """Shape {x_i, x_j} = Σ_k c_ij^k x_k, on the dual of a Lie algebra; the Jacobi identity is not checked here."""
+    """Shape {x_i, x_j} = Σ_k c_ij^k x_k, on the dual of a Lie algebra. Its Jacobi identity is not checked here."""
 
     algebra: LieAlgebra
 
@@ -66,8 +68,8 @@ class LiePoisson:
 class Affine:
     """Shape {x_i, x_j} = Σ_k c_ij^k x_k + b_ij, from a Lie algebra with a cocycle b.
 
-    ``extension`` is the central extension by b: it has one more basis element z, the last one, and [E_i, E_j] = Σ_k
-    c_ij^k E_k + b_ij z. π is its Lie–Poisson tensor at z = 1. The Jacobi identity is not checked here.
+    ``extension`` is the central extension by b, which has one more basis element z as its last one: [E_i, E_j] = Σ_k
+    c_ij^k E_k + b_ij z. π is the Lie–Poisson tensor of the extension at z = 1. The Jacobi identity is not checked here.
     """
 
     extension: LieAlgebra
@@ -78,7 +80,7 @@ class Affine:
 
 @dataclass(frozen=True)
 class General:
-    """Any other shape."""
+    """Shape of a π that has none of the other shapes."""
 
     def __str__(self) -> str:
         return "general"
@@ -88,7 +90,8 @@ Shape = Constant | Canonical | LogCanonical | LiePoisson | Affine | General
 
 
 def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
-    """Return the shape of π; the first that applies of constant, log-canonical, Lie–Poisson, affine and general."""
+    """Return the first of these shapes that π has: constant or canonical, log-canonical, Lie–Poisson, affine,
+    general."""
     upper = {(i, j): poisson[i][j] for j in range(len(coordinates)) for i in range(j)}
     terms = coordinate_terms(coordinates, list(upper.values()))
     if terms is None:
@@ -104,9 +107,9 @@ def recognise(coordinates: Sequence[str], poisson: Matrix) -> Shape:
 
 
 def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expression]) -> list[Terms] | None:
-    """Return the expressions as polynomials in the coordinates; None if one of them is no polynomial.
+    """Return the expressions as polynomials in the coordinates; None if one of them is not a polynomial.
 
-    Identities are used, such as sin² + cos² = 1.
+    Functions that are polynomials by an identity, such as sin² + cos² = 1, are recognised.
     """
     names = list(coordinates) + [s for s in symbols_of(*expressions) if s not in coordinates]
     tower = Tower(names, expressions)
@@ -123,7 +126,7 @@ def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expressio
 
 
 def _split(tower: Tower, element: Poly, coordinates: Sequence[str]) -> Terms | None:
-    if element == 0:  # Most entries of large structures are 0.
+    if element == 0:  # a shortcut, since most entries of large structures are 0
         return {}
     size = len(coordinates)
     degrees = element.degrees()
@@ -191,7 +194,8 @@ def _affine(coordinates: Sequence[str], entries: dict[tuple[int, int], Terms]) -
 
 
 def skew(upper: dict[tuple[int, int], Expression], n: int) -> Matrix:
-    """Return the skew n×n matrix with these entries above the diagonal; absent entries are 0."""
+    """Return the skew n×n matrix with the entries ``upper`` above the diagonal, by (row, column); absent entries are
+    0."""
 
     def entry(i: int, j: int) -> Expression:
         return upper.get((i, j), ZERO) if i < j else -upper.get((j, i), ZERO)

@@ -1,4 +1,4 @@
-"""Systems inside a system: blocks of π, and structures in other coordinates."""
+"""Systems made of a system: the system of a block of π, and a structure in other coordinates."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from phigen.symbolic.expression import ZERO
 
 
 def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> System:
-    """Return a system with the form ``form`` of π in some coordinates, with the parameters of ``system`` and H = 0.
+    """Return a system with H = 0 in the given coordinates, with π by ``form`` and with the parameters of ``system``.
 
-    Casimirs are not searched for. Raises the errors of `structure`.
+    It has no Casimirs and invariants, which are not searched. Raises the errors of `structure`.
     """
     matrix, shape = structure(form, coordinates)
     return replace(
@@ -33,8 +33,10 @@ def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> Syste
 
 
 def block_of(system: System, indices: Sequence[int]) -> System:
-    """Return the system of the coordinates of a block; its form is the one in the spec, if the spec has one for the
-    block."""
+    """Return the system with H = 0 of the coordinates of a block of π, given by their indices.
+
+    Its form of π is the one that the spec states for this block, if there is one, else the matrix.
+    """
     names = tuple(system.coordinates[i] for i in indices)
     if isinstance(system.form, ProductForm):
         for coordinates, form in system.form.blocks:

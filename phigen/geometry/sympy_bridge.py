@@ -1,4 +1,4 @@
-"""Conversions between sympy and `Expression`, for expressions and for systems.
+"""Conversions of expressions and systems to sympy and back.
 
 Only modules that need sympy import this module, since importing sympy takes a quarter of a second.
 """
@@ -33,13 +33,14 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.special import SPECIAL, order_of
 from phigen.symbolic.symbols import plain
 
-#: Functions whose names differ: name in sympy → name in phigen.
+#: Functions with different names in sympy and phigen: name in sympy → name in phigen.
 _FROM_SYMPY = {"Abs": "abs"}
 _TO_SYMPY = {"abs": "Abs"}
 
 
 def expression(value: Any) -> Expression:
-    """Return a sympy expression or a number as an `Expression`; Floats become the decimals that they print.
+    """Return a sympy expression or a number as an `Expression`; a Float becomes the decimal number that sympy prints
+    for it.
 
     Raises `SpecError` for functions and constants that phigen does not have, and for text, which sympy would evaluate
     as Python. Raises `LimitError` for numbers out of range.
@@ -83,8 +84,8 @@ def _node(e: Any, args: list[Expression]) -> Expression:
 
 
 def _rational(e: Any) -> Fraction:
-    """Return a number as a fraction. Raises `LimitError` beyond the limits for numbers in specs."""
-    # Checked before the conversion, since a Float of 1e999999 has a million digits as a fraction.
+    """Return a sympy number as a fraction. Raises `LimitError` for numbers that are too large or too long for specs."""
+    # The size is checked before the conversion: as a fraction, a Float of 1e999999 has a million digits.
     if abs(e) < limits.NUMBER and (e == 0 or abs(e) > Fraction(1, limits.DENOMINATOR)):
         value = Fraction(str(e)) if e.is_Float else Fraction(int(e.p), int(e.q))
         if limits.number_is_bounded(value):
@@ -94,18 +95,24 @@ def _rational(e: Any) -> Fraction:
 
 
 def named_function(order: int, s: Any) -> Any:
-    """Return a derivative of φ (`phigen.symbolic.special`) as a symbol, in the notation of formulas."""
+    """Return the derivative of φ(s) of some order as a function symbol, with primes, for display in formulas.
+
+    φ is the function of `phigen.symbolic.special`.
+    """
     return sympy.Function(r"\varphi" + "'" * order)(s)
 
 
 def closed_function(order: int, s: Any) -> Any:
-    """Return a derivative of φ(s) = (1 − (√s/2) cot(√s/2))/s in closed form."""
+    """Return the derivative of some order of φ(s) = (1 − (√s/2) cot(√s/2))/s in closed form."""
     u = sympy.Dummy("u")
     return sympy.diff((1 - sympy.sqrt(u) / 2 * sympy.cot(sympy.sqrt(u) / 2)) / u, u, order).subs(u, s)
 
 
 def expanded_function(order: int, s: Any, degree: int) -> Any:
-    """Return a derivative of φ(s) = Σ |B_{2n+2}| s^n/(2n+2)! as a polynomial in s, correct up to a degree."""
+    """Return the derivative of some order of φ(s) = Σ |B_{2n+2}| s^n/(2n+2)! as a polynomial in s.
+
+    The polynomial has the terms of the power series up to ``degree``.
+    """
     u = sympy.Dummy("u")
     terms = (abs(sympy.bernoulli(2 * n + 2)) / sympy.factorial(2 * n + 2) * u**n for n in range(degree + order + 1))
     return sympy.diff(sum(terms), u, order).subs(u, s)
@@ -140,21 +147,21 @@ def to_sympy(
     symbols: Mapping[str, Any] | None = None,
     special: Callable[[int, Any], Any] = named_function,
 ) -> Any:
-    """Return the expression in sympy, for instance for ``sympy.latex``.
+    """Return an expression in sympy, for instance for ``sympy.latex``.
 
     ``symbols`` maps names to sympy symbols; other names become real symbols, and the momentum of x becomes ``p_x``.
-    ``special`` selects the form of the derivatives of φ.
+    ``special`` makes the derivatives of φ: by name, in closed form or as a polynomial.
     """
     return _Sympy(symbols or {}, special).values(familiar([e]))[0]
 
 
 @dataclass(frozen=True)
 class SympySystem:
-    """`System` as sympy objects; `System.from_sympy` converts it back.
+    """A `System` as sympy objects; `System.from_sympy` converts it back.
 
     Symbols are real, and positive for parameters that are positive in the system. ``poisson`` is an immutable n×n
-    matrix, ``parameters`` maps symbols to default values, and ``casimirs`` has the declared Casimirs and those found.
-    ``time`` is the symbol of the time, or None.
+    matrix. ``parameters`` maps symbols to default values. ``casimirs`` has the declared Casimirs, then those that
+    phigen found. ``time`` is the symbol of the time, or None.
     """
 
     name: str
@@ -168,7 +175,7 @@ class SympySystem:
 
 
 class Described(Protocol):
-    """Protocol: attributes of a `System` that have a counterpart in sympy."""
+    """Protocol of the attributes of a `System` that are converted to sympy."""
 
     @property
     def name(self) -> str: ...
@@ -191,7 +198,7 @@ class Described(Protocol):
 
 
 def symbols_in_sympy(system: Described) -> dict[str, Any]:
-    """Return the sympy symbols of the coordinates, the parameters and the time by name."""
+    """Return the sympy symbols of the coordinates, the parameters and the time of a system, by name."""
     real = {c: sympy.Symbol(c, real=True) for c in (*system.coordinates, *system.times)}
     parameters = {p.name: sympy.Symbol(p.name, **_assumed(p)) for p in system.parameters}
     return real | parameters
@@ -202,7 +209,7 @@ def _assumed(parameter: Parameter) -> dict[str, bool]:
 
 
 def free_symbols(names: Iterable[str], used_names: Iterable[str]) -> list[Any]:
-    """Return real symbols with these names; names in use get a trailing underscore."""
+    """Return real sympy symbols with these names; a name that is already used gets a trailing underscore."""
     taken_names = {str(name) for name in used_names}
     result = []
     for name in names:
@@ -214,7 +221,7 @@ def free_symbols(names: Iterable[str], used_names: Iterable[str]) -> list[Any]:
 
 
 def given_back(system: Described) -> SympySystem:
-    """Return a system as sympy objects; see `System.to_sympy`."""
+    """Return a system as sympy objects, for `System.to_sympy`."""
     symbols = symbols_in_sympy(system)
 
     def formula(e: Expression) -> Any:
@@ -241,7 +248,7 @@ def parts(
     invariants: Mapping[str, Any] | None,
     time: Any = None,
 ) -> dict[str, Any]:
-    """Return the arguments of `build_system` for a system from sympy objects; see `System.from_sympy`."""
+    """Return the arguments of `build_system` for a system that is given by sympy objects, for `System.from_sympy`."""
     when = "" if time is None else _name(time)
     names = tuple(_name(c) for c in coordinates)
     matrix = sympy.Matrix(poisson)

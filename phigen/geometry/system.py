@@ -1,4 +1,5 @@
-"""Hamiltonian system on a Poisson manifold with global coordinates: the result of the second stage of the compiler."""
+"""Hamiltonian systems on Poisson manifolds with global coordinates: what the compiler makes of a spec before it chooses
+a method."""
 
 from __future__ import annotations
 
@@ -22,20 +23,20 @@ from phigen.symbolic.symbols import increment
 if TYPE_CHECKING:
     from phigen.geometry.sympy_bridge import SympySystem
 
-#: Largest number of characters of H in the representation of a system.
+#: Largest number of characters of H in the text that represents a system in Python; longer expressions are shortened.
 _SHOWN = 60
 
 
 @dataclass(frozen=True, repr=False)
 class System:
-    """System ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), possibly with ``forces`` and sources of ``noise``.
+    """A system ẋ = π(x)∇H(x), or ẋ = π(x)∇H(t, x), possibly with ``forces`` and with sources of ``noise``.
 
-    ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; expressions use the coordinates and parameters as symbols.
-    ``shape`` is the recognised shape of π, ``form`` the form in the spec. ``casimirs`` has the declared Casimirs in the
-    order of the spec, then those found (``C1``, ``C2``, …); ``declared`` has the names of the declared ones. ``time``
-    is the symbol of t, which H and the invariants may contain, or "". ``observables`` are quantities to record, about
-    which nothing is proved. ``notes`` says which searches were omitted, and why. ``spec`` is the spec of the system;
-    None if it was built in Python.
+    ``poisson`` is the n×n matrix π_ij = {x_i, x_j}; all expressions have the coordinates and parameters as symbols.
+    ``shape`` is the recognised shape of π, and ``form`` its form in the spec. ``casimirs`` has the declared Casimirs in
+    the order of the spec, then those found (``C1``, ``C2``, …); ``declared`` has the names of the declared ones.
+    ``time`` is the symbol of t, which H and the invariants may contain, or "". ``observables`` are quantities to
+    record, about which nothing is proved. ``notes`` says which searches were omitted, and why. ``spec`` is the spec of
+    the system, or None if the system was built in Python.
     """
 
     name: str
@@ -60,7 +61,7 @@ class System:
 
         def __getattr__(self, name: str) -> Any:
             """Raise an `AttributeError`; for ``run``, ``runs`` and ``integrate``, its message says that solvers have
-            these."""
+            these attributes."""
             raise missing_attribute(self, name)
 
     def __repr__(self) -> str:
@@ -80,29 +81,31 @@ class System:
 
     @property
     def times(self) -> tuple[str, ...]:
-        """The symbol of the time as a tuple; empty if the system does not depend on the time."""
+        """The symbol of the time as a tuple of length 1; empty if the system does not depend on the time."""
         return (self.time,) if self.time else ()
 
     @property
     def increments(self) -> tuple[str, ...]:
-        """The symbols of the increments of the noise in a step, one for each source."""
+        """The symbols of the noise increments ΔW in a step, one for each source."""
         return tuple(increment(k) for k in range(len(self.noise)))
 
     @property
     def driven(self) -> bool:
-        """Whether H is not conserved: it depends on the time, or forces or noise do work."""
+        """Whether H may change along the motion: it depends on the time, or there are forces or noise."""
         return bool(self.time) or self.forces is not None or bool(self.noise)
 
     @property
     def frozen(self) -> System:
-        """The system in which the time is one more parameter."""
+        """The same system with the time as a parameter, for statements at a fixed time."""
         standing = tuple(Parameter(t, Fraction(0)) for t in self.times)
         return replace(self, parameters=(*self.parameters, *standing), time="")
 
     @property
     def positive(self) -> tuple[str, ...]:
-        """Names of the parameters that are positive or nonnegative; a statement for all positive values also holds at
-        0."""
+        """The names of the parameters that are declared positive or nonnegative.
+
+        A statement for all positive values of a parameter also holds at 0.
+        """
         return tuple(p.name for p in self.parameters if p.bound)
 
     @property
@@ -111,7 +114,7 @@ class System:
         return self.shape.algebra if isinstance(self.shape, LiePoisson) else None
 
     def vector_field(self) -> tuple[Expression, ...]:
-        """Return the vector field π∇H plus forces, one expression for each coordinate."""
+        """Return the vector field π(∇H + ζ) + f, one expression for each coordinate, without noise."""
         slope = gradient(self.hamiltonian, self.coordinates)
         if self.forces is None:
             return hamiltonian_vector_field(self.poisson, slope)
@@ -120,8 +123,8 @@ class System:
         return tuple(a + b for a, b in zip(tangent, self.forces.vector, strict=True))
 
     def forced_rate(self, function: Expression) -> Expression:
-        """Return the contribution of forces to dF/dt for a function F: ∇F·(πζ + f). For H, this is the power of the
-        forces."""
+        """Return the contribution of the forces to dF/dt for a function F: ∇F·(πζ + f). For F = H, this is their
+        power."""
         if self.forces is None:
             return ZERO
         field = hamiltonian_vector_field(self.poisson, self.forces.covector)
@@ -129,7 +132,7 @@ class System:
         return total(s * (a + b) for s, a, b in zip(slopes, field, self.forces.vector, strict=True) if not s.is_zero)
 
     def forced_rate_of_casimir(self, casimir: Expression) -> Expression:
-        """Return the contribution of forces to dC/dt for a Casimir C: ∇C·f, since πζ conserves C."""
+        """Return the contribution of the forces to dC/dt for a Casimir C: ∇C·f, since πζ does not change C."""
         if self.forces is None:
             return ZERO
         slopes = gradient(casimir, self.coordinates)
@@ -153,12 +156,12 @@ class System:
         name: str = "system",
         time: Any = None,
     ) -> System:
-        """Return a system from sympy objects.
+        """Return a system that is given by sympy objects.
 
         ``coordinates`` are symbols or names. ``poisson`` is an n×n matrix or a nested sequence. ``parameters`` maps
-        symbols or names to default values; a symbol declared positive makes a positive parameter. ``time`` is the
-        symbol or name of the time, if the Hamiltonian depends on it. Raises `SpecError` for a matrix of the wrong size,
-        and for unknown symbols and functions.
+        symbols or names to default values; a symbol that sympy knows to be positive becomes a positive parameter.
+        ``time`` is the symbol or the name of the time, if H depends on it. Raises `SpecError` for a matrix of the wrong
+        size, and for unknown symbols and functions.
         """
         from phigen.geometry.sympy_bridge import parts
 
@@ -171,20 +174,20 @@ class System:
         return given_back(self)
 
     def _repr_latex_(self) -> str:
-        """The formulas of π, H, Casimirs and invariants as LaTeX, for notebooks."""
+        """The formulas of π, H, Casimirs and invariants as LaTeX, which notebooks display."""
         return cast(str, display("formulas of a system")(self))
 
     def _repr_html_(self) -> str:
-        """The formulas and parameters of the system as HTML, for notebooks."""
+        """The formulas and parameters of the system as HTML, which notebooks display."""
         return cast(str, display("page of a system")(self))
 
 
 def system_from_spec(spec: Spec) -> System:
-    """Return the system of a spec: π as a matrix, its shape, and the Casimirs that the form of π gives.
+    """Return the system of a spec: the matrix π, its shape, and the Casimirs that phigen finds for it.
 
     Nothing is proved here, apart from the conditions under which a Lie algebra exists; see `phigen.geometry.checks`.
-    Raises `SpecError` for matrices that do not span a Lie algebra, for structure constants without Jacobi identity, and
-    for sizes that do not match the number of coordinates.
+    Raises `SpecError` for matrices that do not span a Lie algebra, for structure constants that violate the Jacobi
+    identity, and for sizes that do not match the number of coordinates.
     """
     if spec.lattice:
         raise system_of_lattice(spec)
@@ -205,7 +208,7 @@ def system_from_spec(spec: Spec) -> System:
 
 
 def system_of_lattice(spec: Spec) -> SpecError:
-    """Return the error for a lattice that is used where a system with a fixed number of coordinates is required."""
+    """Return the error for the spec of a lattice where a system with a fixed number of coordinates is required."""
     message = f"{spec.name} is a lattice; a system with a fixed number of coordinates is needed here"
     hint = "phigen.compile accepts it; phigen show --expand SIZES prints a small one as an ordinary spec"
     return SpecError([spec.diagnostic(("lattice",), message, hint)])
@@ -225,7 +228,7 @@ def build_system(
     forces: SpecForces | None = None,
     noise: Mapping[str, SpecNoise] | None = None,
 ) -> System:
-    """Return a `System` from its parts, with shape and further Casimirs; see `system_from_spec`."""
+    """Return a `System` from its parts; its shape is recognised, and further Casimirs are searched."""
     locations = locations or {}
     declared = dict(casimirs or {})
     try:
@@ -257,7 +260,7 @@ def build_system(
 
 
 def hamiltonian_vector_field(poisson: Matrix, differential: Sequence[Expression]) -> tuple[Expression, ...]:
-    """Return the product of an n×n matrix and a covector."""
+    """Return π∇F, the product of the n×n matrix ``poisson`` and the covector ``differential`` = ∇F."""
     return tuple(
         total(entry * d for entry, d in zip(row, differential, strict=True) if not (entry.is_zero or d.is_zero))
         for row in poisson
@@ -265,7 +268,7 @@ def hamiltonian_vector_field(poisson: Matrix, differential: Sequence[Expression]
 
 
 def _with_place(error: SpecError, locations: Mapping[tuple[Any, ...], Location]) -> SpecError:
-    """Return the error; diagnostics without a location get that of the section ``poisson`` of the spec."""
+    """Return an error whose diagnostics without a location are located at the section ``poisson`` of the spec."""
     place = locations.get(("poisson",))
     return SpecError(
         [Diagnostic(d.message, d.location or place, d.hint, d.source_line, d.severity) for d in error.diagnostics]

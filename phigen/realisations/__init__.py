@@ -1,1 +1,1 @@
-"""Bi-realisations: one file per kind, all behind the protocol of `phigen.realisations.catalogue`."""
+"""Bi-realisations: one module per kind, each with the same interface; `phigen.realisations.catalogue` lists them."""

@@ -1,6 +1,6 @@
 """The kind ``auto``: choice of a bi-realisation by the shape of π.
 
-Exact closed forms come first. The last choice is following paths, which is possible for every π.
+Exact closed forms are tried first. The last choice is a solver that follows paths, which is possible for every π.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from phigen.spec.model import BirealisationChoice, PullbackForm
 
 KIND = "auto"
 
-#: Medians of |π∇S_3| and |π∇S_5| with the Cayley transform, divided by those with the exponential. They are over random
-#: quadratic H (and tops): 26 and 710 on so(3)*, 8 and 49 on se(3)*, 15 and 330 on so(4)*; 0.9 to 2 on sl(2)* and
-#: gl(2)*.
+#: Reason for the user. Medians of |π∇S_3| and |π∇S_5| with the Cayley transform, divided by those with the exponential,
+#: over random quadratic H (and tops): 26 and 710 on so(3)*, 8 and 49 on se(3)*, 15 and 330 on so(4)*; 0.9 to 2 on
+#: sl(2)* and gl(2)*.
 _BETTER = "preferred to the Cayley transform, whose error constants are 8 to 26 times larger on so(3), so(4) and se(3)"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation that fits the shape of π; its ``explanation`` names the kind and the reason."""
+    """Return the bi-realisation that suits the shape of π; its ``explanation`` names the chosen kind and the reason."""
     match system.shape:
         case Constant() | Canonical():
             realisation = constant.build(system, choice)
@@ -39,10 +39,10 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return a bi-realisation of a linear or affine π.
+    """Return a bi-realisation of a linear or affine π, the first that applies.
 
-    Candidates, in order: the exponential in closed form; a bi-realisation for each block of π; the Cayley transform;
-    the exponential along paths.
+    The candidates are, in this order: the exponential in closed form; a bi-realisation for each block of π; the Cayley
+    transform; the exponential by following paths.
     """
     candidate = exponential.closed_form(system)
     if candidate is not None:
@@ -61,10 +61,10 @@ def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _general(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return a bi-realisation of a π that is not linear.
+    """Return a bi-realisation of a π that is not linear, affine, constant or log-canonical: the first that applies.
 
-    Candidates, in order: constant π in other coordinates, a closed form in the coordinates of the spec or for each
-    block, and Karasev's construction.
+    The candidates are, in this order: constant π in other coordinates, each a function of one coordinate; the
+    coordinates in which the spec states π; a bi-realisation for each block of π; Karasev's construction.
     """
     for kind in (_gauged, _pulled_back, _by_blocks):
         candidate = _applicable(kind, system, choice)

@@ -1,6 +1,7 @@
-"""The axioms of a bi-realisation, proved for each build rather than assumed for each kind.
+"""The axioms of a bi-realisation, which are proved for the α and β of each system, not assumed for a kind of
+bi-realisation.
 
-With {F, G} = Σ_i ∂F/∂x_i ∂G/∂p_i − ∂F/∂p_i ∂G/∂x_i on (x, p):
+With {F, G} = Σ_i ∂F/∂x_i ∂G/∂p_i − ∂F/∂p_i ∂G/∂x_i on (x, p), the axioms are
 
     α(x, 0) = β(x, 0) = x,   {α_i, α_j} = π_ij∘α,   {β_i, β_j} = −π_ij∘β,   {α_i, β_j} = 0
 
@@ -23,19 +24,18 @@ from phigen.symbolic.expression import ZERO, Expression, call, fold, number, reb
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import Statement, decide_elements, decide_zero
 
-#: Names of the statements on brackets.
+#: Names of the statements on the brackets of α, of β, and of α with β.
 ALPHA, BETA, MIXED = "{α_i, α_j} = π_ij∘α", "{β_i, β_j} = −π_ij∘β", "{α_i, β_j} = 0"
 
-#: Two indices (i, j), and the polynomial that is 0 if the axiom holds for them.
+#: Indices i and j, and a polynomial that is 0 if the axiom holds for this pair.
 Residual = tuple[int, int, Poly]
 
 
 def check(system: System, realisation: BiRealisation) -> list[Statement]:
-    """Return the statements on the unit, on the three families of brackets, and on the simplified forms that the solver
-    uses.
+    """Return the statements on α and β at p = 0, on their brackets, and on the simplified forms that the solver uses.
 
-    For a pull-back, the brackets are proved in the other coordinates. For a truncation (``exact`` is false) and for the
-    formal series of a path, they are stated and proved up to the degree of the series minus one.
+    For a pull-back, the brackets are proved in the other coordinates. If α and β are truncated series in p, which is so
+    for truncations and for steps along paths, brackets are proved up to the degree of the series minus one.
     """
     if realisation.inner is not None and is_composed(system, realisation):
         return [_unit(system, realisation), *_inner(realisation.inner), _simplified_forms(system, realisation)]
@@ -48,7 +48,7 @@ def check(system: System, realisation: BiRealisation) -> list[Statement]:
 
 
 def _inner(inner: tuple[System, BiRealisation]) -> list[Statement]:
-    """Return the statements on the brackets of the inner structure of a pull-back, with the names of its
+    """Return the statements on the brackets for the other coordinates of a pull-back; the details name these
     coordinates."""
     place = f"in the coordinates {', '.join(inner[0].coordinates)}"
     return [replace(s, detail=f"{s.detail}, {place}" if s.detail else place) for s in check(*inner)[1:4]]
@@ -74,7 +74,8 @@ def _simplified_forms(system: System, realisation: BiRealisation) -> Statement:
 
 
 def _in_exponentials(e: Expression) -> Expression:
-    """Return the expression with hyperbolic functions written in terms of exp, whose relations the ring knows."""
+    """Return the expression with sinh and cosh written in terms of exp, since the ring knows the relations of exp
+    only."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         if node.op in ("sinh", "cosh"):
@@ -86,7 +87,7 @@ def _in_exponentials(e: Expression) -> Expression:
 
 
 def _pulled_back(system: System, maps: Sequence[Expression], pairs: Sequence[tuple[int, int]]) -> list[Expression]:
-    """Return π_ij∘maps for the pairs (i, j)."""
+    """Return the functions π_ij∘α for pairs (i, j), or π_ij∘β if ``maps`` are the components of β."""
     return substitute([system.poisson[i][j] for i, j in pairs], dict(zip(system.coordinates, maps, strict=True)))
 
 
@@ -100,7 +101,8 @@ def _brackets(system: System, realisation: BiRealisation) -> Iterator[Statement]
     n = len(alpha)
     pairs = [(i, j) for j in range(n) for i in range(j)]
     pulled = _pulled_back(system, alpha, pairs), _pulled_back(system, beta, pairs)
-    # p ↦ −p changes the sign of brackets: if it maps α to β, half of the brackets follow from the others.
+    # p ↦ −p changes the sign of every bracket. If it maps α to β, the brackets of β follow from those of α, and half of
+    # the mixed brackets from the other half.
     mirrored = realisation.symmetric and is_symmetric(alpha, beta, system.coordinates)
     everything = [*alpha, *beta, *pulled[0], *([] if mirrored else pulled[1])]
     parameters = [s for s in symbols_of(*everything) if s not in variables]
@@ -132,7 +134,7 @@ def _brackets(system: System, realisation: BiRealisation) -> Iterator[Statement]
 
 
 class _Differential:
-    """The non-zero partial derivatives of an element in x and in p."""
+    """The nonzero partial derivatives of a function of (x, p), with respect to the x_i and to the p_i, by index."""
 
     def __init__(self, tower: Tower, element: Poly, coordinates: Sequence[str], covector: Sequence[str]) -> None:
         self._zero, used_names = tower.zero, tower.names_in(element)
@@ -143,7 +145,7 @@ class _Differential:
         self.in_x, self.in_p = slopes(coordinates), slopes(covector)
 
     def bracket(self, other: _Differential) -> Poly:
-        """Return the canonical bracket {self, other}."""
+        """Return the canonical bracket of this function and another one."""
         result = self._zero
         for i in self.in_x.keys() & other.in_p.keys():
             result += self.in_x[i] * other.in_p[i]

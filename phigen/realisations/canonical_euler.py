@@ -1,6 +1,7 @@
-"""A bi-realisation of canonical π that is not symmetric itself: α = (q, p + a), β = (q + b, p), or the adjoint pair.
+"""The one-sided bi-realisation of a canonical π, for the symplectic Euler method: α = (q, p + a), β = (q + b, p).
 
-(a, b) is the covector at (q, p). At order 1 the step is symplectic Euler; it is explicit for separable H.
+(a, b) is the covector at (q, p). With one term S_1 the step is the symplectic Euler method, which is explicit for
+separable H. The bi-realisation is not symmetric; its adjoint exchanges the roles of q and p.
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ KIND = "canonical-euler"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of a canonical π. ``choice.side``, q or p, names the coordinates that α does not
-    change.
+    """Return the one-sided bi-realisation of a canonical π; ``choice.side``, q or p, names the coordinates that α
+    leaves as they are.
 
-    With q: α = (q, p + a), β = (q + b, p). With p: α = (q − b, p), β = (q, p − a). It is not symmetric, so order k
-    needs S_1 … S_k. Coordinates that are Casimirs are not changed. Raises `SpecError` unless the coordinates form
-    canonical pairs.
+    With side q: α = (q, p + a), β = (q + b, p). With side p: α = (q − b, p), β = (q, p − a). It is not symmetric, so a
+    method of order k needs S_1 … S_k. Coordinates that are Casimirs do not change. Raises `SpecError` unless all other
+    coordinates form canonical pairs.
     """
     shape = system.shape
     if not isinstance(shape, Canonical):

@@ -1,6 +1,6 @@
 """The kinds of bi-realisations, by name.
 
-A new kind is a file with KIND and build, imported and listed here.
+A new kind is a module with KIND, its name, and the function ``build``; it is imported and listed here.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from phigen.spec.model import BirealisationChoice
 
 
 def _of_parts(build: Callable[[System, BirealisationChoice, Builder], BiRealisation]) -> Builder:
-    """Return the builder of a composed kind, from a function that also receives the builder of the inner kind.
+    """Return the builder of a kind that is composed of other bi-realisations, such as a product over the blocks of π.
 
-    The inner kind is ``choice.of``, by default auto.
+    The function ``build`` receives, as its third argument, the builder of the inner kind, which is ``choice.of``.
     """
 
     def built(system: System, choice: BirealisationChoice) -> BiRealisation:
@@ -59,10 +59,10 @@ BUILDERS: dict[str, Builder] = {
 
 
 def realise(system: System, choice: BirealisationChoice | None = None) -> BiRealisation:
-    """Return the bi-realisation requested by a spec (default: ``auto``).
+    """Return the bi-realisation that a spec requests; the default is ``auto``.
 
-    It is not proved here: pass it to `phigen.realisations.axioms.check`. Raises `SpecError`, located at the spec's
-    ``birealisation`` or ``poisson``, for unknown kinds and for kinds that do not apply to the system.
+    Its axioms are not proved here, but by `phigen.realisations.axioms.check`. Raises `SpecError`, located at
+    ``birealisation`` or ``poisson`` in the spec, for an unknown kind and for a kind that does not apply to the system.
     """
     choice = choice or BirealisationChoice()
     try:
@@ -75,7 +75,7 @@ def realise(system: System, choice: BirealisationChoice | None = None) -> BiReal
 
 
 def builder(kind: str) -> Builder:
-    """Return the builder of a kind. Raises `SpecError` for an unknown kind."""
+    """Return the function that builds bi-realisations of a kind. Raises `SpecError` for an unknown kind."""
     build = BUILDERS.get(kind)
     if build is not None:
         return build

@@ -1,13 +1,13 @@
-"""Bi-realisation of a linear π, the dual of a Lie algebra, by the Cayley transform.
+"""Bi-realisation of a linear π, on the dual of a Lie algebra, by the Cayley transform.
 
-The transform is τ(P) = (1 − P/2)⁻¹(1 + P/2) for P = Σ p_i E_i. In a faithful matrix representation with matrices E_i,
-α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)⟩, that is
+The transform is τ(P) = (1 − P/2)⁻¹(1 + P/2) for P = Σ p_i E_i, where the matrices E_i are a faithful representation of
+the algebra. Then α_i = ⟨x, coordinates of (1 + P/2)E_i(1 − P/2)⟩, that is
 
     α_i = x_i − ½(πp)_i − ¼⟨x, coordinates of P E_i P⟩,    β(x, p) = α(x, −p),    β − α = πp.
 
-This requires P E_i P to be in the algebra for all P, or E_a E_i E_b + E_b E_i E_a ∈ g for all a, i, b. It holds for
-so(n), sp(2n), gl(n), sl(2), su(2), se(n), aff(n) and heisenberg(n), and not for sl(3). The paper (example so(n)) prints
-4 instead of 2.
+This requires that P E_i P lies in the algebra for all P or, equivalently, that E_a E_i E_b + E_b E_i E_a does for all
+a, i, b. The condition holds for so(n), sp(2n), gl(n), sl(2), su(2), se(n), aff(n) and heisenberg(n), but not for sl(3).
+The paper (example so(n)) prints 4 instead of 2 in τ.
 """
 
 from __future__ import annotations
@@ -34,13 +34,14 @@ from phigen.symbolic.readable import shortened
 KIND = "cayley"
 
 Sparse = dict[tuple[int, int], Scalar]
-#: (i, a, b, k) with a ≤ b → the coefficient of p_a p_b x_k in ⟨x, coordinates of P E_i P⟩.
+#: The form ⟨x, coordinates of P E_i P⟩: (i, a, b, k) with a ≤ b → coefficient of p_a p_b x_k.
 Trilinear = dict[tuple[int, int, int, int], Expression]
 
 
 @dataclass(frozen=True)
 class _Escape:
-    """A product E_a E_i E_b + E_b E_i E_a that is not in the algebra, by its indices."""
+    """Indices of a product E_a E_i E_b + E_b E_i E_a that does not lie in the algebra, so that there is no Cayley
+    bi-realisation."""
 
     i: int
     a: int
@@ -50,15 +51,15 @@ class _Escape:
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     """Return the Cayley bi-realisation of a linear or affine π, which is symmetric.
 
-    Raises `SpecError` if π is neither linear nor affine, or no known faithful representation is closed under P E_i P.
-    For each representation tried, the message names the element that is not in the algebra.
+    Raises `SpecError` if π is neither linear nor affine, or if P E_i P leaves the algebra in every known faithful
+    representation. The message names, for each representation that was tried, a product that leaves the algebra.
     """
     dual = dual_of(system)
     if dual is None:
         raise refuse(f"birealisation {KIND} needs a linear or affine π; this π is {system.shape}")
     terms, explanation = closed_product(dual.algebra)
     n, size = system.dimension, dual.algebra.dimension
-    if any(i < n <= b for i, _, b, _ in terms):  # a ≤ b; α would depend on p_z
+    if any(i < n <= b for i, _, b, _ in terms):  # p_b, b ≥ a, is p_z of the extension
         raise refuse(f"birealisation {KIND} does not restrict to this affine π", "try exponential")
     x = [symbol(c) for c in system.coordinates]
     increment = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
@@ -85,7 +86,8 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def closed_representation(algebra: LieAlgebra) -> Representation | None:
-    """Return the representation of the whole algebra that `closed_product` uses, or None."""
+    """Return a faithful representation of the whole algebra in which P E_i P lies in the algebra; None if none is
+    known."""
     declared = [algebra.representation] if algebra.representation else []
     if not declared and len(indecomposable_parts(algebra)) > 1:
         return None
@@ -93,15 +95,15 @@ def closed_representation(algebra: LieAlgebra) -> Representation | None:
 
 
 def trilinear(algebra: LieAlgebra, representation: Representation) -> Trilinear | None:
-    """Return the trilinear form of P E_i P in a representation, or None if P E_i P is not in the algebra."""
+    """Return the form ⟨x, coordinates of P E_i P⟩ in a representation, or None if P E_i P leaves the algebra."""
     form = _product(algebra, representation)
     return None if isinstance(form, _Escape) else form
 
 
 def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) -> Expression:
-    """Return a sum of monomials in Horner form; a coefficient that all terms share up to sign is factored out.
+    """Return a sum of monomials in Horner form, with a coefficient that all terms share up to sign factored out.
 
-    For so(3) this yields p_i (p·x), and the p·x of all components is one node of the expression graph.
+    For so(3) this gives p_i (p·x), and p·x becomes one node of the expression graph, which all components share.
     """
     common = next(iter(terms.values()), ONE)
     if any(c is not common and c is not -common for c in terms.values()):
@@ -110,9 +112,10 @@ def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) 
 
 
 def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
-    """Return the trilinear form of P E_i P in the first closed representation, and a description of the representation.
+    """Return the form ⟨x, coordinates of P E_i P⟩ in the first representation where P E_i P lies in the algebra.
 
-    Raises `SpecError` with the representations that were tried.
+    The second result describes this representation. Raises `SpecError`, with the representations that were tried, if
+    there is none.
     """
     failures: dict[str, str] = {}
     if algebra.representation is not None:
@@ -145,7 +148,8 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
 
 
 def _expect_poisson(algebra: LieAlgebra) -> None:
-    """Raise `SpecError` for a linear π that violates the Jacobi identity, for which no representation exists."""
+    """Raise `SpecError` if a linear π violates the Jacobi identity; then its structure constants have no
+    representation."""
     failing = failing_jacobi(algebra)
     if failing is not None:
         triple, component, residual = failing
@@ -163,14 +167,14 @@ def _refusal(algebra: LieAlgebra, representation: Representation, escape: _Escap
 
 
 def _product(algebra: LieAlgebra, representation: Representation) -> Trilinear | _Escape:
-    """Return the trilinear form of P E_i P, or the first product that is not in the algebra."""
+    """Return the form ⟨x, coordinates of P E_i P⟩, or the first product that leaves the algebra."""
     field = Field(v for m in representation.matrices for v in m.values())
     matrices: list[Sparse] = [
         {position: field.convert(v) for position, v in m.items()} for m in representation.matrices
     ]
     span = Span(field, matrices)
     rows = [_by_row(m) for m in matrices]
-    beginning: dict[int, list[int]] = {}  # row → indices of the matrices that have entries in this row
+    beginning: dict[int, list[int]] = {}  # row → matrices that have nonzero entries in this row
     for b, row in enumerate(rows):
         for r in row:
             beginning.setdefault(r, []).append(b)

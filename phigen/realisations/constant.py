@@ -1,4 +1,5 @@
-"""Constant π: α = x − ½πp, β = x + ½πp. With k = 1 this is the implicit midpoint rule."""
+"""Bi-realisation of a constant π: α = x − ½πp, β = x + ½πp. With the single term S_1 it gives the implicit midpoint
+rule."""
 
 from __future__ import annotations
 
@@ -14,8 +15,10 @@ KIND = "constant"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of a constant π, symmetric and defined for all (x, p). Raises `SpecError` for any
-    other π."""
+    """Return the bi-realisation of a constant π, which is symmetric and defined for all (x, p).
+
+    Raises `SpecError` if π is not constant.
+    """
     if not isinstance(system.shape, Constant | Canonical):
         raise refuse(f"birealisation {KIND} needs a constant π; this one is {system.shape}", "try auto")
     increment = hamiltonian_vector_field(system.shape.matrix, covector_symbols(system.coordinates))

@@ -1,8 +1,9 @@
-"""Exterior calculus on T*U in the polynomial ring: the calculus of Poisson sprays and Moser's trick.
+"""Exterior calculus on T*U with polynomials, for Poisson sprays and Moser's trick.
 
-Variables are z = (x_1, …, x_n, p_1, …, p_n). The canonical form is ω = Σ dx_i ∧ dp_i, so that {x_i, p_j} = δ_ij.
-The *weight* of a form counts its factors p and dp: it is the eigenvalue under the Euler field E = Σ p_i ∂_{p_i}.
-A spray has weight 1, ω has weight 1, and L_X raises weights by 1. Functions and forms are kept split by weight.
+The variables are z = (x_1, …, x_n, p_1, …, p_n). The canonical form is ω = Σ dx_i ∧ dp_i, so that {x_i, p_j} = δ_ij.
+The *weight* of a form is the number of its factors p and dp: its eigenvalue under the Euler field E = Σ p_i ∂_{p_i}.
+The form ω has weight 1. The Lie derivative along a spray raises weights by 1. Functions and forms are stored as lists
+of parts, each of one weight.
 """
 
 from __future__ import annotations
@@ -14,19 +15,20 @@ from phigen.realisations.protocol import covector_names
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.tower import Poly, Tower
 
-#: A vector field or a 1-form: one component for each variable.
+#: A vector field or a 1-form: one component for each of the 2n variables x and p.
 Components = list[Poly]
-#: A 2-form Σ w_ab dz_a ∧ dz_b: (a, b) with a < b → w_ab, zeros left out.
+#: A 2-form Σ w_ab dz_a ∧ dz_b: (a, b) with a < b → w_ab, without zeros.
 TwoForm = dict[tuple[int, int], Poly]
-#: Weight → part of that weight.
+#: A function by weight: weight (here the degree in p) → the part of this weight.
 GradedFunction = dict[int, Poly]
 GradedForm = dict[int, TwoForm]
 
 
 class Cotangent:
-    """The ring of functions on T*U that contains some expressions and is closed under all derivatives in x and p.
+    """The ring of functions on T*U that contains some expressions and all their derivatives in x and p.
 
-    ``size`` is n. Variable a < n is x_a, variable n + i is p_i. Parameters are symbols of the ring.
+    ``size`` is n. Variable number a < n is x_a, and variable number n + i is p_i. Parameters are symbols of the ring
+    too.
     """
 
     def __init__(self, coordinates: Sequence[str], expressions: Sequence[Expression]) -> None:
@@ -49,7 +51,7 @@ class Cotangent:
         return self.tower.derivative(f, name)
 
     def scaled(self, f: Poly, factor: Fraction) -> Poly:
-        """Return factor · f."""
+        """Return the product of a function f and a number."""
         return f * self.tower.constant(factor)
 
     # -- forms ------------------------------------------------------------------------------------
@@ -59,7 +61,7 @@ class Cotangent:
         return {(i, self.size + i): self.tower.constant(1) for i in range(self.size)}
 
     def contract(self, field: Components, form: TwoForm) -> Components:
-        """Return the contraction ι_Y Σ w_ab dz_a ∧ dz_b = Σ w_ab (Y_a dz_b − Y_b dz_a)."""
+        """Return the contraction ι_Y w of a field Y and a 2-form w: Σ w_ab (Y_a dz_b − Y_b dz_a)."""
         result = [self.tower.zero] * len(self.names)
         for (a, b), w in form.items():
             result[b] = result[b] + w * field[a]
@@ -67,7 +69,7 @@ class Cotangent:
         return result
 
     def exterior(self, form: Components) -> TwoForm:
-        """Return the exterior derivative d Σ λ_b dz_b."""
+        """Return the exterior derivative of a 1-form Σ λ_b dz_b."""
         result: TwoForm = {}
         for b, component in enumerate(form):
             if component == 0:
@@ -79,15 +81,15 @@ class Cotangent:
         return {key: w for key, w in result.items() if w != 0}
 
     def lie(self, field: Components, form: TwoForm) -> TwoForm:
-        """Return the Lie derivative L_Y of a closed form, d ι_Y."""
+        """Return the Lie derivative of a closed 2-form along a field Y, which is d ι_Y of the form."""
         return self.exterior(self.contract(field, form))
 
     def vanishes(self, form: TwoForm) -> bool:
-        """Whether the form is proved to be 0."""
+        """Whether a 2-form is proved to be 0."""
         return all(self.tower.is_zero(w) for w in form.values())
 
     def sum(self, forms: Iterable[tuple[Fraction, TwoForm]]) -> TwoForm:
-        """Return a linear combination of two-forms."""
+        """Return the linear combination of some 2-forms, given as pairs (factor, form)."""
         result: TwoForm = {}
         for factor, form in forms:
             for key, w in form.items():
@@ -100,5 +102,5 @@ class Cotangent:
         return [self.tower.zero] * self.size + self.variables[self.size :]
 
     def dual(self, form: Components) -> Components:
-        """Return the field Y with ι_Y ω = λ for a 1-form λ: the x part of Y is λ_p, its p part is −λ_x."""
+        """Return the field Y with ι_Y ω = λ for a 1-form λ: its x components are λ_p, its p components −λ_x."""
         return [*form[self.size :], *(-f for f in form[: self.size])]

@@ -1,4 +1,4 @@
-"""The kind ``custom``: α and β from the spec; the axioms are checked as for every other kind."""
+"""The kind ``custom``: α and β are formulas in the spec. Their axioms are proved as for every other kind."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ KIND = "custom"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of ``choice.alpha`` and ``choice.beta``. Raises `SpecError` for wrong sizes or
-    symbols."""
+    """Return the bi-realisation with the maps ``choice.alpha`` and ``choice.beta`` of the spec.
+
+    Raises `SpecError` for a wrong number of components and for unknown symbols.
+    """
     known_symbols = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
     for name, maps in (("alpha", choice.alpha), ("beta", choice.beta)):
         if len(maps) != system.dimension:

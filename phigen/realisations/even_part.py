@@ -1,15 +1,16 @@
-"""The even part of b(M_p)x, b(z) = z/(1 − e^{−z}): Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x in closed form.
+"""The even part of b(M_p)x, with b(z) = z/(1 − e^{−z}), in closed form: Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x with Bernoulli
+numbers B.
 
-M = M_p is the matrix with M_p x = π(x)p on the dual of a Lie algebra. With N = M² and φ as in
-`phigen.symbolic.special`, Σ B_{2k}/(2k)! M^{2k} = Nφ(−N), hence
+M = M_p is the matrix with M_p x = π(x)p on the dual of a Lie algebra. Let N = M², and let φ be the function of
+`phigen.symbolic.special`. Then Σ B_{2k}/(2k)! M^{2k} = Nφ(−N), and the even part of b(M_p)x has these closed forms:
 
     N^k x = 0 for some k     a finite sum
     N(N + s) = 0             N x φ(s)
-    N(N + s)² = 0            N (φ(s) x − φ'(s)(N + s) x),
+    N(N + s)² = 0            N (φ(s) x − φ'(s)(N + s) x)
 
-the last since φ(−N) = φ(s) − φ'(s)(N + s) up to (N + s)², which N annihilates. s is a quadratic polynomial in
-p: s = |p|² for so(3), where N = M² = p×(p×·); minus the discriminant for sl(2); |rotation|² for se(3). All is found
-from the structure constants: if −s is the only non-zero eigenvalue of N, of multiplicity m, then s = −tr N/m.
+In the last case φ(−N) = φ(s) − φ'(s)(N + s) up to terms with (N + s)², which N annihilates. s is a quadratic polynomial
+in p: s = |p|² for so(3), where Nx = p×(p×x); minus the discriminant for sl(2); the squared rotation rate for se(3). s
+follows from the structure constants: if −s is the only nonzero eigenvalue of N, with multiplicity m, then s = −tr N/m.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import sample_point
 
-#: Largest number of terms of a component of M^k x, in p and x, for which a closed form is tried.
+#: Largest number of terms, in p and x, of a component of M_p^k x for which a closed form is tried.
 MOST_TERMS = 20_000
 
 Vector = list[Expression]
@@ -39,19 +40,20 @@ Vector = list[Expression]
 
 @dataclass(frozen=True)
 class EvenPart:
-    """The even part of b(M_p)x: ``values`` are Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x; ``forms`` describes the closed form
-    of each part."""
+    """The even part of b(M_p)x in closed form: ``values`` are the components of Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x.
+
+    ``forms`` describes, for the user, the closed form in each ideal of the algebra.
+    """
 
     values: tuple[Expression, ...]
     forms: tuple[str, ...]
 
 
 def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expression]) -> EvenPart | None:
-    """Return the even part in closed form, for x in the dual and p in the algebra; None if no formula of this module
-    applies.
+    """Return the even part of b(M_p)x in closed form; None if no formula of this module applies.
 
-    Each summand of a direct sum has its own closed form. x and p may be any expressions; for instance, constants in the
-    components of a central extension.
+    x is in the dual of the algebra and p in the algebra. Both may have any expressions as components; for instance,
+    constants for a central extension. Each summand of a direct sum of algebras has its own closed form.
     """
     values: Vector = [ZERO] * algebra.dimension
     forms: list[str] = []
@@ -67,9 +69,11 @@ def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expressi
 
 
 def _parts(algebra: LieAlgebra) -> list[list[int]]:
-    """Return ideals spanned by basis elements, by index, whose sum is the algebra and which commute with each other.
+    """Return ideals, given by the indices of basis elements, that commute with each other and whose sum acts as the
+    algebra.
 
-    Ideals may share central elements (the last one of a central extension), on which M_p x vanishes.
+    Ideals may share central elements, such as the last one of a central extension. Basis elements that commute with all
+    others are left out, since M_p x has no component along them.
     """
     touching = {m for ij in algebra.constants for m in ij}
     inner = {ij: {k: c for k, c in row.items() if k in touching} for ij, row in sorted(algebra.constants.items())}
@@ -79,15 +83,18 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
 
 
 def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
-    """Return the closed form on an ideal spanned by basis elements: of the whole ideal, or of its summands in
-    another basis."""
+    """Return the closed form on an ideal that basis elements span: one for the whole ideal, or one for each direct
+    summand.
+
+    The direct summands need not be spanned by basis elements.
+    """
     closed = _closed(ideal, x, p)
     if closed is not None:
         return closed
     projections = ideal_projections(ideal)
     if len(projections) < 2:
         return None
-    # M_p = Σ M_{e_a p} for the projections e_a onto the summands, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
+    # For the projections e_a onto the summands, M_p = Σ M_{e_a p}, and M_{e_a p} M_{e_b p} = 0 for a ≠ b.
     summands = [_closed(ideal, x, applied(e, p, ZERO)) for e in projections]
     closed_summands = [s for s in summands if s is not None]
     if len(closed_summands) < len(summands):
@@ -97,7 +104,7 @@ def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
 
 
 def matrix_of(algebra: LieAlgebra, p: Sequence[Expression]) -> list[Vector]:
-    """Return the matrix M_p with (M_p)_ik = Σ_j c_ij^k p_j."""
+    """Return the matrix M_p with M_p x = π(x)p: its entry (i, k) is Σ_j c_ij^k p_j."""
     n = range(algebra.dimension)
     terms: list[list[list[Expression]]] = [[[] for _ in n] for _ in n]
     for i in n:
@@ -127,7 +134,7 @@ def _closed(algebra: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
 
 
 def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
-    """Return the s for which 0 and −s can be the only eigenvalues of M², or None."""
+    """Return the s such that 0 and −s are the only eigenvalues of M², if its traces allow such an s; else None."""
     n = range(len(matrix))
     if not _may_have_root(matrix):
         return None
@@ -143,7 +150,8 @@ def _root(tower: Tower, matrix: Sequence[Vector]) -> Poly | None:
 
 
 def _may_have_root(matrix: Sequence[Vector]) -> bool:
-    """Whether (tr M²)² is a multiple of tr M⁴ by 1, …, n at a numeric point.
+    """Whether (tr M²)² is one of 1, …, n times tr M⁴ at a sample point, as is necessary for a single nonzero eigenvalue
+    of M².
 
     This test comes first, since symbolic squares of large matrices take long.
     """
@@ -188,7 +196,7 @@ def _semisimple(tower: Tower, matrix: Sequence[Vector], x: Vector, root: Poly) -
 
 
 def _vanish(tower: Tower, vector: Sequence[Expression]) -> bool:
-    with suppress(DomainError):  # The test at a point comes first: the expansion of a nonzero element may be too large.
+    with suppress(DomainError):  # A test at a point comes first: the expansion of a nonzero element may be too large.
         if any(evaluate_exactly(vector, sample_point(symbols_of(*vector), (), 0))):
             return False
     return all(tower.is_zero(v) for v in tower.convert_all(vector))

@@ -1,13 +1,14 @@
-"""Bi-realisation of a linear or affine π by the exponential, computed from the structure constants.
+"""Bi-realisation of a linear or affine π by the exponential map, computed from the structure constants.
 
 With M_p x = π(x)p and b(z) = z/(1 − e^{−z}) = 1 + z/2 + z²/12 − …
 
     α = b(−M_p)x,    β = b(M_p)x,    β − α = π(x)p,    β(x, p) = α(x, −p).
 
-No matrix representation is needed. This is Karasev's construction for linear π. It is exact for linear H (S_t = tH),
-and its error constants are 10 to 1000 times smaller than those of the Cayley transform. An affine π, given by a Lie
-algebra with a cocycle, is treated as the hyperplane z = 1 in the dual of the central extension. b is written in closed
-form where `phigen.realisations.even_part` has a formula; otherwise the solver follows the path ṁ = π(m)p numerically.
+No matrix representation is needed. For linear π this is Karasev's construction. It is exact for linear H (S_t = tH). On
+so(3), so(4) and se(3) its error constants are 8 to 700 times smaller than those of the Cayley transform. An affine π,
+given by a Lie algebra with a cocycle, is treated as the hyperplane z = 1 in the dual of the central extension. b(M_p)x
+is written in closed form where `phigen.realisations.even_part` has a formula; otherwise the solver follows the path ṁ =
+π(m)p numerically.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ REFERENCE = f"{PAPER}, the proposition on Lie–Poisson structures, with τ = ex
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the exponential bi-realisation of a linear or affine π, which is symmetric.
+    """Return the exponential bi-realisation of a linear or affine π, which is symmetric: in closed form, or by paths.
 
-    Raises `SpecError` for other π.
+    Raises `SpecError` if π is neither linear nor affine.
     """
     closed = closed_form(system)
     if closed is not None:
@@ -42,7 +43,8 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def closed_form(system: System) -> BiRealisation | None:
-    """Return the exponential in closed form, or None if π is neither linear nor affine or has no known closed form."""
+    """Return the exponential bi-realisation in closed form; None if π is neither linear nor affine, or no closed form
+    is known."""
     dual = dual_of(system)
     even = even_part(dual.algebra, dual.x, dual.p) if dual else None
     if even is None:
@@ -74,7 +76,8 @@ def _assembled(system: System, even: EvenPart) -> BiRealisation:
 
 
 def followed(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the exponential without a closed form: the solver follows the path ṁ = π(m)p, which is linear in m."""
+    """Return the exponential bi-realisation without a closed form: the solver follows the path ṁ = π(m)p, where p is
+    constant."""
     from phigen.realisations import karasev
 
     path = karasev.build(system, choice)

@@ -1,4 +1,5 @@
-"""Linear and affine π as one case: the dual of a Lie algebra, or the hyperplane z = 1 of a central extension."""
+"""Linear and affine π as one case: π on the dual of a Lie algebra, or on the hyperplane z = 1 in the dual of its
+central extension."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from phigen.symbolic.expression import ONE, ZERO, Expression, symbol
 
 @dataclass(frozen=True)
 class Dual:
-    """A point x of the dual and an element p of a Lie algebra, as expressions.
+    """The coordinates x as a point of the dual of a Lie ``algebra``, and the covector p as an element of the algebra.
 
     For an affine π the algebra is the central extension, and the last components are x_z = 1 and p_z = 0. x_z is a
     Casimir, so the hyperplane x_z = 1 is a Poisson submanifold. Maps that do not depend on p_z restrict to it.
@@ -25,8 +26,10 @@ class Dual:
 
 
 def dual_of(system: System) -> Dual | None:
-    """Return the coordinates and the covector of a linear or affine π as elements of the dual and the algebra; None
-    for other π."""
+    """Return the coordinates and the covector of a linear or affine π as elements of a Lie algebra and its dual.
+
+    Returns None for any other π.
+    """
     x, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
     match system.shape:
         case LiePoisson(algebra):

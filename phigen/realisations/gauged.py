@@ -1,15 +1,14 @@
-"""Bi-realisation of π_ij = g_i(x_i) A_ij g_j(x_j): constant π in coordinates in which the fields g_i are constant.
+"""Bi-realisation of π_ij = g_i(x_i) A_ij g_j(x_j) with constant A: the one of a constant π, in other coordinates.
 
-In y_i = ∫ dx_i/g_i(x_i) the tensor is A and the covector g_i(x_i)p_i. With u_i = Σ_j A_ij g_j(x_j)p_j,
+In the coordinates y_i = ∫ dx_i/g_i(x_i), π is A and the covector is g_i(x_i)p_i. With u_i = Σ_j A_ij g_j(x_j)p_j,
 
     α_i = the flow of ẋ = g_i(x) from x_i for the time −½u_i,    β_i = the same flow for the time ½u_i.
 
-The flow is elementary, and written without cancellation, for these g:
+For these g the flow for the time t is elementary, and written without cancellation:
 
-- ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w and w² = b²/4 − ac;
-  with tan if w² is negative; if parameters decide the sign, T = t/(1 − sφ(s)), s = −4w²t², φ as in
-  `phigen.symbolic.special`
-- bx + c: x + g(x)(e^{bt} − 1)/b, which is the log-canonical realisation for c = 0
+- ax² + bx + c: x + g(x) T/(1 − T(ax + b/2)) with T = tanh(wt)/w and w² = b²/4 − ac; with tan if w² is negative; if the
+  sign depends on parameters, T = t/(1 − sφ(s)) with s = −4w²t² and φ as in `phigen.symbolic.special`
+- bx + c: x + g(x)(e^{bt} − 1)/b, which is the log-canonical bi-realisation for c = 0
 - c e^{kx}: x − log(1 − kt g(x))/k
 - c x^r: x(1 + (1 − r)t g(x)/x)^{1/(1−r)}
 """
@@ -35,7 +34,8 @@ _HALF = number(Fraction(1, 2))
 
 @dataclass(frozen=True)
 class _Motion:
-    """α − x, β − x and β − α of one coordinate, each without cancellation."""
+    """The components of α − x (``early``), β − x (``late``) and β − α (``increment``) for one coordinate, without
+    cancellation."""
 
     early: Expression
     late: Expression
@@ -43,9 +43,9 @@ class _Motion:
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of π_ij = g_i A_ij g_j, which is symmetric.
+    """Return the bi-realisation of π_ij = g_i(x_i) A_ij g_j(x_j), which is symmetric.
 
-    Raises `SpecError` if π is not of this form, or the flow of a g_i is none of those listed above.
+    Raises `SpecError` if π does not have this form, or if phigen knows no formula for the flow of some g_i.
     """
     separation = separated(system.coordinates, system.poisson)
     if separation is None:
@@ -81,9 +81,9 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _motion(c: str, g: Expression, u: Expression, positive: Collection[str]) -> _Motion | None:
-    """Return the differences of α and β for a coordinate ``c``: the flow of g for the times −½u and ½u.
+    """Return the components of α − x, β − x and β − α for the coordinate ``c``: the flow of g for the times −½u and ½u.
 
-    None if the flow is not elementary.
+    Returns None if phigen knows no formula for the flow.
     """
     if u.is_zero:
         return _Motion(ZERO, ZERO, ZERO)
@@ -117,7 +117,7 @@ def _quadratic(
     positive: Collection[str],
 ) -> _Motion:
     a, b, c = coefficients
-    squared = _simplified((b**2 - 4 * a * c) / 4)  # w²
+    squared = _simplified((b**2 - 4 * a * c) / 4)  # w² of the flow of ax² + bx + c
     tilt = a * x + b / 2
     if not (squared.is_number or _is_positive(squared, positive)):
         s = -(squared * u**2)
@@ -153,7 +153,8 @@ def _monomial(x: Expression, g: Expression, u: Expression, degree: Fraction) -> 
 
 
 def _constant(e: Expression, c: str) -> Expression | None:
-    """Return an equal expression without the coordinate ``c``, or None if the expression depends on it."""
+    """Return an expression that does not depend on the coordinate ``c`` in a form without ``c``; None if it depends on
+    ``c``."""
     simple = _simplified(e)
     return None if c in symbols_of(simple) else simple
 

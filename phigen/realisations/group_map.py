@@ -1,12 +1,14 @@
-"""Bi-realisation of a linear π by a map τ of the user from the algebra to the group, close to the exponential.
+"""Bi-realisation of a linear π by a map τ from the Lie algebra to its group, close to the exponential, which the spec
+states.
 
-With matrices E_i, P = Σ p_i E_i and dτ(p)·E_j = ∂τ/∂p_j, the right and left trivialised derivatives R and L of τ are
-defined by (∂τ/∂p_j) τ⁻¹ = Σ_k R_kj E_k and τ⁻¹ ∂τ/∂p_j = Σ_k L_kj E_k. Then
+With matrices E_i and P = Σ p_i E_i, the right and left trivialised derivatives R and L of τ are defined by (∂τ/∂p_j)
+τ⁻¹ = Σ_k R_kj E_k and τ⁻¹ ∂τ/∂p_j = Σ_k L_kj E_k. Then
 
     β = R^{−T} x,    α = L^{−T} x.
 
-Column i of R⁻¹ solves Σ_j (∂τ/∂p_j) (R⁻¹)_ji = E_i τ; for L⁻¹ the right side is τ E_i. The bi-realisation is symmetric
-if and only if τ(−p) = τ(p)⁻¹. For τ = (1 − P/2)⁻¹(1 + P/2) this is the kind cayley.
+Column i of R⁻¹ solves Σ_j (∂τ/∂p_j) (R⁻¹)_ji = E_i τ. Column i of L⁻¹ solves the same equation with τ E_i on the right
+side. The bi-realisation is symmetric if and only if τ(−p) = τ(p)⁻¹. For τ = (1 − P/2)⁻¹(1 + P/2) it is the
+bi-realisation of the kind ``cayley``.
 """
 
 from __future__ import annotations
@@ -38,11 +40,11 @@ KIND = "group-map"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of a linear π by ``choice.tau``: a function of the symbol `MATRIX`, or a matrix in
-    ``p:NAME``.
+    """Return the bi-realisation of a linear π by the map τ in ``choice.tau``.
 
-    Raises `SpecError` if π is not linear, no faithful matrices are known, τ(0) ≠ 1, dτ(0) ≠ id, or the derivative of τ
-    is not in the algebra.
+    τ is a rational function of the symbol `MATRIX`, or a matrix of expressions in the symbols ``p:NAME``. Raises
+    `SpecError` if π is not linear, no faithful matrices are known, τ(0) ≠ 1, dτ(0) ≠ id, or the derivative of τ leaves
+    the algebra.
     """
     if not isinstance(system.shape, LiePoisson):
         raise refuse(f"birealisation {KIND} needs a linear π, the dual of a Lie algebra; this π is {system.shape}")
@@ -130,8 +132,10 @@ def _expect_equal(a: Matrix, b: Matrix, message: str, system: System) -> None:
 
 
 class _Trivialised:
-    """Solver for R⁻¹ and L⁻¹, by elimination in the field of rational functions of p and of the functions that occur
-    in τ."""
+    """Solver of the linear equations for R⁻¹ and L⁻¹, the inverse trivialised derivatives of τ.
+
+    It eliminates in the field of rational functions of p and of the functions of p that occur in τ.
+    """
 
     def __init__(self, system: System, representation: Representation, tau: Matrix) -> None:
         self._names = system.coordinates
@@ -143,9 +147,9 @@ class _Trivialised:
         self._columns = [[self._field.convert(e) for row in m for e in row] for m in slopes]
 
     def solved(self, *, left: bool) -> list[list[Expression]]:
-        """Return R⁻¹ if ``left``, else L⁻¹.
+        """Return R⁻¹ if ``left``, else L⁻¹, as a matrix by rows.
 
-        Row j, column i is the coefficient of ∂τ/∂p_j in E_i τ or in τ E_i.
+        Column i has the coefficients with which the ∂τ/∂p_j add up to E_i τ or, for L⁻¹, to τ E_i.
         """
         n = len(self._basis)
         sides = []
@@ -157,8 +161,11 @@ class _Trivialised:
         return [[self._field.expression(v) for v in row[n:]] for row in reduced]
 
     def _eliminated(self, rows: list[list[Scalar]], n: int) -> list[list[Scalar]]:
-        """Return rows after elimination of the first n columns. Raises `SpecError` if the equations are
-        contradictory."""
+        """Return the rows of the equations with the first n columns reduced to the identity.
+
+        Raises `SpecError` if dτ is singular, or if the equations have no solution since the derivative of τ leaves the
+        algebra.
+        """
         reduced: list[list[Scalar]] = []
         for k in range(n):
             pivot = next((r for r in rows if r[k] != 0), None)

@@ -1,12 +1,12 @@
-"""Bi-realisation of any smooth π: Karasev's construction, followed numerically.
+"""Bi-realisation of any smooth π by Karasev's construction: the solver follows a path numerically.
 
-Let m(t), 0 ≤ t ≤ 1, solve ṁ = π(m)p with p constant. Then α is the start of this path, β its end, and x its mean ∫₀¹ m
-dt. A step of the solver solves p = ∇S_h(mean of the path that starts at x under p) for p; the new state is the end of
-that path. The path is the flow of the linear Hamiltonian p·x, so for every p it stays on the symplectic leaf. If the
-path is exact to round-off, so is the step as a Poisson map.
+Let m(t), 0 ≤ t ≤ 1, solve ṁ = π(m)p with constant p. Then α is the start of this path, β its end, and x its mean ∫₀¹ m
+dt. A step from the state x₀ solves p = ∇S_h(mean of the path that starts at x₀) for p; the new state is the end of this
+path. The path is part of the flow of the linear Hamiltonian p·x, so it stays on its symplectic leaf for every p. If the
+path is exact to round-off, the step is a Poisson map to round-off.
 
-The S_i are computed from formal series: mean_j = D^j x/(j+1)!, D = Σ (πp)_a ∂_a, is inverted for α up to the degree k −
-1 in p that S_1 … S_k need. For linear π this is the exponential bi-realisation.
+The S_i are computed from formal series. The series of the mean is Σ D^j x/(j+1)! with D = Σ (πp)_a ∂_a. Its inversion
+gives α up to degree k − 1 in p, as S_1 … S_k require. For linear π this is the exponential bi-realisation.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from phigen.symbolic.expression import ZERO, Expression, derivatives, number, su
 
 KIND = "karasev"
 
-#: Degree in p of the formal series `BiRealisation.alpha`: sufficient for S_1 … S_3, order 4.
+#: Degree in p of the formal series `BiRealisation.alpha`. It is sufficient for S_1 … S_3, and hence for order 4.
 DEGREE = 2
 
 
 def build(system: System, choice: BirealisationChoice, *, degree: int = DEGREE) -> BiRealisation:
-    """Return the bi-realisation of any π. It is symmetric, since the reversed path exchanges α and β.
+    """Return the bi-realisation of any smooth π, for a solver that follows paths.
 
-    ``alpha`` is exact up to ``degree`` in p.
+    It is symmetric, since reversing a path exchanges α and β. ``alpha`` is a series that is correct up to ``degree`` in
+    p.
     """
     alpha = series(system, degree)
     mirrored = substitute(alpha, {s.value: -s for s in covector_symbols(system.coordinates)})
@@ -50,10 +51,11 @@ def build(system: System, choice: BirealisationChoice, *, degree: int = DEGREE) 
 
 
 def series(system: System, degree: int) -> list[Expression]:
-    """Return α(x, p) up to a degree in p, from mean(α, p) = x.
+    """Return α(x, p) as a series that is correct up to a degree in p; terms of higher degree in the result must not be
+    used.
 
-    α = x − Σ_{j=1}^{degree} (D^j x)(α)/(j+1)! is solved by repeated substitution. The result also contains some terms
-    of higher degree, which are not those of the series and must not be used.
+    α is defined by: the path that starts at α has the mean x. So α = x − Σ_{j=1}^{degree} (D^j x)(α)/(j+1)!, which is
+    solved by repeated substitution.
     """
     coordinates = system.coordinates
     x: list[Expression] = [symbol(c) for c in coordinates]
@@ -61,9 +63,9 @@ def series(system: System, degree: int) -> list[Expression]:
     powers = [list(flow)]
     for _ in range(degree - 1):
         powers.append(_derivatives_along_flow(powers[-1], coordinates, flow))
-    approximations = [x]  # approximations[d] is α up to degree d in p
+    approximations = [x]  # approximations[d]: α, correct up to degree d in p
     for order in range(1, degree + 1):
-        # D^j x has degree j in p, so α is needed only up to degree order − j there.
+        # D^j x has degree j in p, so the α that is substituted in it need be correct up to degree order − j only.
         shifts = [
             substitute(powers[j - 1], dict(zip(coordinates, approximations[order - j], strict=True)))
             for j in range(1, order + 1)
@@ -80,7 +82,7 @@ def series(system: System, degree: int) -> list[Expression]:
 def _derivatives_along_flow(
     functions: list[Expression], coordinates: tuple[str, ...], flow: tuple[Expression, ...]
 ) -> list[Expression]:
-    """Return the derivative D f along the flow for each function f."""
+    """Return the derivative of each function along the vector field ``flow``."""
     columns = [derivatives(functions, c) for c in coordinates]
     return [
         total(column[i] * f for column, f in zip(columns, flow, strict=True) if not (column[i] is ZERO or f is ZERO))

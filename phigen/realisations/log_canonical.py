@@ -1,7 +1,7 @@
 """Bi-realisation of a log-canonical π, {x_i, x_j} = a_ij x_i x_j.
 
-α_j = x_j exp(½u_j), β_j = x_j exp(−½u_j), u_j = Σ_i a_ij x_i p_i. The paper prints α with the opposite sign in the
-exponent; the Lotka–Volterra scheme of the paper has the sign used here.
+It is α_j = x_j exp(½u_j), β_j = x_j exp(−½u_j) with u_j = Σ_i a_ij x_i p_i. The paper prints α with the opposite sign
+in the exponent, but its Lotka–Volterra scheme has the sign that is used here.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ KIND = "log-canonical"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the bi-realisation of a log-canonical π, symmetric and defined for all (x, p). Raises `SpecError` for any
-    other π.
+    """Return the bi-realisation of a log-canonical π, which is symmetric and defined for all (x, p).
 
-    The increment is −2 x_j sinh(½u_j), written without cancellation at small u_j.
+    β − α is −2 x_j sinh(½u_j), written without cancellation for small u_j. Raises `SpecError` if π is not
+    log-canonical.
     """
     if not isinstance(system.shape, LogCanonical):
         raise refuse(f"birealisation {KIND} needs {{x_i, x_j}} = a_ij x_i x_j; this π is {system.shape}", "try auto")
@@ -33,7 +33,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         half * total(row[j] * w for row, w in zip(a, products, strict=True) if not row[j].is_zero)
         for j in range(len(x))
     ]
-    # With t = exp(u/2) − 1 all formulas of the solver are rational: 2 sinh(u/2) = t (1 + 1/(1 + t)).
+    # In t = exp(u/2) − 1 all formulas of the solver are rational: 2 sinh(u/2) = t (1 + 1/(1 + t)).
     growth = [call("expm1", u) for u in exponents]
     alpha = tuple(xj * call("exp", u) for xj, u in zip(x, exponents, strict=True))
     beta = tuple(xj * call("exp", -u) for xj, u in zip(x, exponents, strict=True))

@@ -1,4 +1,4 @@
-"""Rational functions of one matrix: (1 + P/2)/(1 − P/2) as a matrix of expressions."""
+"""Evaluation of a rational function of a matrix P, such as (1 + P/2)/(1 − P/2), to a matrix of expressions."""
 
 from __future__ import annotations
 
@@ -19,28 +19,29 @@ def identity(size: int) -> Matrix:
 
 
 def multiplied(a: Matrix, b: Matrix) -> Matrix:
-    """Return the product of two matrices, without terms that are 0."""
+    """Return the product of two matrices of expressions, computed without terms that are 0."""
     columns = list(zip(*b, strict=True))
     return [[total(u * v for u, v in zip(row, column, strict=True)) for column in columns] for row in a]
 
 
 class MatrixFunction(Arithmetic[Matrix]):
-    """Evaluation of expressions at a matrix P; numbers and parameters stand for multiples of the identity.
+    """Evaluation of an expression at a matrix P; numbers and parameters in it stand for multiples of the identity.
 
     All values are functions of P and therefore commute, so left and right quotients are equal.
     """
 
     def __init__(self, argument: Matrix, name: str) -> None:
-        """``name`` is the symbol that stands for the matrix."""
+        """Prepare the evaluation at the matrix ``argument``, for which the symbol ``name`` stands in expressions."""
         self._argument, self._size, self._name = argument, len(argument), name
 
     def visit(self, node: Expression, args: list[Matrix]) -> Matrix:
-        """Return the value of a node. Raises `SpecError` for functions that are not rational in P."""
+        """Return the value of a node from the values of its arguments. Raises `SpecError` for functions that are not
+        rational in P."""
         if node.op == "symbol" and node.value == self._name:
             return self._argument
         if all(self._is_scalar(a) for a in args) and node.op not in ("add", "sub", "neg", "mul"):
             return self._scaled(rebuild(node, [a[0][0] for a in args]))
-        match node.op:  # matrices are lists, which have no operators
+        match node.op:  # matrices are lists of rows, without operators
             case "add":
                 return _entrywise(add, args[0], args[1])
             case "sub":
@@ -56,7 +57,7 @@ class MatrixFunction(Arithmetic[Matrix]):
         return self._power(base, int(exponent)) if exponent.denominator == 1 else self.function("pow", [base])
 
     def function(self, name: str, args: list[Matrix]) -> Matrix:
-        """Raise `SpecError`: elementary functions of a matrix are not rational."""
+        """Raise `SpecError`, since elementary functions of a matrix are not rational."""
         raise refuse(
             f"birealisation group-map: tau uses {name} of a matrix; it must be a rational function of P",
             "kind: exponential is τ = exp(P); other functions are given entry by entry",

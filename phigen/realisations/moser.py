@@ -1,12 +1,14 @@
-"""Moser's trick by recursion in the weight: a map ψ with ψ*Ω = ω that is the identity to first order on p = 0.
+"""Moser's trick by recursion: a map ψ of T*U with ψ*Ω = ω that is the identity to first order at p = 0.
 
-Ω = ω + Ω₃ + Ω₅ + … is closed, Ω_w of weight w in (p, dp) (`phigen.realisations.cotangent`). The term Ω_w of lowest
-weight has the primitive λ = ι_E Ω_w / w, since L_E Ω_w = w Ω_w = d ι_E Ω_w. With ι_Y ω = −λ,
+Ω = ω + Ω₃ + Ω₅ + … is a closed 2-form. Its part Ω_w has the weight w, the number of factors p and dp
+(`phigen.realisations.cotangent`). The part Ω_w of lowest weight w > 1 has the primitive λ = ι_E Ω_w / w, since L_E Ω_w
+= w Ω_w = d ι_E Ω_w. With ι_Y ω = −λ,
 
     exp(Y)*Ω = Ω + L_Y Ω + ½ L_Y² Ω + … = ω + (terms of weight above w).
 
-Repetition yields ψ = exp(Y_2) ∘ exp(Y_4) ∘ …, where Y_{w−1} raises weights by w − 1. Moser's trick itself integrates a
-time-dependent field. The recursion reaches the same normal form with one homogeneous field for each weight.
+Repetition gives ψ = exp(Y_2) ∘ exp(Y_4) ∘ …, where Y_{w−1} raises weights by w − 1. Moser's trick itself integrates one
+field that depends on a time. The recursion reaches the same normal form by a sequence of homogeneous fields, one for
+each weight.
 """
 
 from __future__ import annotations
@@ -20,17 +22,17 @@ from phigen.realisations.cotangent import Components, Cotangent, GradedForm, Gra
 
 @dataclass(frozen=True)
 class Step:
-    """The factor exp(Y) of ψ, with Y of weight ``weight``."""
+    """A factor exp(Y) of ψ, where the field Y raises weights by ``weight``."""
 
     weight: int
     field: Components
 
 
 def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
-    """Return the factors of ψ in the order in which functions are pulled back, such that ψ*Ω = ω up to the weight
-    ``top``.
+    """Return the factors exp(Y) of a map ψ such that ψ*Ω = ω up to the weight ``top``.
 
-    ``forms`` are the parts of Ω by weight: ω at weight 1, and parts of odd weight. Parts that vanish give no factor.
+    They are in the order in which functions are pulled back. ``forms`` has the parts of Ω by weight: ω at weight 1, and
+    parts of odd weight. Parts that vanish give no factor.
     """
     steps = []
     for weight in range(3, top + 1, 2):
@@ -45,7 +47,7 @@ def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
 
 
 def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> GradedForm:
-    """Return exp(Y)*Ω up to the weight ``top``."""
+    """Return exp(Y)*Ω up to the weight ``top``, for a factor exp(Y) of ψ and the form Ω."""
     result: GradedForm = {}
     for weight, form in forms.items():
         term = form
@@ -60,7 +62,10 @@ def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> G
 
 
 def pulled_back(space: Cotangent, f: GradedFunction, steps: Sequence[Step], top: int) -> GradedFunction:
-    """Return ψ*f up to the weight ``top``. Each exp(Y) acts on functions by the Lie series of Y."""
+    """Return ψ*f up to the weight ``top``, for a function f and the factors exp(Y) of ψ.
+
+    Each exp(Y) acts on functions by the Lie series of Y.
+    """
     for step in steps:
         result: GradedFunction = {}
         for weight, part in f.items():

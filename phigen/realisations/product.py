@@ -1,4 +1,4 @@
-"""Bi-realisation of a block-diagonal π: the product of those of its blocks."""
+"""Bi-realisation of a block-diagonal π: the product of bi-realisations of its blocks."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ KIND = "product"
 
 
 def build(system: System, choice: BirealisationChoice, build_part: Builder) -> BiRealisation:
-    """Return the product of the bi-realisations that ``build_part`` makes of the blocks of π.
+    """Return the product of the bi-realisations that ``build_part`` makes for the blocks of π.
 
-    Raises `SpecError` if π has only one block, or the kind does not apply to a block. Also raises it if the solver of
-    one block would have to follow paths, which is possible only for the whole system.
+    Raises `SpecError` if π has only one block, or if the kind does not apply to a block. Also raises it if the solver
+    would have to follow a path for a block, since a path can be followed for the whole system only.
     """
     parts = grouped(system)
     if len(parts) < 2:
@@ -30,7 +30,7 @@ def build(system: System, choice: BirealisationChoice, build_part: Builder) -> B
 
 
 def grouped(system: System) -> list[System]:
-    """Return the systems of the blocks of π; all blocks with constant π form one system."""
+    """Return a system with H = 0 for each block of π; all blocks with constant π are put together in one system."""
     single = [block_of(system, indices) for indices in blocks(system.coordinates, system.poisson)]
     constant = [b for b in single if isinstance(b.shape, Constant | Canonical)]
     if len(constant) < 2:
@@ -43,7 +43,10 @@ def grouped(system: System) -> list[System]:
 def assembled(
     system: System, parts: Sequence[System], build_part: Builder, choice: BirealisationChoice
 ) -> BiRealisation:
-    """Return the product of the bi-realisations that ``build_part`` makes of ``parts``, for the whole system."""
+    """Return the product of the bi-realisations that ``build_part`` makes for some ``parts`` of a system.
+
+    Raises `SpecError` if the solver would have to follow a path for a part.
+    """
     realisations = [build_part(part, choice) for part in parts]
     for part, realisation in zip(parts, realisations, strict=True):
         if realisation.path:

@@ -1,4 +1,4 @@
-"""The protocol of bi-realisations: the record that every kind returns, and the type of its builder."""
+"""The interface of bi-realisations: the record that every kind returns, and the type of the function that builds it."""
 
 from __future__ import annotations
 
@@ -20,20 +20,22 @@ PAPER = (
 
 @dataclass(frozen=True)
 class BiRealisation:
-    """Maps α, β : (x, p) → x with the axioms that `phigen.realisations.axioms` proves.
+    """Two maps α, β : (x, p) → x that satisfy the axioms in `phigen.realisations.axioms`.
 
     All tuples have one expression for each coordinate, in the symbols NAME (x), ``momentum(NAME)`` (its covector) and
     the parameters. With {x_i, p_j} = δ_ij: {α_i, α_j} = π_ij∘α, {β_i, β_j} = −π_ij∘β, {α_i, β_j} = 0.
 
-    - ``displacement``: α − x, simplified so that no terms of the size of x cancel
+    - ``displacement``: α − x, simplified such that no terms of the size of x cancel
     - ``increment``: β − α, simplified in the same way
-    - ``symmetric``: whether β(x, p) = α(x, −p), proved
-    - ``exact``: false for a truncation, whose steps are Poisson maps only up to the order
-    - ``degree``: for a truncation, the degree in p up to which α and β are correct; brackets are up to one degree less
+    - ``symmetric``: whether β(x, p) = α(x, −p), which is proved
+    - ``exact``: false for a truncated series, whose steps are Poisson maps only up to the order of the method
+    - ``degree``: for a truncated series, the degree in p up to which α and β are correct; their brackets are correct up
+      to one degree less
     - ``path``: whether the solver follows the path ṁ = π(m)p (Karasev's construction); then ``alpha`` and ``beta`` are
-      truncated formal series, from which the S_i are computed, and are never evaluated
-    - ``inner``: for a pull-back, the system in the other coordinates and its bi-realisation, on which proofs are made
-    - ``explanation``: the name and the reason of the choice, for the user; ``reference``: the source of the formulas
+      truncated series, from which the S_i are computed, and are never evaluated in a step
+    - ``inner``: for a pull-back, the system in the other coordinates and its bi-realisation, for which the axioms are
+      proved
+    - ``explanation``: the chosen form and the reason, for the user; ``reference``: the source of the formulas
     """
 
     kind: str
@@ -52,18 +54,19 @@ class BiRealisation:
 
     @property
     def covector(self) -> tuple[str, ...]:
-        """The names of the symbols p, in the order of the coordinates."""
+        """The names of the symbols of the covector p, in the order of the coordinates."""
         return covector_names(self.coordinates)
 
     @property
     def label(self) -> str:
-        """The kind as displayed to users; approximate ones are marked."""
+        """The kind as displayed to users; truncated series are marked as approximate."""
         if self.exact:
             return self.kind
         return f"{self.kind} (approximate" + (")" if self.degree is None else f", Poisson up to degree {self.degree})")
 
 
-#: Function that makes the bi-realisation of a system, or raises `SpecError` if the kind does not apply.
+#: Type of the functions that build the bi-realisation of a system, or raise `SpecError` if the kind does not apply to
+#: it.
 Builder = Callable[[System, BirealisationChoice], BiRealisation]
 
 
@@ -78,12 +81,13 @@ def covector_symbols(coordinates: Sequence[str]) -> list[Expression]:
 
 
 def reversed_covector(expressions: Sequence[Expression], coordinates: Sequence[str]) -> list[Expression]:
-    """Return the expressions with p replaced by −p."""
+    """Return the expressions with −p in place of the covector p."""
     return substitute(expressions, {name: -symbol(name) for name in covector_names(coordinates)})
 
 
 def is_symmetric(alpha: Sequence[Expression], beta: Sequence[Expression], coordinates: Sequence[str]) -> bool:
-    """Whether β(x, p) = α(x, −p) is proved; methods with a symmetric bi-realisation have even order."""
+    """Whether β(x, p) = α(x, −p) is proved. Methods with a symmetric bi-realisation are symmetric and have even
+    order."""
     mirrored = reversed_covector(alpha, coordinates)
     pairs = [(a, b) for a, b in zip(mirrored, beta, strict=True) if a is not b]
     roots = [e for pair in pairs for e in pair]
@@ -93,7 +97,7 @@ def is_symmetric(alpha: Sequence[Expression], beta: Sequence[Expression], coordi
 
 
 def simplified_differences(left: Sequence[Expression], right: Sequence[Expression]) -> tuple[Expression, ...]:
-    """Return left − right, simplified by the polynomial ring if that needs fewer operations."""
+    """Return left − right for each component, in the normal form of a polynomial ring if that has fewer operations."""
     roots = [a - b for a, b in zip(left, right, strict=True)]
     tower = Tower(symbols_of(*roots), roots)
     images = [tower.expression(element) for element in tower.convert_all(roots)]
@@ -105,5 +109,5 @@ def _operations(e: Expression) -> int:
 
 
 def refuse(message: str, hint: str = "") -> SpecError:
-    """Return the error of a builder that does not apply; the caller adds the place in the spec."""
+    """Return the error of a kind that does not apply to a system; the caller adds the place in the spec."""
     return SpecError([Diagnostic(message, hint=hint)])

@@ -1,7 +1,7 @@
-"""Bi-realisation of a π that is simpler in other coordinates y = ψ(x).
+"""Bi-realisation of a π that a spec states in other coordinates y = ψ(x), where it is simpler.
 
-With q_a = Σ_i p_i ∂x_i/∂y_a, the covector in the coordinates y, α(x, p) = ψ⁻¹(α_y(ψ(x), q)), and likewise for β. In
-short, α = ψ⁻¹ ∘ α_y ∘ T*ψ⁻¹.
+Let α_y be the map α in the coordinates y, and q_a = Σ_i p_i ∂x_i/∂y_a the covector in these coordinates. Then α(x, p) =
+ψ⁻¹(α_y(ψ(x), q)), in short α = ψ⁻¹ ∘ α_y ∘ T*ψ⁻¹, and likewise for β.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ KIND = "pullback"
 
 
 def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> BiRealisation:
-    """Return the bi-realisation that ``build_inner`` makes of the inner structure, in the coordinates of the spec.
+    """Return the bi-realisation that ``build_inner`` makes in the other coordinates of a pull-back, in the coordinates
+    of the spec.
 
-    Raises `SpecError` unless π is given as a pull-back, and if the solver of the inner structure would have to follow
-    paths.
+    Raises `SpecError` unless the spec states π as a pull-back, and if the solver would have to follow paths in the
+    other coordinates.
     """
     form = system.form
     if not isinstance(form, PullbackForm):
@@ -58,9 +59,10 @@ def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> 
 
 
 def is_composed(system: System, realisation: BiRealisation) -> bool:
-    """Whether α and β are the maps of ``realisation.inner`` in the coordinates of ψ, and the inverse ψ⁻¹ is proved.
+    """Whether α and β are the maps of ``realisation.inner``, transformed by ψ to the coordinates of the spec, with a
+    proved inverse ψ⁻¹.
 
-    Then the axioms follow from those of the inner realisation, since T*ψ is symplectic.
+    Then the axioms for α and β follow from the axioms in the other coordinates, since T*ψ is symplectic.
     """
     if realisation.inner is None or not isinstance(system.form, PullbackForm):
         return False
@@ -75,7 +77,8 @@ def is_composed(system: System, realisation: BiRealisation) -> bool:
 def moved(
     system: System, form: PullbackForm, change: Coordinates, maps: Sequence[Expression]
 ) -> tuple[Expression, ...]:
-    """Return ψ⁻¹ ∘ map ∘ T*ψ⁻¹ for a map in the coordinates y."""
+    """Return a map α or β that is given in the coordinates y = ψ(x) as a map in the coordinates x: ψ⁻¹ ∘ map ∘
+    T*ψ⁻¹."""
     p = covector_symbols(system.coordinates)
     covector = [total(pi * row[a] for pi, row in zip(p, change.jacobian, strict=True)) for a in range(len(p))]
     substitution = dict(zip(form.coordinates, change.forward, strict=True))

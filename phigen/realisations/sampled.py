@@ -1,7 +1,7 @@
-"""Check of the axioms of a large bi-realisation in exact arithmetic at points.
+"""Check of the axioms of a large bi-realisation at points, in exact arithmetic.
 
-A proof would expand too many terms. At a point the brackets of all pairs are products of two matrices of numbers, the
-derivatives in x and those in p.
+A proof would expand too many terms. At a point, the brackets of all pairs are products of two matrices of numbers: the
+derivatives with respect to x and those with respect to p.
 """
 
 from __future__ import annotations
@@ -21,14 +21,16 @@ from phigen.symbolic.numeric import DomainError, evaluate_exactly, is_rational
 from phigen.symbolic.tower import rational
 from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement, sample_point
 
-#: Number of points, and largest number of attempts to find them.
+#: Number of points at which the axioms are checked, and largest number of points that are tried, as not all are in the
+#: domain.
 POINTS, ATTEMPTS = 3, 16
 
 Point = Mapping[str, Fraction]
 
 
 def is_large(system: System, realisation: BiRealisation) -> bool:
-    """Whether the brackets of α and β are checked at points: they are rational, and a proof would be too long."""
+    """Whether the brackets of α and β are only checked at points: a proof would take too long, and all functions are
+    rational."""
     maps = [*realisation.alpha, *realisation.beta]
     if not is_rational(*maps, *(e for row in system.poisson for e in row)):
         return False
@@ -39,7 +41,8 @@ def is_large(system: System, realisation: BiRealisation) -> bool:
 
 
 def brackets_at_points(system: System, realisation: BiRealisation, titles: Sequence[str]) -> Iterator[Statement]:
-    """Yield the statements on {α_i, α_j}, {β_i, β_j} and {α_i, β_j}, named by ``titles``."""
+    """Yield the statements on the brackets {α_i, α_j}, {β_i, β_j} and {α_i, β_j}, checked at points; ``titles`` are
+    their names."""
     maps = realisation.alpha, realisation.beta
     variables = [*system.coordinates, *covector_names(system.coordinates)]
     slopes: tuple[list[list[Expression]], ...] = ([], [])
@@ -81,8 +84,10 @@ def _failures(
     slopes: tuple[list[list[Expression]], ...],
     point: Point,
 ) -> list[str]:
-    """Return, for each of αα, ββ and αβ, a pair whose bracket is wrong at the point, as text; "" if all brackets are
-    right."""
+    """Return for each of {α_i, α_j}, {β_i, β_j} and {α_i, β_j} a text about a pair whose bracket is wrong at a point.
+
+    The text is "" if the brackets of all pairs are right. ``slopes`` are the derivatives of α and β.
+    """
     n, names = system.dimension, system.coordinates
     values = iter(evaluate_exactly([e for one_map in slopes for row in one_map for e in row], point))
     (a_x, a_p), (b_x, b_p) = (_halves([[next(values) for _ in range(2 * n)] for _ in names]) for _ in maps)
@@ -102,13 +107,13 @@ def _failures(
 
 
 def _halves(rows: list[list[Fraction]]) -> tuple[Any, Any]:
-    """Return the derivatives in x and those in p as two matrices."""
+    """Return the derivatives with respect to x and those with respect to p as two matrices."""
     n = len(rows)
     return _matrix([row[:n] for row in rows]), _matrix([row[n:] for row in rows])
 
 
 def _tensor(system: System, maps: Sequence[Expression], point: Point) -> Any:
-    """Return the matrix π at the image of the point under ``maps``."""
+    """Return the matrix π at the point to which ``maps``, α or β, take a point (x, p)."""
     image = dict(zip(system.coordinates, evaluate_exactly(maps, point), strict=True))
     values = iter(evaluate_exactly([e for row in system.poisson for e in row], {**point, **image}))
     return _matrix([[next(values) for _ in row] for row in system.poisson])

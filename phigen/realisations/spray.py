@@ -1,19 +1,19 @@
-"""Poisson sprays and Moser's trick: a bi-realisation from the flow of a vector field on T*U.
+"""Poisson sprays and Moser's trick: a bi-realisation from the flow Φ of a vector field X on T*U.
 
-The field is X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j quadratic in p. With ω = Σ dx_i ∧ dp_i and τ(x, p) = x,
-the paper (section "Poisson Spray and Moser's trick") takes α̅ = τ, β̅ = τ∘Φ¹, Ω = ∫₀¹ Φˢ*ω ds, and ψ with ψ*Ω = ω; then
+The field is X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j quadratic in p. Let ω = Σ dx_i ∧ dp_i and τ(x, p) = x.
+The paper (section "Poisson Spray and Moser's trick") takes α̅ = τ, β̅ = τ∘Φ¹, Ω = ∫₀¹ Φˢ*ω ds, and ψ with ψ*Ω = ω; then
 α = α̅∘ψ, β = β̅∘ψ. Here ψ = Φ^{−½}∘ψ₀, so that
 
     α = τ∘Φ^{−½}∘ψ₀,    β = τ∘Φ^{½}∘ψ₀,    ψ₀*Ω₀ = ω,    Ω₀ = ∫_{−½}^{½} Φˢ*ω ds = Σ_{k even} L_Xᵏ ω / ((k+1)! 2ᵏ).
 
-X changes sign under p → −p up to the reversal of p, hence β(x, p) = α(x, −p) for every spray. ψ₀ is the identity to
-first order on p = 0. ψ is not (the paper says it is): it changes x by −½πp.
+The map p ↦ −p takes X to −X, hence β(x, p) = α(x, −p) for every spray. ψ₀ is the identity to first order at p = 0. ψ is
+not, although the paper says so: it changes x by −½πp.
 
-Where L_X² ω = 0, Ω₀ = ω and ψ₀ = id. With a flow in closed form this yields the constant and the log-canonical
-bi-realisations, and those of nilpotent flows with linear Φˢ*ω. For the flat spray (f = 0), Ω₀ = Σ d(mean_i of the path)
-∧ dp_i and p·(mean − x) = 0, so ψ₀ does not change p: this is Karasev's construction, with the same S_i. Another spray
-changes S_3 by G(x, ∇H), G cubic in p, since two symmetric bi-realisations differ by a symplectic map that is the
-identity to first order on p = 0.
+If L_X² ω = 0, then Ω₀ = ω and ψ₀ = id. With a flow in closed form this gives the constant and the log-canonical
+bi-realisations, and those of nilpotent flows for which Φˢ*ω is linear in s. For the flat spray (f = 0), Ω₀ = Σ d(mean_i
+of the path) ∧ dp_i and p·(mean − x) = 0, so ψ₀ does not change p: this is Karasev's construction, with the same S_i.
+Any other spray changes S_3 by a function G(x, ∇H) with G cubic in p, since two symmetric bi-realisations differ by a
+symplectic map that is the identity to first order at p = 0.
 
 Sprays and symplectic realisations: M. Crainic, I. Mărcuţ, J. Symplectic Geom. 9 (2011).
 """
@@ -38,22 +38,25 @@ from phigen.symbolic.verdict import PROVED
 KIND = "spray"
 REFERENCE = f"{PAPER}, section on Poisson sprays; M. Crainic, I. Mărcuţ, J. Symplectic Geom. 9 (2011)"
 
-#: A Lie series counts as finite if it ends within this number of terms.
+#: Largest number of terms of a Lie series that counts as finite.
 LONGEST = 8
-#: Largest number of terms of a polynomial in the search for a closed form; beyond it the search stops.
+#: Largest number of terms of a polynomial in the search for a closed form; the search stops beyond it.
 SEARCHED_TERMS = 500
-#: Hint for a flat spray without a closed form.
+#: End of the hint about a flat spray that has no closed form.
 KARASEV = "; the kind karasev follows the flow of the same spray to round-off"
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """Return the symmetric bi-realisation of a Poisson spray: exact if it has a closed form, else a truncation.
+    """Return the bi-realisation of a Poisson spray, which is symmetric: exact if phigen finds a closed form, else a
+    truncated series.
 
-    ``choice.spray`` is ``flat`` (f = 0), ``natural`` (log-canonical π: f_j = −p_j Σ_i a_ji x_i p_i, which conserves
-    each x_j p_j), ``auto`` (natural for log-canonical π, else flat) or the n expressions f_j. ``choice.degree`` is the
-    degree in p of a truncation, by default one more than the (even) order of the method; the defect of a step as a
-    Poisson map is then two orders smaller than its error. Raises `SpecError` unless each f_j is a quadratic form in p,
-    and for a degree too small for the order; `LimitError` for series that are too long.
+    ``choice.spray`` is ``flat`` (f = 0), ``natural`` (for log-canonical π: f_j = −p_j Σ_i a_ji x_i p_i, which conserves
+    each x_j p_j), ``auto`` (natural for log-canonical π, else flat), or the n expressions f_j. ``choice.degree`` is the
+    degree in p of a truncated series. By default it is the (even) order of the method plus one; the defect of a step as
+    a Poisson map is then two orders in h smaller than its error.
+
+    Raises `SpecError` unless each f_j is a quadratic form in p, and for a degree that is too small for the order.
+    Raises `LimitError` for series that are too long.
     """
     spray = make_spray(system, choice.spray)
     exact = _half_flows(system, spray) or _terminating(system, spray)
@@ -66,7 +69,10 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _half_flows(system: System, spray: Spray) -> BiRealisation | None:
-    """Return the bi-realisation α = τ∘Φ^{−½}, β = τ∘Φ^{½}, or None unless L_X² ω = 0 and the flow has a closed form."""
+    """Return the bi-realisation α = τ∘Φ^{−½}, β = τ∘Φ^{½}; None unless L_X² ω = 0 and the flow Φ has a closed form.
+
+    X is the field of the spray, and τ(x, p) = x.
+    """
     space = spray.space
     if not space.vanishes(centred_form(spray, 3)[3]):
         return None
@@ -79,9 +85,9 @@ def _half_flows(system: System, spray: Spray) -> BiRealisation | None:
 
 
 def _closed_flow(spray: Spray, i: int) -> tuple[Expression, Expression] | None:
-    """Return x_i∘Φ^{−½} − x_i and x_i∘Φ^{½} − x_i∘Φ^{−½}.
+    """Return x_i∘Φ^{−½} − x_i and x_i∘Φ^{½} − x_i∘Φ^{−½} for the flow Φ of the spray X.
 
-    None unless the Lie series of x_i is finite, or L_X x_i = v x_i with L_X v = 0.
+    Returns None unless the Lie series of x_i is finite, or L_X x_i = v x_i with L_X v = 0.
     """
     tower = spray.space.tower
     x = tower.variable(spray.space.names[i])
@@ -98,7 +104,7 @@ def _closed_flow(spray: Spray, i: int) -> tuple[Expression, Expression] | None:
 
 
 def _finite_series(spray: Spray, f: Poly) -> list[Poly] | None:
-    """Return the Lie series of f if it is finite, else None."""
+    """Return the Lie series of the function f along the spray if it is finite, else None."""
     try:
         series = lie_series(spray, f, LONGEST, SEARCHED_TERMS)
     except LimitError:
@@ -107,16 +113,21 @@ def _finite_series(spray: Spray, f: Poly) -> list[Poly] | None:
 
 
 def _differences(space: Cotangent, alpha: GradedFunction) -> tuple[Expression, Expression]:
-    """Return α − x and β − α of one coordinate, from the parts of α by degree in p and β(x, p) = α(x, −p)."""
+    """Return the components of α − x and β − α for one coordinate, from the parts of this component of α by degree in
+    p.
+
+    It is used that β(x, p) = α(x, −p).
+    """
     displacement = space.tower.combine(f for k, f in alpha.items() if k > 0)
     odd = space.tower.combine(f for k, f in alpha.items() if k % 2)
     return space.tower.expression(displacement), space.tower.expression(odd * space.tower.constant(-2))
 
 
 def _terminating(system: System, spray: Spray) -> BiRealisation | None:
-    """Return the bi-realisation of a nilpotent flow whose series for α is finite, or None.
+    """Return the bi-realisation of a spray with a nilpotent flow for which the series of α is finite; None for other
+    sprays.
 
-    The axioms, proved later, show that the series is complete.
+    The series is complete if the axioms hold, so they are proved here.
     """
     coordinates = [spray.space.tower.variable(c) for c in system.coordinates]
     if any(_finite_series(spray, x) is None for x in coordinates):
@@ -159,12 +170,12 @@ def _maps(system: System, displacement: Sequence[Expression]) -> tuple[tuple[Exp
 
 
 def moser_steps(spray: Spray, degree: int) -> list[Step]:
-    """Return the factors of ψ₀ that α needs up to a degree in p."""
+    """Return the factors of the map ψ₀ of Moser's trick, as many as α needs up to a degree in p."""
     return straighten(spray.space, centred_form(spray, degree + 1), degree + 1)
 
 
 def alpha_series(spray: Spray, degree: int) -> list[GradedFunction]:
-    """Return α = τ∘Φ^{−½}∘ψ₀ for each coordinate, as parts by degree in p, up to ``degree``."""
+    """Return, for each coordinate, the component of α = τ∘Φ^{−½}∘ψ₀ as parts by degree in p, up to ``degree``."""
     space, result = spray.space, []
     steps = moser_steps(spray, degree)
     for x in space.variables[: space.size]:

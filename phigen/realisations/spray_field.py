@@ -1,7 +1,8 @@
-"""A Poisson spray as a vector field on T*U: construction from a spec, checks, and its Lie series.
+"""A Poisson spray as a vector field X on T*U: its construction from a spec, the checks, and Lie series along it.
 
-X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j = Σ f_jkl(x) p_k p_l: X lifts πp and is homogeneous of weight 1
-(paper, section "Poisson Spray and Moser's trick"; the paper's example sums over i < j where all i, j are meant).
+X = Σ (πp)_i ∂_{x_i} + Σ f_j(x, p) ∂_{p_j} with f_j = Σ f_jkl(x) p_k p_l. So its x components are πp, and X is
+homogeneous: it raises the degree in p by 1 (paper, section "Poisson Spray and Moser's trick"; the example there sums
+over i < j, where all i, j are meant).
 """
 
 from __future__ import annotations
@@ -21,26 +22,32 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly
 
-#: Largest number of terms of one polynomial of a series.
+#: Largest number of terms of a polynomial in a series.
 MOST_TERMS = 20_000
 
 
 @dataclass(frozen=True)
 class Spray:
-    """The field X on T*U, with the components for x first, then those for p, and its ring; ``name`` names the spray."""
+    """A Poisson spray X on T*U: the components of the ``field`` for x, then those for p, as elements of the ring
+    ``space``.
+
+    ``name`` names the spray for users.
+    """
 
     space: Cotangent
     field: Components
     name: str
 
     def apply(self, f: Poly) -> Poly:
-        """Return L_X f, the derivative of f along the field X."""
+        """Return L_X f, the derivative of a function f along the spray X."""
         return self.space.along(self.field, f)
 
 
 def make_spray(system: System, name_or_forces: str | Sequence[Expression]) -> Spray:
-    """Return the spray requested by a spec, as in `phigen.realisations.spray.build`. Raises `SpecError` if it is not
-    a spray."""
+    """Return the spray that a spec requests; the values are explained at `phigen.realisations.spray.build`.
+
+    Raises `SpecError` if the p components are not quadratic forms in p.
+    """
     name, forces = _covector_part(system, name_or_forces)
     velocity = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
     space = Cotangent(system.coordinates, [*velocity, *forces])
@@ -81,9 +88,10 @@ def _checked(system: System, forces: Sequence[Expression]) -> Sequence[Expressio
 
 
 def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]) -> None:
-    """Raise `SpecError` unless the forces are quadratic forms in p.
+    """Raise `SpecError` unless the p components ``forces`` of the spray are quadratic forms in p.
 
-    The ring decides it: a smooth function that is homogeneous of degree 2 is a quadratic form.
+    A smooth function of p that is homogeneous of degree 2 is a quadratic form; the ring decides whether each component
+    is one.
     """
     space, n = spray.space, system.dimension
     tower = space.tower
@@ -102,7 +110,8 @@ def _expect_quadratic(system: System, spray: Spray, forces: Sequence[Expression]
 
 
 def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS) -> list[Poly]:
-    """Return L_Xᵏ f / k! for k = 0 … length. Raises `LimitError` beyond ``most_terms`` terms."""
+    """Return the terms L_Xᵏ f / k! for k = 0 … length. Raises `LimitError` for a term with more than ``most_terms``
+    monomials."""
     result = [f]
     for k in range(1, length + 1):
         result.append(spray.space.scaled(spray.apply(result[-1]), Fraction(1, k)))
@@ -114,8 +123,10 @@ def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS)
 
 
 def centred_form(spray: Spray, top: int) -> GradedForm:
-    """Return the parts of Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to the weight ``top``: L_Xᵏ ω / ((k+1)! 2ᵏ) at weight k + 1, k
-    even."""
+    """Return the parts of Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to the weight ``top``, for the flow Φ of the spray X.
+
+    The part of weight k + 1 is L_Xᵏ ω / ((k+1)! 2ᵏ) for even k; there are no parts of even weight.
+    """
     space, form = spray.space, spray.space.canonical()
     result = {1: form}
     for k in range(1, top):

@@ -1,7 +1,7 @@
-"""The axioms of a truncated bi-realisation, proved degree by degree in p.
+"""Proofs of the axioms for α and β that are truncated series in p, one degree in p after another.
 
 If α and β are correct up to degree d in p, their brackets are correct up to degree d − 1, since {·, ·} takes one
-derivative in p. So the statements are identities between homogeneous parts:
+derivative in p. So the statements are identities between homogeneous parts, denoted by their degree in brackets:
 
     Σ_{k+l=m+1} {α_i^(k), α_j^(l)} = (π_ij∘α)^(m)    for m = 0 … d − 1,    and likewise for β and for (α, β).
 """
@@ -17,12 +17,12 @@ from phigen.symbolic.taylor import Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import UNDECIDED, Statement, decide_elements
 
-#: Reason why steps along paths need no statement about higher degrees.
+#: Reason, for the user, why steps along paths are Poisson maps although the series are truncated.
 EXACT_PATH = "steps follow the exact path, for which Karasev's theorem is the proof"
 
 
 class _HomogeneousParts:
-    """Homogeneous parts in p, up to a degree, of expressions in x and p, and their brackets."""
+    """The homogeneous parts in p, up to a degree, of some expressions in x and p, and the brackets of these parts."""
 
     def __init__(self, system: System, expressions: Sequence[Expression], degree: int) -> None:
         self.coordinates, self.covector = system.coordinates, covector_names(system.coordinates)
@@ -32,7 +32,7 @@ class _HomogeneousParts:
         self.tower = Tower([*variables, *parameters], at_zero, variables)
         taylor = Taylor(expressions, self.tower, self.covector)
         for k in range(degree + 1):
-            # In the Taylor series along p ↦ tp, the coefficient of t^k is the part of degree k.
+            # In the Taylor series along p ↦ tp, the coefficient of t^k is the homogeneous part of degree k.
             taylor.advance({c: self.tower.variable(c) if k == 1 else self.tower.zero for c in self.covector})
         self.parts = [taylor.coefficients(e) for e in expressions]
         self._slopes: dict[tuple[int, int, str], Poly] = {}
@@ -44,7 +44,8 @@ class _HomogeneousParts:
         return self._slopes[key]
 
     def bracket(self, e: int, f: int, degree: int) -> Poly:
-        """Return the part of the given degree of the bracket of expressions number ``e`` and ``f``."""
+        """Return the homogeneous part of a given ``degree`` in p of the bracket of the expressions with the numbers
+        ``e`` and ``f``."""
         result = self.tower.zero
         for k in range(degree + 2):
             for c, p in zip(self.coordinates, self.covector, strict=True):
@@ -57,7 +58,7 @@ class _HomogeneousParts:
 
 
 def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterator[Statement]:
-    """Yield the statements on {α_i, α_j}, {β_i, β_j} and {α_i, β_j} up to ``degree`` − 1 in p."""
+    """Yield the statements on {α_i, α_j}, {β_i, β_j} and {α_i, β_j}, each up to ``degree`` − 1 in p."""
     n = system.dimension
     maps = [*realisation.alpha, *realisation.beta]
     pairs = [(i, j) for j in range(n) for i in range(j)]
