@@ -136,7 +136,7 @@ def ours(solver: Any) -> Advance:
 def kernels(quick: bool) -> list[dict[str, Any]]:
     """Return rows with the times of generated and hand-written splittings, in nanoseconds for a site and step.
 
-    Each time is the least of several runs, in which both alternate.
+    Each time is the least of several runs, in which the two splittings take turns.
     """
     rows = []
     for sites, size, order in ((XXZ, 1024, 2), (XXZ, 1024, 4), (CUBE, 32, 2), (CUBE, 96, 2)):

@@ -30,16 +30,21 @@ order_option = click.option("--order", metavar="K", type=ORDER, help="Order of t
 #: The type of ``--seed``, which selects the random numbers of a run with noise.
 SEED = click.IntRange(0, limits.SEED)
 
-#: The options that choose the solver of a run.
+#: The option for the target whose solver runs; auto takes C, or NumPy if there is no C compiler.
 target_option = click.option(
-    "-t", "--target", type=click.Choice(["auto", *RUNNABLE]), default="auto", show_default=True
+    "-t",
+    "--target",
+    type=click.Choice(["auto", *RUNNABLE]),
+    default="auto",
+    show_default=True,
+    help="Target of the solver; auto is C, or NumPy without a C compiler.",
 )
 
 settings_option = click.option(
     "--set", "settings", metavar="NAME=VALUE", multiple=True, help="Value of a parameter or of an initial coordinate."
 )
 
-#: The options that choose the one-step map; they override the spec.
+#: The option for the scheme of the steps, which overrides the spec.
 scheme_option = click.option("--scheme", type=click.Choice(SCHEMES), help="Scheme of the steps; overrides the spec.")
 
 #: The option for the profile of code that phigen itself runs; ``profile:`` in a spec only applies to ``phigen build``.

@@ -57,7 +57,8 @@ STRICT = ("-Wall", "-Wextra", "-Werror")
 @click.option(
     "--stack",
     metavar="FLAGS",
-    help="State the stack in the header, measured by gcc, or the gcc named in CC, with FLAGS, such as --stack=-O2.",
+    help="State in the header how much stack the C uses, measured by gcc (or the gcc named in CC) with FLAGS, "
+    "as in --stack=-O2.",
 )
 @click.option("--certify", is_flag=True, help="Also verify the solvers, and write DIR/NAME/NAME.certificate.json.")
 @click.option(

@@ -38,7 +38,7 @@ WIDTH = 0.01
     "boxes",
     multiple=True,
     metavar="NAME=LOW:HIGH",
-    help="Range of a coordinate.  [default: box of the run, else its start ± 1 %, or ± 0.01 if it is below 1]",
+    help="Range of a coordinate.  [default: box of the run, else the initial value ± 1 %, or ± 0.01 below 1]",
 )
 @click.option(
     "--time", "times", metavar="LOW:HIGH", help="Range of the time t, if H depends on t.  [default: times of the run]"

@@ -26,7 +26,7 @@ force_option = click.option(
     is_eager=True,
     expose_value=False,
     callback=_keep,
-    help="Replace files of other runs, and those that phigen did not write.",
+    help="Replace files of other runs, and files that phigen did not write.",
 )
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 @profile_option
 @click.option(
     "--accuracy", type=click.FloatRange(1e-15, 0.5), default=1e-8, show_default=True, metavar="E",
-    help="The largest error that is allowed, relative.",
+    help="Largest relative error that is allowed.",
 )  # fmt: skip
 @click.option(
     "--measure", type=click.Choice(["energy", "orbit"]), default="energy", show_default=True,

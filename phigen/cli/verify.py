@@ -46,7 +46,7 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @click.option("--adjoint", is_flag=True, help="Measure gradients, whether the spec asks for them or not.")
 @click.option("--quick", is_flag=True, help="Use fewer steps.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
-              help="Draw the constancy of one modified Hamiltonian: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
+              help="Draw changes of the modified Hamiltonian of one spec: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, one object for each spec.")
 @force_option
 @verbosity

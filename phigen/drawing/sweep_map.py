@@ -59,7 +59,7 @@ def draw(store: Path, path: Path, requested: str | None = None, origin: str = ""
 def _figure(data: Any, names: Sequence[str], logarithmic: Set[str], varied: Set[str]) -> Figure:
     """Return a figure with a panel for each variable; states have a panel for each coordinate.
 
-    ``varied`` has the names of the quantities in which members without a grid differ.
+    ``varied`` has the names of the quantities that vary between members if their settings do not form a grid.
     """
     from matplotlib.figure import Figure
 

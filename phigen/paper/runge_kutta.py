@@ -1,4 +1,4 @@
-"""Classical methods in compiled C, called step by step: long runs and sections of them."""
+"""Runs of classical methods in compiled C that are advanced step by step, for long runs and for Poincaré sections."""
 
 from __future__ import annotations
 
