@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: cd8ba7843f2af1f5ff4d5d575575a57a5e80fa9e564f553d0884ae7dae0d284a
+ * body-sha256: 5d26716b4efa491f543c95d0e6da4b265929ca055337b342caa6658d3d863328
  */
 #include "duffing.h"
 #include <float.h>
@@ -19,8 +19,8 @@
 /* ---- The model ---- */
 const duffing_params duffing_default_params = { 0.1, 1.2 };
 
-enum { duffing_PREPARED = 22 };       /* number of the first coefficients, functions of params and h only */
-enum { duffing_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+enum { duffing_PREPARED = 22 };       /* first coefficients, which depend on params and h only */
+enum { duffing_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 #define duffing_TOLERANCE 1e-20       /* largest estimated error after an accepted correction */
 
 /* Midpoint of the step, at which time-dependent coefficients are evaluated. */

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: c37fc98f6fb367cced4c6daeeeda27d9a8e4f6b933034b2b35db6b286f327a67
+ * body-sha256: f513b0ae77a9d96966532e3f488ff0eda7050edb22089b1a0e630e17f6d13046
  */
 #include "food_web.h"
 #include <limits.h>
@@ -26,7 +26,7 @@ const food_web_params food_web_default_params = { NULL, NULL };
 enum { food_web_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
 enum { food_web_ROW = 1 };            /* coefficients of one flow */
 enum { food_web_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
-enum { food_web_FLOWS = 25 };         /* in a step */
+enum { food_web_FLOWS = 25 };         /* flows in a step */
 
 /* Along each axis: the smallest size. */
 static const size_t food_web_least[food_web_AXES] = { 1 };

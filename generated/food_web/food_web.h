@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a2c30a9df195db8e9e46e089b01ba68f26577b575339b47f6ee9c33193473157
+ * body-sha256: ff5afcc3d59dfb964744049b3c3250836300d6bb205d7319e82de3a5640be22a
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -41,8 +41,8 @@ typedef struct {
     double *x[food_web_ARRAYS]; /* first sites of the fields, then parameters at sites */
     double *before[food_web_DIM]; /* fields before the present steps, restored if one fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
-    int *bonds, *middle; /* for each site, index in other of the first bond from it, and to it */
-    int *other, *number; /* for each of these, the site at the other end, and the number of the bond */
+    int *bonds, *middle; /* for each site, index in other of the first bond that begins or ends there */
+    int *other, *number; /* for each bond of a site, the site at its other end, and its number */
     double *at_bonds[food_web_BOND_ARRAYS]; /* for each entry of other, the parameters at the bond */
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */

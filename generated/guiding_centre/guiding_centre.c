@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 043de3432a274f93110ca0eee49d4c0a48e7b3e658aaa5eeffad1b8c35afe869
+ * body-sha256: eb8db355e8820b7e82b258801a9570c6bd262fe8e36e7ed4c11b12abf9bd94a8
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -20,7 +20,7 @@
 /* ---- The model ---- */
 const guiding_centre_params guiding_centre_default_params = { 0.5, 0.3, 0.2 };
 
-enum { guiding_centre_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+enum { guiding_centre_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 /* largest number of Taylor terms of a path; a path that needs more is divided */
 enum { guiding_centre_TERMS = 30 };
 enum { guiding_centre_SERIES = 55 }; /* Taylor series of a path, those of the coordinates first */
@@ -255,7 +255,7 @@ static double guiding_centre_taylor_power(const double *a, const double *b, doub
     return sum / (double)k;
 }
 
-/* First coefficients of the series of a path; those of the coordinates are given. */
+/* Coefficients of order 0 of the series of a path, except the coordinates, which are given. */
 static void guiding_centre_path_begin(const double *coef, const double p[4],
     double s[55][guiding_centre_TERMS + 1], double f[1])
 {

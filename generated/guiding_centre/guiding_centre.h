@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e0433f23e7e8e3ea272eeff688455e776588fd4decbf32b848d214fda59cdf08
+ * body-sha256: 78d70f674f7cd04c033d3989862ba412c98a2459eae347d189008610ed239dbd
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -14,7 +14,7 @@ extern "C" {
 #define guiding_centre_CASIMIRS 0 /* Casimirs: none */
 #define guiding_centre_PHIGEN_VERSION "0.1.0"
 #define guiding_centre_SPEC_SHA256 "82d5ea90095e73077a2671c7c2e7b96d51802a2b6398fe46f5396c4225a32104"
-enum { guiding_centre_STAGES = 5 };       /* of a step */
+enum { guiding_centre_STAGES = 5 };       /* stages of a step */
 enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
 enum { guiding_centre_DIFFERENCES = 9 };  /* for the predictor; more would amplify rounding */
 

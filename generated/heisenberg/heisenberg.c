@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: afa46dedf2ef472b4c8a1090d8c3c6524690c202cb5b12276a92f32c65982ff8
+ * body-sha256: a47c45d61e8e77e6004369a616dac1a029cf4b4a601c41d58cb55c8e43309bb9
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -23,14 +23,14 @@
 /* ---- The model ---- */
 const heisenberg_params heisenberg_default_params = { 1.0, NULL };
 
-enum { heisenberg_HALO = 1 }; /* sites that are copied beside a row */
+enum { heisenberg_HALO = 1 }; /* sites that are copied beyond each end of a row */
 enum { heisenberg_LEAD = 8 }; /* doubles before the first site of a row */
 enum { heisenberg_RESERVED = 7 }; /* arrays over the sites in the memory of a solver */
 enum { heisenberg_LINES = 5 }; /* rows that kernels read: the row itself and its neighbours */
 enum { heisenberg_ROW = 3 }; /* coefficients of one flow */
 enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
-enum { heisenberg_FLOWS = 5 }; /* in a step */
-enum { heisenberg_SPAN = 1 }; /* slices on either side of a slice that a flow reads; see wavefront blocking */
+enum { heisenberg_FLOWS = 5 }; /* flows in a step */
+enum { heisenberg_SPAN = 1 }; /* neighbouring slices that a flow reads on each side; see wavefront blocking */
 
 /* Along each axis: the smallest size, whether the ends are open. */
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
@@ -242,7 +242,7 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     }
 }
 
-/* As above, with full-range functions. */
+/* As heisenberg_sweep1_near, with full-range functions. */
 static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -290,7 +290,7 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     }
 }
 
-/* As above, with full-range functions. */
+/* As heisenberg_sweep2_near, with full-range functions. */
 static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -338,7 +338,7 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     }
 }
 
-/* As above, with full-range functions. */
+/* As heisenberg_sweep3_near, with full-range functions. */
 static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];

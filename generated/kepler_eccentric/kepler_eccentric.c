@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0) and the monitor dt/dtau; The
  *   solver
- * body-sha256: 8f1fd9d90725ef76302726e432dba52057355b5a79a10fa0c661c28de0af7977
+ * body-sha256: 54814e3feb5a38d3525e3a468462bf0bbd20db7ef184835cc38445329fa0d697
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -19,8 +19,8 @@
 /* ---- The model ---- */
 const kepler_eccentric_params kepler_eccentric_default_params = { 1e-06 };
 
-enum { kepler_eccentric_ROWS_OF_FLOWS = 35 }; /* times of flows in a step, each with its coefficients */
-enum { kepler_eccentric_ROW = 4 };            /* coefficients for one of them */
+enum { kepler_eccentric_ROWS_OF_FLOWS = 35 }; /* durations of flows, each with its coefficients */
+enum { kepler_eccentric_ROW = 4 };            /* coefficients in a row */
 
 /* The times of flows, as fractions of h: one for each row of coefficients. */
 static const double kepler_eccentric_times[kepler_eccentric_ROWS_OF_FLOWS] = { 0.06510124154444503,

@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 30fbf91f4941e9e1bf35d225a8a55600a216f3e7fcc8197a805e9c6a171a236b
+ * body-sha256: de1b0a0f95be7ed4208eadc49dd5ae4d9ba8b129ddb769ea8fd87be2ec159ae4
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -16,8 +16,8 @@ extern "C" {
 #define kowalevski_gauss_SPEC_SHA256 "207f4ed5fd3660d4975c60c4ec873885b380480a09e812d4abf3ef5acac67116"
 enum { kowalevski_gauss_COEFFICIENTS = 1 }; /* numbers that are functions of params and h */
 enum { kowalevski_gauss_NODES = 8 };        /* stages of a step */
-enum { kowalevski_gauss_WIDTH = 8 };        /* of an array over the stages */
-enum { kowalevski_gauss_UNKNOWNS = 8 };     /* of a stage */
+enum { kowalevski_gauss_WIDTH = 8 };        /* entries of an array over the stages */
+enum { kowalevski_gauss_UNKNOWNS = 8 };     /* unknowns of a stage */
 enum { kowalevski_gauss_EARLIER = 2 };      /* steps that predictors read */
 
 typedef struct {

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 264638b41fc604cf6859e70851455e4ae7f1041eab833f443fc2dc6271eb3e59
+ * body-sha256: 206d04fc122fdd3c16039ad969e282718d85e78e6f6b1ff8b867f161605ab984
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -213,7 +213,7 @@ static inline void point_vortices_increment(const double *coef, const point_vort
     }
 }
 
-/* A sweep, or to x the end of a stage, for a row segment. */
+/* A sweep over y, or the update of x at the end of a stage, for a row segment. */
 static void point_vortices_stage_piece(const point_vortices_solver *s, const double *coef, double *const *y,
     double *const *to, size_t unit)
 {

@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f2d1e355791e823993800963d2735e9bfcca02aa9f1fa26b7e636885c3cd3590
+ * body-sha256: a3c50242403e62e01f75cbd1604096c7e55bd71d835034ebfbe5aaabe73822fe
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -26,7 +26,7 @@ enum { point_vortices_ARRAYS = 3 };       /* arrays over the sites: fields, then
 enum { point_vortices_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
 enum { point_vortices_STAGES = 5 };       /* stages of a step */
 enum { point_vortices_DIRECTIONS = 24 };  /* dimension of a Krylov space */
-enum { point_vortices_DIFFERENCES = 2 };  /* differences of the predictor */
+enum { point_vortices_DIFFERENCES = 2 };  /* differences in the predictor of a stage */
 enum { point_vortices_GATHERED = 4 };     /* sums over other sites that are stored for each site */
 
 typedef enum { point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vortices_SINGULAR,

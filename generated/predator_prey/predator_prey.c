@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 56c629e99f63de30e8b49f2c2e763b647b7424e35632600059da9d41d3811263
+ * body-sha256: cfd68cd182d606e07b5f36ad2f654c2f54143b585510c09b5a14669a6661c477
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -19,7 +19,7 @@
 /* ---- The model ---- */
 const predator_prey_params predator_prey_default_params = { 1.0, 0.1, 0.05, 0.5 };
 
-enum { predator_prey_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+enum { predator_prey_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 #define predator_prey_TOLERANCE 1e-20       /* largest estimated error after an accepted correction */
 
 static int predator_prey_allowed(const predator_prey_params *params)

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: bce451d1b2ddccbaa5adf4dff751324f8751eea7838fcd9dca155094aac47287
+ * body-sha256: 3341a74f00a8a99a85b9ebc1676a9fe2837d1a7d79bb0a7f8abdbd1f4496bc24
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -20,7 +20,7 @@
 /* ---- The model ---- */
 const quaternion_top_params quaternion_top_default_params = { 1.0, 1.5, 2.0, 1.0, 0.5 };
 
-enum { quaternion_top_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+enum { quaternion_top_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 /* largest number of Taylor terms of a path; a path that needs more is divided */
 enum { quaternion_top_TERMS = 30 };
 enum { quaternion_top_SERIES = 84 }; /* Taylor series of a path, those of the coordinates first */
@@ -403,7 +403,7 @@ static int quaternion_top_plausible(const quaternion_top_solver *s,
     return fabs(H[2] - H[0]) <= quaternion_top_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
-/* First coefficients of the series of a path; those of the coordinates are given. */
+/* Coefficients of order 0 of the series of a path, except the coordinates, which are given. */
 static void quaternion_top_path_begin(const double *coef, const double p[7],
     double s[84][quaternion_top_TERMS + 1], double f[1])
 {

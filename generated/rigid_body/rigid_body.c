@@ -13,7 +13,7 @@
  *   subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members: implicit
  *   steps; Ensembles
- * body-sha256: 409c5d9690e615726ad501d37020bbe1acb0ce8c79531a61a9722a9134edd24b
+ * body-sha256: 17c6ce26cbb976a6305013a4e51ada2ed3929489889f1920d6e3009aea630207
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -29,7 +29,7 @@
 /* ---- The model ---- */
 const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.6666666666666666 };
 
-enum { rigid_body_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
+enum { rigid_body_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 enum { rigid_body_CHECKS = 8 }; /* past solutions that the recurrence is tested on, not fitted to */
 enum { rigid_body_PASSES = 2 }; /* iterations of a block that cost as much per step as one evaluation */
 #define rigid_body_TOLERANCE 1e-20 /* largest estimated error after an accepted correction */
@@ -1383,7 +1383,7 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
 /* Data shared by all blocks: coefficients, equal in all lanes, and the recurrences that predict the
    solutions. */
 typedef struct {
-    int fits; /* number of the fit that weight belongs to; -1 for none */
+    int fits; /* number of the fit that resulted in weight; -1 if there is none */
     rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];
 } rigid_body_table;
 

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 05012269a77516ad9f88af52177f2f7e653026312102f6d417a57d6f6262993f
+ * body-sha256: 948e3486fc320c642655c7cade71787f7fb423195f027dee109a8c46cc3fcec5
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -615,8 +615,8 @@ export class Solver {
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
-   * @param {ArrayLike<number>} [options.gauge] factors of the Casimirs in place of those at x0; for fixed factors
-   *   the step is an exact Poisson map
+   * @param {ArrayLike<number>} [options.gauge] factors of the Casimirs subtracted from H; by default they follow
+   *   from x0. For fixed factors the step is an exact Poisson map
    */
   constructor(options = {}) {
     expectOptions(options, OPTIONS);

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 7feb17bc4946116d0d2de3f5baa088eacfd913d54c22ba113cafb7d7a999dd25
+ * body-sha256: baea6bb40e460ed5afdcbc1aa349c294d796b849c0348810a01dd5148f75cb16
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -27,9 +27,9 @@
 /* ---- The model ---- */
 const thermal_spin_params thermal_spin_default_params = { 1.0, 0.5, 0.1 };
 
-enum { thermal_spin_PREPARED = 7 }; /* number of the first coefficients, functions of params and h only */
-enum { thermal_spin_MAX_ITERATIONS = 20 }; /* limit of the iterations of an implicit step */
-#define thermal_spin_TOLERANCE 1e-20 /* largest estimated error after an accepted correction */
+enum { thermal_spin_PREPARED = 7 };        /* first coefficients, which depend on params and h only */
+enum { thermal_spin_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
+#define thermal_spin_TOLERANCE 1e-20       /* largest estimated error after an accepted correction */
 
 #define thermal_spin_BOUND 6.0 /* bound of normal variates: rare large ones would make steps fail */
 

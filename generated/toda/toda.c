@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 74ba4f859f396b1abeafc27ba12a36e3d16c0a6f9f8a96984c29711513d98f8f
+ * body-sha256: 46bd92f34937f56aa3048e95d5811dc6b7cbfb5ccb6f7b4ad1223c64f1f30507
  */
 #include "toda.h"
 #include <math.h>
@@ -22,12 +22,12 @@
 /* ---- The model ---- */
 const toda_params toda_default_params = { 0 };
 
-enum { toda_HALO = 1 };           /* sites that are copied beside a row */
+enum { toda_HALO = 1 };           /* sites that are copied beyond each end of a row */
 enum { toda_LEAD = 8 };           /* doubles before the first site of a row */
 enum { toda_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
 enum { toda_ROW = 2 };            /* coefficients of one flow */
 enum { toda_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
-enum { toda_FLOWS = 13 };         /* in a step */
+enum { toda_FLOWS = 13 };         /* flows in a step */
 
 /* Along each axis: the smallest size. */
 static const size_t toda_least[toda_AXES] = { 2 };

@@ -184,7 +184,7 @@ def functions(program: Program, path: Recurrences, kind: str) -> list[ir.Functio
     rules = build.rules()
     later = [ir.If(ir.Binary(">", K, ZERO), rules)] if rules else []
     point = [ir.vectors(ir.Vector(series), E), *[ir.vectors(values, F)] * bool(path.fixed)]
-    of_series = f"First coefficients of the series of a {kind}; those of the coordinates are given"
+    of_series = f"Coefficients of order 0 of the series of a {kind}, except the coordinates, which are given"
     of_order = "Coefficient k of the series, and coefficient k + 1 of the coordinates"
     at_point = (*point, *build.fixed(), ir.Copy(E, M, n), *build.nodes(), *build.field())
     return [
@@ -254,7 +254,7 @@ def lane_functions(program: Program, path: Recurrences, slopes: PathSlopes, used
     along_p = [(e.row * 2 * n + n + e.column, half, e) for e in slopes.tensor]
     functions = [
         build.follow("follow", "the series that follow from those of the coordinates", range(n, base)),
-        build.follow("follow_slopes", "the further series", range(base, len(whole.series))),
+        build.follow("follow_slopes", "the series that derivatives need", range(base, len(whole.series))),
         build.variation("vary_by", "v", slopes.jacobian, 2 * n, "the derivatives"),
         build.source("vary_source", "v", [*along_m, *along_p], "the derivatives"),
     ]

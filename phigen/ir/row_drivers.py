@@ -103,7 +103,7 @@ class RowDrivers:
         if threads and body:
             head.append(ir.Declare(ir.Type.SIZE, ((ir.fixed("units").symbol, ir.Called("units", (S,))),)))
         if orders:
-            text = "fields in permuted order: a loop written for one order of the fields also runs on these"
+            text = "fields in permuted order, so that a loop for one order of the fields serves for another"
             head.append(ir.Comment(text))
         said = ", for a row segment" * alone + ", for the row segments first ... end - 1" * several
         function = ir.Function(name, doc + said, Role.OTHER, ("s", *parameters, *range_names), (*head, *orders, *body))

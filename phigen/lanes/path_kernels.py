@@ -70,7 +70,7 @@ def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Seque
         ),
         Kernel(
             "slope_values",
-            "the values of the further series",
+            "the values of the series that derivatives need",
             {
                 "coef": coef,
                 "p": covector,

@@ -145,7 +145,9 @@ STATE = (
         "ATTITUDE && POSITION",
         ("double position[3]; /* position of the body in space; change it only by phi_set_attitude */",),
     ),
-    StateBlock("first", "ATTITUDE && MATRICES", ("double first[PHI_ELEMENT]; /* attitude of phi_set_attitude */",)),
+    StateBlock(
+        "first", "ATTITUDE && MATRICES", ("double first[PHI_ELEMENT]; /* the attitude that phi_set_attitude set */",)
+    ),
     StateBlock(
         "turned",
         "ATTITUDE",
@@ -164,9 +166,8 @@ STATE = (
         "rate",
         "RATE_OF_GAUGE",
         (
-            "double rate[PHI_RATE];"
-            " /* gradient of the Casimirs subtracted from H: the body rotates at this rate too */",
-            "double aside[PHI_ELEMENT]; /* the rotation at this rate in one step, minus the identity */",
+            "double rate[PHI_RATE]; /* gradient of the Casimirs subtracted from H: rate of an additional rotation */",
+            "double aside[PHI_ELEMENT]; /* the additional rotation in one step, minus the identity */",
         ),
         reset=("phi_set_aside(s);",),
         copied=(
@@ -177,7 +178,7 @@ STATE = (
     StateBlock(
         "aside_of_block",
         "RATE_OF_GAUGE && BLOCKS",
-        ("double aside_of_block[PHI_ELEMENT]; /* the same for a block of steps */",),
+        ("double aside_of_block[PHI_ELEMENT]; /* the additional rotation in a block of steps, minus the identity */",),
     ),
     StateBlock(
         "before_h",

@@ -25,7 +25,7 @@ def divided_at_ends(function: ir.Function) -> list[ir.Function]:
     """
     if not any(map(_weight, statements(function.body))):
         return [function]
-    near = replace(function, name=function.name + NEAR_ENDS, doc="the same for sites near open ends")
+    near = replace(function, name=function.name + NEAR_ENDS, doc=f"{function.doc}, for sites near open ends")
     return [map_blocks(function, _without_weights), near]
 
 

@@ -167,7 +167,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
         public.append(("OBSERVABLES", len(program.observed), f"observables: {', '.join(program.observed)}"))
     if program.modified:
         public.append(("MODIFIED_POWER", program.modified.power, "power of h in the error of the modified Hamiltonian"))
-    sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
+    sizes: Sizes = [("STAGES", len(program.fractions), "stages of a step")] if has["COMPOSED"] else []
     also = f", and of {_renewing(program)}" if program.step.refresh else ""
     sizes.append(
         ("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that are functions of params and h{also}")
@@ -182,7 +182,9 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
         sizes.append(("TRAIL", trail, "numbers on the tape for each step, for the reverse pass"))
         if has["EACH"]:
             batch = 1 if step.kind.flows else LANES * _packs_back(lanes, has)
-            sizes.append(("TRAIL_EACH", trail * max(1, batch), "the same for a batch of members"))
+            sizes.append(
+                ("TRAIL_EACH", trail * max(1, batch), "numbers on the tape for each step of a batch of members")
+            )
     if has["PREDICTED"] and not has["RECURRENCES"] and not has["GAUSS"]:
         predictor = PredictorPolicy()
         sizes.append(("DIFFERENCES", predictor.differences, "for the predictor; more would amplify rounding"))
@@ -307,7 +309,7 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
     sizes: Sizes = []
     step = program.step
     if step.refresh:
-        sizes.append(("PREPARED", step.prepared, "number of the first coefficients, functions of params and h only"))
+        sizes.append(("PREPARED", step.prepared, "first coefficients, which depend on params and h only"))
     sizes += text_of(program).constants(program, step)
     if has["ADJOINT"]:
         sizes += [("RENEWED_OF_ROW", step.renewed, "coefficients of a row that depend on the time")] * bool(
@@ -327,7 +329,7 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
     if has["ALONG"] and step.back:
         sizes.append(("USED", len(step.back.used), "coefficients that the slope of a path depends on"))
     if has["BATCHED"]:
-        sizes.append(("BACK_PACKS", _packs_back(lanes, has), "packs of members that are pulled back together"))
+        sizes.append(("BACK_PACKS", _packs_back(lanes, has), "SIMD batches (packs) of members in one reverse pass"))
     return sizes + text_of(program).last_constants(step)
 
 

@@ -48,8 +48,8 @@ def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
     width = _width(step, lanes)
     return [
         ("NODES", step.tableau.stages, "stages of a step"),
-        ("WIDTH", width, "of an array over the stages" + ", those that fill a vector" * (width > step.tableau.stages)),
-        ("UNKNOWNS", step.unknowns, "of a stage"),
+        ("WIDTH", width, "entries of an array over the stages" + ", to fill a vector" * (width > step.tableau.stages)),
+        ("UNKNOWNS", step.unknowns, "unknowns of a stage"),
         *([("EARLIER", EARLIER, "steps that predictors read")] if isinstance(lanes, Stages) else []),
         *([("LIFT", step.lift.size, "components of frames of group elements")] if step.lift else []),
     ]

@@ -68,15 +68,15 @@ LATTICE = (
         "BODIES",
         (
             "ptrdiff_t massive;         /* number of bodies up to the last one with a mass */",
-            "double mass;               /* of all bodies */",
+            "double mass;               /* sum of the masses of all bodies */",
         ),
     ),
     StateBlock(
         "bonds",
         "GRAPH",
         (
-            "int *bonds, *middle;      /* for each site, index in other of the first bond from it, and to it */",
-            "int *other, *number; /* for each of these, the site at the other end, and the number of the bond */",
+            "int *bonds, *middle;      /* for each site, index in other of the first bond that begins or ends there */",
+            "int *other, *number; /* for each bond of a site, the site at its other end, and its number */",
         ),
     ),
     StateBlock(
@@ -325,20 +325,20 @@ ROW = (
         "ADJOINT",
         (
             "double *const *bar, *const *handed;"
-            " /* cotangents by x, and those for neighbouring sites: see phi_transpose */",
+            " /* cotangents of x, and contributions to neighbouring sites: see phi_transpose */",
         ),
         reset=("row.bar = row.handed = NULL;",),
     ),
     StateBlock(
         "received",
         "ADJOINT && TAKES",
-        ("double *const *received;      /* cotangents that neighbouring sites have computed for these before */",),
+        ("double *const *received;      /* contributions that neighbouring sites have stored in an earlier flow */",),
         reset=("row.received = NULL;",),
     ),
     StateBlock(
         "givers",
         "GIVERS",
-        ("ptrdiff_t givers[PHI_LINES];  /* the rows whose sites compute cotangents for this one */",),
+        ("ptrdiff_t givers[PHI_LINES];  /* offsets of the rows whose sites contribute to cotangents of this row */",),
     ),
     StateBlock(
         "chosen",

@@ -21,13 +21,17 @@ from phigen.targets.c.loops import commented, table
 
 def sizes(step: Splitting) -> list[tuple[str, int, str]]:
     """Return the sizes of a splitting as constants: name, value and comment."""
-    constants = [("ROWS_OF_FLOWS", len(step.schedule.times), "times of flows in a step, each with its coefficients")]
-    constants.append(("ROW", max(1, step.row), "coefficients for one of them"))
+    constants = [("ROWS_OF_FLOWS", len(step.schedule.times), "durations of flows, each with its coefficients")]
+    constants.append(("ROW", max(1, step.row), "coefficients in a row"))
     flows = len(step.schedule.flows_of_run)
-    said = "in a run of one step" if step.schedule.begin else "in a step"
+    said = "flows in a run of one step" if step.schedule.begin else "flows in a step"
     constants += [("FLOWS", flows, said)] if step.tangents or step.adjoint else []
     corrected = step.adjoint is not None and bool(step.schedule.begin)
-    return constants + [("BEGUN", len(step.schedule.begin), "before the first step, and after the last")] * corrected
+    return (
+        constants
+        + [("BEGUN", len(step.schedule.begin), "flows before the first step of a run, and as many after the last")]
+        * corrected
+    )
 
 
 def printed(program: Program, step: Splitting) -> str:

@@ -51,7 +51,7 @@ class StepText:
 
 
 def _max_iterations(step: Newton | Path) -> Sizes:
-    return [("MAX_ITERATIONS", step.inner.max_iterations, "limit of the iterations of an implicit step")]
+    return [("MAX_ITERATIONS", step.inner.max_iterations, "largest number of iterations for an implicit step")]
 
 
 def _newton_kernels(step: Newton, has: Switches) -> list[Kernel | None]:
@@ -89,7 +89,7 @@ def _path_constants(program: Program, step: Path) -> Sizes:
     if step.back:
         back, n = step.back, program.dimension
         sizes.append(("BACK", 3 * n + len(back.used), "numbers of a path in the reverse pass, with cotangents"))
-        sizes.append(("BACK_SERIES", len(back.recurrences.series), "Taylor series of such a path"))
+        sizes.append(("BACK_SERIES", len(back.recurrences.series), "Taylor series of a path in the reverse pass"))
         sizes.append(("BACK_FIXED", max(1, len(back.recurrences.fixed)), "values that are constant along the path"))
     return sizes
 
@@ -99,8 +99,8 @@ def _adjoint_path(program: Program, path: PathAdjoint) -> str:
     on.
     """
     used, extended = ir.ConstantTable("back_used", tuple(path.used) or (0,)), adjoint_program(program, path)
-    said = "The coefficients" if path.used else "None of the coefficients is one"
-    comment = f"/* {said} that the slope of a path depends on. */"
+    said = "The coefficients that the slope of a path depends on." if path.used else "No coefficient enters the slope."
+    comment = f"/* {said} */"
     return f"{comment}\n{table(used, program)}\n\n{_path(extended, path.recurrences, 'back')}"
 
 
@@ -119,9 +119,9 @@ def _path_in_lanes(program: Program, step: Path, slopes: PathSlopes) -> str:
 def path_sizes(slopes: PathSlopes, slope_terms: int) -> Sizes:
     """Return the sizes for paths in SIMD lanes, as constants."""
     return [
-        ("SLOPE_TERMS", slope_terms, "most of the expansion of the derivatives of a path"),
-        ("SLOPE_SERIES", max(1, len(slopes.series)), "further series that these need"),
-        ("SLOPE_FIXED", max(1, len(slopes.fixed)), "further values that are constant along a path"),
+        ("SLOPE_TERMS", slope_terms, "largest number of Taylor terms of derivatives of a path"),
+        ("SLOPE_SERIES", max(1, len(slopes.series)), "further Taylor series that derivatives of a path need"),
+        ("SLOPE_FIXED", max(1, len(slopes.fixed)), "further constant values that derivatives of a path need"),
     ]
 
 

@@ -9,7 +9,7 @@ TABLE = (
     StateBlock(
         "fits",
         members=(
-            "int PHI_OF(fits, PHI_STAGES); /* number of the fit that weight belongs to; -1 for none */",
+            "int PHI_OF(fits, PHI_STAGES); /* number of the fit that resulted in weight; -1 if there is none */",
             "phi_lanes PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS], PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM];",
         ),
     ),
@@ -17,7 +17,7 @@ TABLE = (
         "march",
         "COMPOSED && !PATH",
         (
-            "int marching; /* 1 if the last steps were a block; slope then holds its slopes */",
+            "int marching; /* 1 if the last steps were a block, whose derivatives of x are in slope */",
             "double slope[PHI_DIM][PHI_SLOPES];",
         ),
     ),
@@ -34,7 +34,7 @@ MODEL = (
         "factors",
         "SPARSE",
         (
-            "/* factors of the Jacobian of alpha(y); Jacobian of the increment; corrections subtracted from it */",
+            "/* factors of the Jacobian of alpha(y); Jacobian and corrections of the increment */",
             "phi_lanes factor[PHI_FACTORS], slope[PHI_DIM * PHI_DIM], gained[PHI_DIM];",
         ),
     ),
@@ -90,17 +90,17 @@ COTANGENT = (
     StateBlock(
         "x",
         members=(
-            "double x[PHI_DIM]; /* by the state */",
-            "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* by the coefficients of each stage */",
+            "double x[PHI_DIM]; /* derivatives of L by the state */",
+            "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* derivatives of L by the coefficients */",
         ),
     ),
-    StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state by which x are derivatives */",)),
+    StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state to which the derivatives x belong */",)),
     StateBlock(
         "after",
         "GAUSS",
         (
-            "int chained; /* whether after has values */",
-            "double after[PHI_UNKNOWNS][PHI_WIDTH]; /* by the unknowns of the stages, in the step after */",
+            "int chained; /* 1 if after has values, else 0 */",
+            "double after[PHI_UNKNOWNS][PHI_WIDTH]; /* derivatives of L by unknowns of the next step */",
         ),
     ),
 )
@@ -121,7 +121,7 @@ TRACED = (
 #: Members of the struct with the arguments of the reverse pass of an ensemble, those that depend on switches.
 PULLED = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
-    StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* see phi_members */",)),
+    StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),
 )
 
 #: Members of the struct for the reverse pass of a batch of members: derivatives of a number L, as in phi_cotangent.
@@ -144,8 +144,8 @@ TRANSPOSE = (
         "bar",
         members=(
             "double *bar[PHI_BARS];      /* derivatives by fields, then by parameters at sites and at bonds */",
-            "double *row_bar[PHI_BARS];  /* the same, with those of the fields at one row of a run */",
-            "double *handed[PHI_HANDED]; /* derivatives that sites compute for their neighbours */",
+            "double *row_bar[PHI_BARS];  /* as bar, with the derivatives by fields for one row of a run */",
+            "double *handed[PHI_HANDED]; /* contributions of sites to derivatives at their neighbours */",
             "double *sums;               /* for each row segment, derivatives by the coefficients */",
         ),
     ),
@@ -158,9 +158,9 @@ TRANSPOSE = (
         "states_of_legs",
         "!SERIES && RECOMPUTED",
         (
-            "double *tape;               /* states at the starts of the legs of a segment */",
-            "size_t leg;                 /* number of steps of a leg */",
-            "int lost;                   /* 1 if inverse flows of a leg have led to another state than its start */",
+            "double *tape;               /* states of a segment at steps that are leg steps apart */",
+            "size_t leg;                 /* number of steps between two states on the tape */",
+            "int lost;                   /* 1 if inverse flows have led to another state than that on the tape */",
             "int anew;                   /* 1 if flows are repeated, since inverse flows are inaccurate */",
         ),
     ),
@@ -222,15 +222,15 @@ FLOW = (
     StateBlock(
         "go",
         "RECOMPUTED && !TAKES",
-        ("int go;                     /* 0 forward; reverse: 1 at the sites themselves, 2 for their neighbours */",),
+        ("int go;                     /* 0 forward; 1 reverse, at the sites themselves; 2 reverse, for neighbours */",),
     ),
     StateBlock(
         "reverse",
         "RECOMPUTED",
         (
-            "int row;                    /* in the reverse pass: the row of coefficients, */",
+            "int row;                    /* in the reverse pass, the row of coefficients */",
             "const struct phi_transpose *g;",
-            "double *const *bar;         /* and the derivatives to transform */",
+            "double *const *bar;         /* in the reverse pass, the derivatives to transform */",
         ),
     ),
 )

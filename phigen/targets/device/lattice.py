@@ -29,15 +29,15 @@ _ARRAYS = {
     "x": ("double", "x[n * count + i]: field n at site i"),
     "start": (
         "const double",
-        "start[n * count + i]: the fields at the start of a stage, where x has those in its middle",
+        "start[n * count + i]: field n at the start of a stage; x then has its solution y",
     ),
     "varied": ("const double", "varied[n * count + i]: a variation of the fields"),
-    "out": ("double", "out[n * count + i]: result n at site i, where a kernel does not update x"),
+    "out": ("double", "out[n * count + i]: result n at site i, of kernels that do not update x"),
     "starts": ("const int", "starts[i] to starts[i + 1]: the places of the bonds of site i in the next arrays"),
     "others": ("const int", "others[b]: the other site of bond b"),
     "at_bonds": ("const double", "at_bonds[n * starts[count] + b]: parameter n at bond b"),
     "colours": ("const int", "colours[i]: the colour of site i"),
-    "colour": ("int", "colour: that of the sites that a sweep updates"),
+    "colour": ("int", "colour: the colour of the sites that a sweep updates"),
     "sums": ("double", "sums[n * count + i]: sum n over the bonds or pairs of site i"),
     "adds": ("int", "adds: 1 if a kernel adds to sums, 0 if it overwrites them"),
 }

@@ -117,7 +117,8 @@ SOLVER = (
             Option(
                 "gauge",
                 "ArrayLike<number>",
-                "factors of the Casimirs in place of those at x0; for fixed factors\nthe step is an exact Poisson map",
+                "factors of the Casimirs subtracted from H; by default they follow\nfrom x0. "
+                "For fixed factors the step is an exact Poisson map",
             ),
         ),
     ),

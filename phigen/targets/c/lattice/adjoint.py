@@ -178,7 +178,9 @@ class _Reverse(RowLoops):
         if receives:
             second = dict([*second.items()][:1])
         if second:
-            yield self._driver("Contributions of other sites to the cotangents of sites", "hand_rows", second)
+            yield self._driver(
+                "Add the contributions of other sites to the cotangents of each site", "hand_rows", second
+            )
 
     def _driver(self, title: str, name: str, cases: Mapping[int, RowSegment]) -> str:
         """Return the text of a row driver that runs one traversal; ``cases`` are its parts, by number."""
@@ -305,7 +307,7 @@ class _Reverse(RowLoops):
         for array in sorted({h.array for h in beside if h.offset[-1]}) if not layout.step.sites.open[-1] else ():
             first.append(self.row_drivers.copied_ends(_HANDED, array, near_ends=near_ends))
         if beside and apart:
-            purpose = f"contributions to the cotangents of sites by those that {whom}"
+            purpose = f"contributions to cotangents by the neighbours that {whom}"
             loops.append(row_transposes.handing(name, purpose, beside, self.layout))
             second.append(ir.Call(name, (SEGMENT,)))
         recomputed = sorted({f for one in pulled for f in one.recomputed})

@@ -119,7 +119,7 @@ class RowLoops:
         """Yield the loop after the passes on the level of sites. Fast code has a second loop, for sites near open
         ends.
         """
-        doc = "as above, with full-range functions" if form == "_far" else loop.doc
+        doc = f"as {self.program.name}_{loop.name}_near, with full-range functions" if form == "_far" else loop.doc
         loop = replace(loop, name=loop.name + form, doc=doc)
         for part in divided_at_ends(loop) if self.fast else [loop]:
             yield calling(simultaneous(temporaries(part)), versions)
@@ -183,12 +183,12 @@ class RowLoops:
         places = self.layout.step.sites.ends
         for end, bonds, transpose in transposed_at_ends(places, ends, oriented, kernel, summed=summed):
             built = calling(temporaries(self.sites.transposed_sums(bonds, transpose)), self.versions)
-            name, purpose = kernel.name, "contributions to the cotangents of a site by all sums over bonds or pairs"
+            name, purpose = kernel.name, "contributions of all sums over bonds or pairs to the cotangents of a site"
             if not ends.of_all:
-                receiver = "the site where the sum is" if end == "a" else "the other site"
+                receiver = "the site of a sum" if end == "a" else "the sites in a sum"
                 name, purpose = (
                     f"{kernel.name}_{end}",
-                    f"contributions to the cotangents of {receiver} by sums over bonds or pairs",
+                    f"contributions of sums over bonds or pairs to the cotangents of {receiver}",
                 )
             of_bonds = row_transposes.BondTranspose(
                 replace(built, name=name, doc=purpose), end, first, len(transpose.inputs[HERE]), oriented

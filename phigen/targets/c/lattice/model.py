@@ -42,7 +42,9 @@ def declarations(program: Program, step: Sweeps) -> str:
             [("DIRECTIONS", LatticeNewtonPolicy().directions, "dimension of a Krylov space")] if has["KRYLOV"] else []
         )
         sizes += (
-            [("DIFFERENCES", _differences(program), "differences of the predictor")] if has["SWEEP_PREDICTORS"] else []
+            [("DIFFERENCES", _differences(program), "differences in the predictor of a stage")]
+            if has["SWEEP_PREDICTORS"]
+            else []
         )
     if step.partners:
         sizes.append(("GATHERED", _gathered(layout), "sums over other sites that are stored for each site"))
@@ -181,9 +183,9 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
     """Yield the constants of the C file: name, value and comment."""
     program, step, sites, several = layout.program, layout.step, layout.step.sites, not layout.single_row
     if densities := program.observables.named:
-        yield "SHARE", share(densities), "sites whose densities of observables are computed in one go"
+        yield "SHARE", share(densities), "sites whose densities of observables are computed in one pass"
     if has["HALO"]:
-        yield "HALO", layout.halo, "sites that are copied beside a row"
+        yield "HALO", layout.halo, "sites that are copied beyond each end of a row"
         yield "LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row"
     yield "RESERVED", _reserved(layout, has), "arrays over the sites in the memory of a solver"
     if several:
@@ -191,7 +193,7 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
     yield "ROW", max(1, step.row), "coefficients of one flow"
     yield "ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"
     if step.refresh:
-        yield "PREPARED", step.prepared, "of a row, before those that depend on the time"
+        yield "PREPARED", step.prepared, "coefficients of a row before those that depend on the time"
     if program.noise:
         sources = program.noise.sources
         yield "SOURCES", len(sources), f"sources of noise at a site: {', '.join(sources)}"
@@ -205,26 +207,30 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
         )
         yield "MOST_SWEEPS", step.equation.most_sweeps, "largest number of sweeps of a stage"
         if has["BANDED"]:
-            yield "REACH", reach(step), "sites that y at a site depends on, to each side"
-            yield "BAND", band(step), "diagonals beside that of the matrix of Newton's method"
+            yield "REACH", reach(step), "sites on each side on which y at a site depends"
+            yield "BAND", band(step), "off-diagonals on each side in the matrix of Newton's method"
     else:
-        yield "FLOWS", len(step.schedule.flows), "in a step"
+        yield "FLOWS", len(step.schedule.flows), "flows in a step"
     if step.corrected:
-        yield "FLOWS_BEFORE", len(step.schedule.begin), "before a run; those after it come last"
+        yield "FLOWS_BEFORE", len(step.schedule.begin), "flows before a run; those after a run come last"
     if step.rates:
         yield "NEGATIVE", 1 + step.rates.negative, "the part B of H, which is negative"
     if step.relative:
         bodies = step.relative
         yield "BODY_AXES", len(bodies.axes), "axes along which bodies have a position and a velocity or momentum"
-        yield "MASS", layout.lattice.arrays.index(bodies.mass), "index of the masses"
-        yield "INNER", layout.lattice.arrays.index(sites.derived[0]), "index of the masses that orbits are about"
+        yield "MASS", layout.lattice.arrays.index(bodies.mass), "index of the array of masses"
+        yield (
+            "INNER",
+            layout.lattice.arrays.index(sites.derived[0]),
+            "index of the array of central masses of the orbits",
+        )
         yield "REMAINDER", 1 + bodies.remainder, "the part of H besides the Kepler motions"
     if has["WAVES"]:
         far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = max(1, *far) if several else 1
-        yield "SPAN", span, "slices on either side of a slice that a flow reads; see wavefront blocking"
+        yield "SPAN", span, "neighbouring slices that a flow reads on each side; see wavefront blocking"
     if layout.lattice.weights and several:
-        yield "WEIGHTS", len(layout.lattice.weights), "kinds of terms that open ends take away"
+        yield "WEIGHTS", len(layout.lattice.weights), "kinds of terms that reach beyond open ends"
     if sites.colours > 1:
         yield "COLOUR_COUNT", sites.colours, "colours of sites"
         yield "COLOUR_STRIDE", sites.weights[-1], "change of the colour number from site to site along a row"

@@ -380,7 +380,7 @@ def _of_equation(loops: RowLoops, kernel: Kernel, rows: Rows | None = None, end:
 
 
 _TITLES = {
-    Role.RELAX: "A sweep, or to x the end of a stage",
+    Role.RELAX: "A sweep over y, or the update of x at the end of a stage",
     Role.SLOPE: "Derivative of a sweep by y along v",
     Role.OWN_SLOPE: "Derivative of a sweep by y at the site itself",
     Role.SIDE: "Derivative of a sweep by x along v",
