@@ -2,11 +2,11 @@
 
 from phigen import interrupts
 
-interrupts.obey()  # Before the imports that take time, so that Ctrl-C ends the process during them too.
+interrupts.obey()  # Called before the imports, which take time, so that Ctrl-C ends the process during them too.
 
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line ``phigen`` with the arguments of the process."""
     from phigen.cli import main as run
 
     run()

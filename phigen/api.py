@@ -1,9 +1,9 @@
-"""The Python API: `load` a system, `compile` it to a solver, print its `formulas`.
+"""The functions of phigen for Python: `load` a system, `compile` it to a solver, get its `formulas` in sympy.
 
-import phigen
-system = phigen.load("rigid_body.yaml")
-solver = phigen.compile(system, target="c", order=4)
-trajectory = solver.integrate([1, 1, 1], h=0.05, steps=20_000, stride=10, I2=2.5)
+    import phigen
+    system = phigen.load("rigid_body.yaml")
+    solver = phigen.compile(system, target="c", order=4)
+    trajectory = solver.integrate([1, 1, 1], h=0.05, steps=20_000, stride=10, I2=2.5)
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Source: TypeAlias = "str | PathLike[str] | Spec | System | LatticeSystem | Compi
 
 
 def load(path: str | PathLike[str]) -> System | LatticeSystem:
-    """Return the system in a spec file, or in the bundled spec of that name.
+    """Return the system that a spec file defines; ``path`` is the file, or the name of a bundled spec.
 
     The result is a `System`, or for a lattice a `LatticeSystem`. Its attribute ``spec`` holds the other parts of the
     file. Raises `SpecError` with all errors of the file.
@@ -98,17 +98,18 @@ def compile(
     """Return a solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled spec.
 
     ``target`` is ``c``, ``numpy``, ``opencl``, ``cuda``, or ``auto``: C if there is a compiler, else NumPy with a
-    `PhigenWarning`. On ``opencl`` and ``cuda``, ensembles and lattices run on a device, see `Solver.device`; ``device``
-    selects one by its number.
+    `PhigenWarning`. With ``opencl`` and ``cuda``, ensembles and lattices run on a device, see `Solver.device`; the
+    argument ``device`` is the number of the device to use.
 
     ``order`` overrides the order of the spec, and ``scheme`` (``series``, ``splitting``, ``gauss``, ``auto``) its
     scheme. ``tangent`` adds `Solver.step_tangent`, and ``adjoint`` adds `Solver.pullback` and `Solver.jacobian`, in
     addition to the parts that the spec requests. ``profile`` is the profile of the code, ``fast`` by default; the
     profile in a spec only applies to ``phigen build``.
 
-    Compiled C is cached by its content. Returns a `Solver`, or for a lattice a `LatticeSolver`. Raises `SpecError`;
-    `LimitError`; `CheckError` if a statement is refuted, e.g. if π is not Poisson; and `ToolchainError` if C was
-    requested and there is no working compiler, or if the compiler named in CC does not work.
+    Compiled C is stored in a cache, under a hash of its content. Returns a `Solver`, or for a lattice a
+    `LatticeSolver`. Raises `SpecError`; `LimitError`; `CheckError` if a statement is refuted, e.g. if π is not Poisson;
+    and `ToolchainError` if C was requested and there is no working compiler, or if the compiler named in CC does not
+    work.
     """
     expect_runnable(target)
     if device is not None and target not in registry.DEVICES:
@@ -125,8 +126,8 @@ def expect_runnable(target: str) -> None:
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
-    """Return the formulas of the method that `compile` uses, in sympy: α, β, S_1 … S_k, and the Hamiltonian that is
-    discretised.
+    """Return the formulas, in sympy, of the method that `compile` uses: α, β, S_1 … S_k, and the discretised
+    Hamiltonian.
 
     ``terms`` requests S_1 … S_terms instead of the terms of the method. Raises the errors of `compile`, and `SpecError`
     for a splitting, which has none of these formulas.
@@ -139,10 +140,10 @@ def formulas(source: Source, order: int | None = None, *, terms: int | None = No
 
 
 def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
-    """Return the compilation of a source, with its statements proved, for solvers that run inside phigen.
+    """Return the compilation of a source: the method and the program, before they are printed in a target language.
 
-    The options override the spec, see `phigen.spec.model.Spec.overridden`. The compilation has the profile ``fast``
-    unless the options or the source, if it is a compilation already, name another one. Raises the errors of `compile`.
+    Its statements are proved. The options override the spec, see `phigen.spec.model.Spec.overridden`. The profile is
+    ``fast`` unless the options, or a source that is a compilation, name another one. Raises the errors of `compile`.
     """
     _expect_valid(**options)
     if isinstance(source, Compilation):
@@ -151,7 +152,8 @@ def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
     if isinstance(source, System):
         return compile_proved((source.spec or _spec_of(source)).for_running(**options), system=source)
     if not isinstance(source, Spec | str | PathLike) and isinstance(getattr(source, "spec", None), Spec):
-        # The source is a LatticeSystem. Its package is imported only for lattices, so there is no isinstance here.
+        # Only a LatticeSystem is left. There is no isinstance, since that would import the package of lattices for all
+        # systems.
         source = source.spec
     if isinstance(source, Spec):
         return compile_proved(source.for_running(**options))
@@ -172,7 +174,10 @@ def _expect_valid(**options: Unpack[Overrides]) -> None:
 
 
 def solver_of(compilation: Compilation, target: str = "auto", device: int | None = None) -> Solver:
-    """Return the loaded solver of a compilation. Raises `ToolchainError` if C was requested and cannot be compiled."""
+    """Compile and load the solver of a compilation, and return it.
+
+    Raises `ToolchainError` if C was requested and cannot be compiled.
+    """
     from phigen.runtime.solver import Solver
 
     if compilation.spec.lattice:
@@ -181,14 +186,14 @@ def solver_of(compilation: Compilation, target: str = "auto", device: int | None
 
 
 def lattice_solver_of(compilation: Compilation, target: str = "auto", device: int | None = None) -> LatticeSolver:
-    """Return the loaded solver of a lattice."""
+    """Compile and load the solver of a compiled lattice, and return it. Raises `ToolchainError` as `solver_of`."""
     from phigen.runtime.lattice import LatticeSolver
 
     return LatticeSolver(*_loaded(compilation.program, target, device), compilation.spec)
 
 
 def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any]:
-    """Return the back end of a program on a target, and its `Interface`."""
+    """Return the loaded solver of a program in the language of a target, and its `Interface`."""
     interface = interface_of(program)
     target_name = chosen_target(target, _warn)
     files = files_of(program, target_name, f"phigen build {program.name}.yaml")
@@ -198,8 +203,8 @@ def _loaded(program: Program, target: str, device: int | None) -> tuple[Any, Any
 def files_of(program: Program, target: str, command: str) -> dict[str, str]:
     """Return the files (name → text) that Python loads for a target.
 
-    For a device, these are the files of the device and those of a host target, which serves computations that do not
-    run on devices.
+    For a target that is a device, these are the code for the device, and code in C or NumPy for computations that do
+    not run on devices.
     """
     if target not in registry.DEVICES:
         return emit(program, target, command)
@@ -212,16 +217,18 @@ def _warn(message: str) -> None:
 
 
 def backend_of(files: Mapping[str, str], interface: Interface, target: str = "", device: int | None = None) -> Backend:
-    """Return the back end of the files (name → text) of a target, by default the target that the files belong to.
+    """Return the loaded solver of generated files (name → text), in the language of a target.
 
-    ``device`` is the number of a device, for targets that run on devices. Raises `ToolchainError`.
+    By default the target follows from the names of the files. ``device`` is the number of a device, for targets that
+    run on devices. Raises `ToolchainError`.
     """
     language = registry.find(target) if target else registry.target_of(files, interface.name)
     return language.load(files, interface, device)
 
 
 def interface_of(program: Program) -> Interface:
-    """Return the names and sizes of a program that the runtime needs; a `LatticeInterface` for lattices."""
+    """Return the names, sizes and features of a program that Python needs to run it; a `LatticeInterface` for
+    lattices."""
     from phigen.runtime.interface import Interface, LatticeInterface
 
     interface = Interface(
@@ -250,7 +257,7 @@ def interface_of(program: Program) -> Interface:
     from phigen.targets.device.launches import launches
 
     sites, relative = step.sites, step.relative
-    if relative:  # momenta of bodies without mass have no velocities
+    if relative:  # momenta of bodies without mass would have no velocities, so masses must be positive
         bound = "positive" if relative.momenta else "nonnegative"
         interface = replace(interface, **{bound: getattr(interface, bound) | {relative.mass}})
     every_other = bool(step.partners and not step.partners.graph)
@@ -279,7 +286,7 @@ def interface_of(program: Program) -> Interface:
 
 
 def chosen_target(target: str, warn: Callable[[str], None] = lambda message: None) -> str:
-    """Return ``target``, or for ``auto`` the name of a target: C if there is a compiler, else NumPy.
+    """Return ``target`` or, if it is ``auto``, the name of a target: C if there is a compiler, else NumPy.
 
     If NumPy replaces C, ``warn`` receives the reason. Raises `ToolchainError` if the compiler named in CC does not
     work.
@@ -298,7 +305,8 @@ def chosen_target(target: str, warn: Callable[[str], None] = lambda message: Non
 
 
 def _spec_of(system: System) -> Spec:
-    """Return the spec of a system built in Python; all other settings have the defaults of a spec file."""
+    """Return a spec for a system built in Python; settings that a system does not have get the defaults of a spec
+    file."""
     _expect_names(system)
     return Spec(
         name=system.name,
@@ -314,7 +322,8 @@ def _spec_of(system: System) -> Spec:
 
 
 def _expect_names(system: System) -> None:
-    """Raise `SpecError` if names of the system, its coordinates or its parameters cannot stand in generated code."""
+    """Raise `SpecError` if the names of the system, its coordinates or its parameters cannot be used in generated
+    code."""
     problems = [objection(system.name)] if re.fullmatch(SPEC_NAME, system.name) else [_malformed(system.name, _HINT)]
     problems += [
         _malformed(name, "letters, digits and _, not starting with a digit")

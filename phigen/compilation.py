@@ -2,7 +2,8 @@
 CompiledLattice``.
 
 All four have the members of `_Compiled` and a ``system``, which raises `SpecError` for a lattice of any size. Code that
-needs one kind calls `by_series`, `by_splitting`, `by_gauss` or `by_sweeps`, which raise `ValueError` for other kinds.
+needs one of the four calls `by_series`, `by_splitting`, `by_gauss` or `by_sweeps`, which raise `ValueError` for other
+compilations.
 """
 
 from __future__ import annotations
@@ -35,8 +36,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class _Compiled(ABC):
-    """Base class of all compilations; ``seconds`` has the duration of each stage of the compiler by the name of the
-    stage."""
+    """Base class of all compilations: a spec, its method, and the program of a step.
+
+    ``seconds`` has the duration of each stage of the compiler, by the name of the stage.
+    """
 
     spec: Spec
     order: Order
@@ -55,30 +58,30 @@ class _Compiled(ABC):
     @property
     @abstractmethod
     def label(self) -> str:
-        """The method in a few words for users, e.g. the kind of the bi-realisation."""
+        """The method in a few words for users, for instance the kind of the bi-realisation."""
 
     @property
     @abstractmethod
     def exact(self) -> bool:
-        """Whether the structure of a step is exact to round-off, rather than up to a power of h.
+        """Whether a step preserves the Poisson structure to round-off, rather than up to a power of h.
 
-        For a series, this means that a step maps α(y, p) to β(y, p) with the same y and p. With forces, a step that is
-        exact in this sense is not a Poisson map; see `poisson`.
+        For a series, this means that a step maps α(y, p) to β(y, p), where y is the solution of the implicit equation
+        and p a covector. With forces, a step that is exact in this sense is not a Poisson map; see `poisson`.
         """
 
     @property
     @abstractmethod
     def poisson(self) -> bool:
-        """Whether a step is a Poisson map to round-off: it is exact, and there are no forces."""
+        """Whether a step is a Poisson map to round-off: its structure is exact, and there are no forces."""
 
     @property
     def symmetric(self) -> bool:
-        """Whether a step of −h is the inverse of a step of h."""
+        """Whether a step of size −h is the inverse of a step of size h."""
         return True
 
     @property
     def degree(self) -> int | None:
-        """The degree d of a truncated method, whose Poisson defect in a step is O(h^(d+1)); None if nothing is
+        """The degree d of a truncated method, whose steps are Poisson maps up to O(h^(d+1)); None if nothing is
         truncated."""
         return None
 
@@ -89,17 +92,19 @@ class _Compiled(ABC):
 
     @property
     def birealisation(self) -> str | None:
-        """The kind of the bi-realisation, chosen by the compiler or by the spec; None if steps have none."""
+        """The kind of the bi-realisation, chosen by the compiler or by the spec; None if the scheme uses no
+        bi-realisation."""
         return None
 
     @property
     def in_double(self) -> Self:
-        """This compilation in double precision."""
+        """The same compilation, but with a program in double precision."""
         program = self.program
         return replace(self, program=replace(program, extras=replace(program.extras, real="double")))
 
     def including(self, part: str) -> Self:
-        """Return the compilation with a part of the code, even if the profile or the spec leaves this part out."""
+        """Return the compilation with an optional part of the code, even if the profile or the spec leaves this part
+        out."""
         extras, program = self.program.extras, self.program
         if program.offers(part):
             return self
@@ -107,79 +112,80 @@ class _Compiled(ABC):
         return replace(self, program=replace(program, extras=extras))
 
     def with_stack(self, stack: StackBound | None) -> Self:
-        """Return the compilation with ``stack``, the measured stack use that the C states; None for no such
-        statement."""
+        """Return the compilation with ``stack``, the measured stack use that the C states in a comment; None for no
+        comment."""
         return replace(self, program=replace(self.program, stack=stack))
 
     @property
     def method(self) -> str:
-        """The method in words, for the first lines of runs: scheme, bi-realisation if there is one, order, and
-        profile."""
+        """The method in words, which runs print first: scheme, bi-realisation if there is one, order, and profile."""
         scheme = self.described["scheme"]
         scheme_text = scheme if self.label.startswith(scheme) else f"{scheme} ({self.label})"
         return f"scheme {scheme_text}, order {self.order.order}, profile {self.program.profile}"
 
     @property
     def described(self) -> dict[str, Any]:
-        """Description of the method as plain data, for JSON."""
+        """The method as plain data, for the output of commands in JSON."""
         return {"scheme": self.scheme_name}
 
     @property
     def reasons(self) -> Mapping[str, str]:
-        """Reasons for choices of the compiler, by the label of the choice."""
+        """The reasons for choices of the compiler, by the label of the choice, such as "scheme chosen"."""
         return {"scheme chosen": self.choice} if self.choice else {}
 
     @property
     def notes(self) -> list[str]:
-        """Decisions of the compiler that the user may not expect, one line each."""
+        """Choices of the compiler that the user may not expect, each as a line of text."""
         choice_note = f"scheme: auto chose {self.choice}" if self.choice else ""
         return [*filter(None, [choice_note, self.order.note])]
 
     @property
     def monitor(self) -> Expression | None:
-        """The rate dt/dτ of a monitor, whose steps have equal size in τ; None without a monitor."""
+        """The monitor g of dt = g dτ, with which steps have equal size in τ; None without a monitor."""
         return None
 
     @property
     def has_series(self) -> bool:
-        """Whether the step comes from S_1, S_2, … and a bi-realisation."""
+        """Whether the step is computed from a bi-realisation and the terms S_1, S_2, … of a generating function."""
         return False
 
     @property
     def is_composed(self) -> bool:
-        """Whether a step is composed of several maps."""
+        """Whether a step is composed of several maps, such as flows or steps of lower order."""
         return len(self.program.fractions) > 1
 
     @property
     def stage(self) -> Order:
-        """Order and number of terms of one stage: those of the method, or order 2 and one term if a step is
-        composed."""
+        """Order and number of terms of one map of which a step is composed: order 2 and one term.
+
+        If a step is a single map, these are the order and the number of terms of the method.
+        """
         return self.order if len(self.program.fractions) == 1 else Order(2, 1)
 
     @property
     def known_system(self) -> System | None:
-        """The system, to be passed to further compilations of the spec; None for a lattice, whose cell is built
-        again."""
+        """The system, which further compilations of the spec can use again; None for a lattice."""
         return None
 
     def named(self, method: str) -> str:
-        """Return a line that names the method, with the reason if the method depends on the runs of the spec."""
+        """Return a line that names the method and, if the runs of the spec decide the method, the reason."""
         return method
 
     def by_series(self) -> CompiledSeries:
-        """Return this compilation if its scheme is a series. Raises `ValueError` for others."""
+        """Return this compilation if its scheme is a series. Raises `ValueError` for other schemes."""
         raise self._not("generating function")
 
     def by_splitting(self) -> CompiledSplitting:
-        """Return this compilation if its scheme is a splitting. Raises `ValueError` for others."""
+        """Return this compilation if its scheme is a splitting. Raises `ValueError` for other schemes."""
         raise self._not("parts with flows")
 
     def by_gauss(self) -> CompiledGauss:
-        """Return this compilation if its scheme is Gauss collocation. Raises `ValueError` for others."""
+        """Return this compilation if its scheme is Gauss collocation. Raises `ValueError` for other schemes."""
         raise self._not("stages of collocation")
 
     def by_sweeps(self) -> CompiledLattice:
-        """Return this compilation if it is that of a lattice of any size. Raises `ValueError` for others."""
+        """Return this compilation if it is the compilation of a lattice of any size. Raises `ValueError` for other
+        systems."""
         raise self._not("sweeps over sites")
 
     def _not(self, part: str) -> ValueError:
@@ -199,22 +205,22 @@ class _CompiledSystem(_Compiled, ABC):
 
     @property
     def poisson(self) -> bool:
-        """Whether a step is a Poisson map to round-off: it is exact, and there are no forces."""
+        """Whether a step is a Poisson map to round-off: its structure is exact, and there are no forces."""
         return self.exact and self.system.forces is None
 
     @property
     def discretised(self) -> System:
-        """The system with the Hamiltonian that is discretised: H minus the Casimirs of the gauge."""
+        """The system whose Hamiltonian is discretised: H minus multiples of Casimirs, called the gauge."""
         return self.gauge.applied(self.system)
 
     @property
     def notes(self) -> list[str]:
-        """Decisions of the compiler that the user may not expect, one line each."""
+        """Choices of the compiler that the user may not expect, each as a line of text."""
         return [*super().notes, *filter(None, self.gauge.notes)]
 
     @property
     def monitor(self) -> Expression | None:
-        """The rate dt/dτ of a monitor, whose steps have equal size in τ; None without a monitor."""
+        """The monitor g of dt = g dτ, with which steps have equal size in τ; None without a monitor."""
         return self.gauge.monitor
 
     @abstractmethod
@@ -224,7 +230,8 @@ class _CompiledSystem(_Compiled, ABC):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """Call the function for this kind of compilation with this compilation, and return the result."""
+        """Call that one of the three functions which is for this kind of compilation, with this compilation; return its
+        result."""
 
     @property
     def known_system(self) -> System | None:
@@ -238,9 +245,10 @@ class _CompiledSystem(_Compiled, ABC):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledSeries(_CompiledSystem):
-    """Compilation by scheme ``series``: a step from S_1, S_2, … and a bi-realisation.
+    """Compilation by scheme ``series``: the step is computed from a bi-realisation and a generating function.
 
-    ``gauged`` holds the discretised system and its Hamilton–Jacobi series, ``scheme`` the generating function.
+    ``gauged`` holds the discretised system and its Hamilton–Jacobi series S_1, S_2, …, ``scheme`` the generating
+    function.
     """
 
     realisation: BiRealisation
@@ -249,7 +257,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def scheme_name(self) -> str:
-        """The scheme, as in specs."""
+        """The name of the scheme: "series"."""
         return "series"
 
     @property
@@ -259,27 +267,31 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def exact(self) -> bool:
-        """Whether a step maps α(y, p) to β(y, p) with the same y and p, to round-off."""
+        """Whether the bi-realisation is exact, rather than truncated; a step then maps α(y, p) to β(y, p), to
+        round-off.
+
+        y is the solution of the implicit equation, and p a covector.
+        """
         return self.realisation.exact
 
     @property
     def symmetric(self) -> bool:
-        """Whether a step of −h is the inverse of a step of h."""
+        """Whether a step of size −h is the inverse of a step of size h."""
         return self.realisation.symmetric
 
     @property
     def degree(self) -> int | None:
-        """The degree at which the bi-realisation is truncated; None if it is exact."""
+        """The degree in p at which the bi-realisation is truncated; None if it is exact."""
         return self.realisation.degree
 
     @property
     def kind(self) -> str:
-        """The kind of the bi-realisation."""
+        """The kind of the bi-realisation, such as ``constant``."""
         return self.realisation.kind
 
     @property
     def birealisation(self) -> str | None:
-        """The kind of the bi-realisation."""
+        """The kind of the bi-realisation, such as ``constant``."""
         return self.realisation.kind
 
     @property
@@ -292,18 +304,20 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def has_series(self) -> bool:
-        """Whether the step comes from S_1, S_2, … and a bi-realisation."""
+        """True: the step is computed from a bi-realisation and the terms S_1, S_2, … of a generating function."""
         return True
 
     @property
     def discretised(self) -> System:
-        """The system with the Hamiltonian that is discretised: H minus the Casimirs of the gauge."""
+        """The system whose Hamiltonian is discretised: H minus multiples of Casimirs, called the gauge."""
         return self.gauged.system
 
     @property
     def series(self) -> HamiltonJacobi:
-        """The Hamilton–Jacobi series of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver
-        chooses."""
+        """The Hamilton–Jacobi series of the system `discretised`.
+
+        The symbol ``gauge:C`` stands for the multiple of the Casimir C that the solver subtracts from H.
+        """
         return self.gauged.series
 
     def by_series(self) -> CompiledSeries:
@@ -328,19 +342,21 @@ class CompiledSplitting(_CompiledSystem):
 
     @property
     def symmetric(self) -> bool:
-        """Whether a step of −h is the inverse of a step of h; with a corrector this holds only up to terms of order
-        ε²."""
+        """Whether a step of size −h is the inverse of a step of size h; with a corrector only up to terms of order ε².
+
+        ε is the size of the small part of H.
+        """
         schedule = self.program.step.flow_schedule
         return schedule is None or len(schedule.end) < 2
 
     @property
     def scheme_name(self) -> str:
-        """The scheme, as in specs."""
+        """The name of the scheme: "splitting"."""
         return "splitting"
 
     @property
     def label(self) -> str:
-        """The word "splitting"."""
+        """The method in a word for users: "splitting"."""
         return "splitting"
 
     @property
@@ -369,50 +385,50 @@ class CompiledSplitting(_CompiledSystem):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledGauss(_CompiledSystem):
-    """Compilation by scheme ``gauss``: a step by Gauss collocation, with the unknowns that ``gauss`` describes."""
+    """Compilation by scheme ``gauss``: a step by Gauss collocation in the unknowns that ``gauss`` describes."""
 
     gauss: Realisation
 
     @property
     def scheme_name(self) -> str:
-        """The scheme, as in specs."""
+        """The name of the scheme: "gauss"."""
         return "gauss"
 
     @property
     def label(self) -> str:
-        """The unknowns of a step, and whether its structure is exact."""
+        """The method in a few words for users: the unknowns of a step, and whether its structure is exact."""
         return self.gauss.label
 
     @property
     def exact(self) -> bool:
-        """Whether the structure of the step is exact to round-off; see `_Compiled.exact`."""
+        """Whether a step preserves the Poisson structure to round-off, rather than up to a power of h."""
         return self.gauss.exact
 
     @property
     def degree(self) -> int | None:
-        """The order d of the method; without exact structure, the Poisson defect of a step is O(h^(d+1))."""
+        """The order d of the method. If its structure is not exact, steps are Poisson maps up to O(h^(d+1))."""
         return self.order.order
 
     @property
     def notes(self) -> list[str]:
-        """Decisions of the compiler, one line each, and a warning if steps are no Poisson maps."""
+        """Choices of the compiler, each as a line of text, and a warning if steps are no Poisson maps."""
         defect = f"its defect is O(h^{self.order.order + 1}) in a step, and phigen verify measures it"
         warned = [] if self.gauss.exact else [f"structure: to truncation: a step is not a Poisson map; {defect}"]
         return [*super().notes, *warned]
 
     @property
     def structure(self) -> str:
-        """The structure of the method, as in specs: ``exact`` or ``to truncation``."""
+        """Whether steps preserve the Poisson structure, as the spec says it: ``exact`` or ``to truncation``."""
         return "exact" if self.gauss.exact else "to truncation"
 
     @property
     def tableau(self) -> Tableau:
-        """The coefficients of the Gauss stages."""
+        """The coefficients of the Gauss method."""
         return tableau(self.order.terms)
 
     @property
     def described(self) -> dict[str, Any]:
-        """Description of the method as plain data, for JSON, with unknowns and structure."""
+        """The method as plain data, for the output of commands in JSON: scheme and structure."""
         return {"scheme": self.scheme_name, "structure": self.structure}
 
     def by_gauss(self) -> CompiledGauss:
@@ -431,39 +447,42 @@ class CompiledGauss(_CompiledSystem):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledLattice(_Compiled):
-    """Compilation of a lattice of any size: its ``cell``, and the plan of the ``sweeps`` of a step."""
+    """Compilation of a lattice of any size: its ``cell``, one site with its neighbours, and the plan of a step.
+
+    ``sweeps`` is the plan: the updates of all sites of which a step consists.
+    """
 
     cell: Cell
     sweeps: LatticePlan
 
     @property
     def system(self) -> System:
-        """Raise `SpecError`: the number of coordinates is unknown before a run."""
+        """Raise `SpecError`: the number of sites, and so of coordinates, is unknown before a run."""
         raise system_of_lattice(self.spec)
 
     @property
     def discretised(self) -> System:
-        """Raise `SpecError`: the number of coordinates is unknown before a run."""
+        """Raise `SpecError`: the number of sites, and so of coordinates, is unknown before a run."""
         return self.system
 
     @property
     def gauge(self) -> Gauge:
-        """An empty gauge: nothing is subtracted from H."""
+        """The multiples of Casimirs that are subtracted from H: none for lattices."""
         return Gauge()
 
     @property
     def scheme_name(self) -> str:
-        """The scheme, as in specs."""
+        """The name of the scheme: "splitting" or "series"."""
         return self.sweeps.scheme
 
     @property
     def label(self) -> str:
-        """The kind of the bi-realisation, or "splitting"."""
+        """The method in a few words for users: the kind of the bi-realisation, or "splitting"."""
         return self.sweeps.label
 
     @property
     def kind(self) -> str:
-        """The kind of the bi-realisation, or the scheme where steps have none."""
+        """The kind of the bi-realisation, or the name of the scheme if the scheme uses no bi-realisation."""
         return self.sweeps.kind
 
     @property
@@ -473,12 +492,12 @@ class CompiledLattice(_Compiled):
 
     @property
     def is_composed(self) -> bool:
-        """Whether a step is composed of several maps: flows, or stages of order 2."""
+        """Whether a step is composed of several maps: flows of parts of H, or implicit steps of order 2."""
         return not self.sweeps.is_implicit or len(self.program.fractions) > 1
 
     @property
     def exact(self) -> bool:
-        """True: flows and implicit stages are Poisson maps."""
+        """True: a step is a composition of flows or implicit maps, which preserve the Poisson structure."""
         return True
 
     @property
@@ -488,15 +507,15 @@ class CompiledLattice(_Compiled):
 
     @property
     def described(self) -> dict[str, Any]:
-        """Description of the method as plain data, with the number of colours.
+        """The method as plain data, for the output of commands in JSON, with the number of colours of sites.
 
-        ``since`` is the reason if the sizes of runs require the series, or more colours.
+        ``since`` is the reason if the sizes of the runs require the scheme series, or more colours, else None.
         """
         plan = self.sweeps
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
 
     def named(self, method: str) -> str:
-        """Return a line that names the method, with the reason if the sizes in the runs decide the method."""
+        """Return a line that names the method and, if the sizes in the runs decide the method, the reason."""
         if not self.sweeps.since:
             return method
         colours = self.sweeps.colouring.count
@@ -513,11 +532,11 @@ class CompiledLattice(_Compiled):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """Raise `SpecError`: a lattice has a compilation of its own, which has none of these kinds."""
+        """Raise `SpecError`: a lattice is compiled in its own way, by none of the three functions."""
         raise system_of_lattice(self.spec)
 
     def _repr_latex_(self) -> str:
-        """The formulas of the cell as LaTeX, for notebooks."""
+        """The formulas of the lattice at one site, as LaTeX for notebooks."""
         return cast(str, display("formulas of a cell")(self.cell))
 
 

@@ -51,11 +51,11 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: Order of the series that is built to estimate the operations of a series of higher order; the estimate is a lower
-#: bound.
+#: A series of high order is not built to estimate its cost. The operations of a series of this order are a lower bound.
 PREVIEW_ORDER = 4
 
-#: Number of coordinates from which a spec is examined for a lattice that is written out, and least number of its sites.
+#: Specs with at least this number of coordinates are examined for a lattice that is written out site by site; the
+#: lattice must have at least this number of sites.
 LEAST_LATTICE_SITES = 8
 
 
@@ -65,9 +65,9 @@ def compile_spec(
     system: System | None = None,
     **options: Unpack[Overrides],
 ) -> Compilation:
-    """Compile a spec with the options that override it; see `Spec.overridden`.
+    """Compile a spec without proofs; the options override settings of the spec, see `Spec.overridden`.
 
-    ``system`` is the system of the spec, if the caller has already built it. Nothing is proved: see `compile_proved`.
+    ``system`` is the system of the spec, if the caller has already built it. `compile_proved` compiles with proofs.
     Raises `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too
     large).
     """
@@ -90,9 +90,9 @@ def examine(
     system: System | None = None,
     **options: Unpack[Overrides],
 ) -> Examination:
-    """Compile a spec as far as possible, and prove all statements about it.
+    """Compile a spec as far as possible, and prove all statements about the system and the method.
 
-    Raises `SpecError` if the spec does not even define a system.
+    A refuted statement raises no error. Raises `SpecError` if the spec does not even define a system.
     """
     spec, clock = spec.overridden(**options), _Clock()
     if spec.lattice:
@@ -132,9 +132,9 @@ def compile_proved(
     system: System | None = None,
     **options: Unpack[Overrides],
 ) -> Compilation:
-    """Compile as `compile_spec`, but prove the statements about the system and the method.
+    """Compile a spec, as `compile_spec` does, and prove the statements about the system and the method.
 
-    Raises `CheckError` if a statement is refuted, with its name and its residual: π is not Poisson, a claimed Casimir
+    Raises `CheckError` if a statement is refuted, with its name and its residual: π is not Poisson, a declared Casimir
     is none, or the bi-realisation is wrong. Raises `SpecError` and `LimitError` as `compile_spec`.
     """
     examination = examine(spec, system=system, **options)
@@ -148,20 +148,20 @@ def compile_proved(
 
 
 def emit(program: Program, target: str, command: str, *, single_file: bool = False) -> dict[str, str]:
-    """Return the files of one target (name → text).
+    """Print a program in the language of a target, and return the files (name → text).
 
-    ``command`` is the command line that regenerates the files; it is written into their headers. Raises `ValueError`
-    for an unknown target.
+    ``command`` is the command line that regenerates the files; it is written into their headers. With ``single_file``,
+    code that is otherwise in several files is in one. Raises `ValueError` for an unknown target.
     """
     with progress.stage(f"{program.name}: emission of {target}"):
         return registry.find(target).emit(program, command, single_file=single_file)
 
 
 def _warn_of_written_out_lattice(spec: Spec) -> None:
-    """Warn if the spec is a lattice that is written out site by site.
+    """Warn if the equations of the spec are those of a lattice, written out site by site.
 
-    Its compilation is slow; the warning says how to get a spec of one site, which compiles fast for any number of
-    sites.
+    Such a spec is slow to compile. The warning says how to get a spec of one site, which compiles fast for any number
+    of sites.
     """
     if spec.dimension < LEAST_LATTICE_SITES:
         return
@@ -177,7 +177,7 @@ def _warn_of_written_out_lattice(spec: Spec) -> None:
 
 
 def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
-    """Prove the statements about a lattice that hold for all its sizes."""
+    """Compile a lattice as far as possible, and prove all statements, which hold for any number of sites."""
     from phigen.lattice.cell_building import cell_from_spec
     from phigen.proofs import lattice_statements
 
@@ -200,10 +200,11 @@ def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
 
 
 def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation | None:
-    """Return the bi-realisation of a large system, before anything is proved about the system.
+    """Return the bi-realisation of a large system before anything is proved about the system, to find limits early.
 
-    Returns None if the system is small, if the gauge decides on the bi-realisation, or if there is no bi-realisation;
-    in the last case, the proofs report the reason. Raises `LimitError` if the generating function would be too large.
+    Returns None if the system is small, if the Casimirs to be subtracted from H (the gauge) decide on the
+    bi-realisation, or if there is no bi-realisation; in the last case, the proofs report the reason. Raises
+    `LimitError` if the generating function would be too large.
     """
     as_it_is = isinstance(spec.gauge, str) and not (spec.monitor or source.forces or source.noise)
     if spec.scheme != "series" or not as_it_is or not is_large(source):
@@ -225,7 +226,7 @@ def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRe
 
 
 def _expect_inputs_to_change(spec: Spec) -> None:
-    """Raise `SpecError` if ``without`` leaves out the function that changes the inputs of the spec."""
+    """Raise `SpecError` if the spec has inputs, but ``without`` leaves out the C function that sets them."""
     if spec.inputs and "parameters" in spec.extras.without:
         message = f"inputs need {spec.name}_set_parameters, which `without` leaves out"
         raise SpecError([spec.diagnostic(("inputs",), message, "remove inputs, or the parameters of `without`")])
@@ -234,7 +235,10 @@ def _expect_inputs_to_change(spec: Spec) -> None:
 def _compile_series(
     spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None
 ) -> CompiledSeries:
-    """Compile a system by the scheme series, to a step from S_1, S_2, … and a bi-realisation."""
+    """Compile a system by the scheme series: its bi-realisation, the gauge, the generating function, and the program.
+
+    ``early_realisation`` is the bi-realisation, if `_realised_early` has found it already.
+    """
     realisation = early_realisation or clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
     plan = plan_order(spec.order, spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
@@ -257,10 +261,10 @@ def _compile_series(
 
 
 def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
-    """Compile by the scheme whose steps are expected to reach the accuracy of the order at the least cost.
+    """Compile by the scheme that is expected to reach the accuracy of the requested order in the least time.
 
-    A series is not tried if its operations at a lower order show that it costs more than another scheme. Raises the
-    error of the series if no scheme applies.
+    The series is not tried if its operations at a lower order show that it takes more time than another scheme. Raises
+    the error of the series if no scheme applies.
     """
     compilations: dict[str, Compilation] = {}
     failures: dict[str, SpecError] = {}
@@ -279,7 +283,7 @@ def _cheapest(spec: Spec, source: System, clock: _Clock) -> Compilation:
 
 
 def _candidates(spec: Spec) -> tuple[str, ...]:
-    """Return the schemes to which all options of the spec apply."""
+    """Return the names of the schemes that offer all options of the spec, as candidates for ``scheme: auto``."""
     names_options = spec.birealisation.kind != "auto" or spec.terms is not None
     if names_options or spec.extras.modified_hamiltonian > 0:
         return ("series",)
@@ -287,13 +291,14 @@ def _candidates(spec: Spec) -> tuple[str, ...]:
 
 
 def _settings_of_the_solve(spec: Spec) -> list[str]:
-    """Return the settings of the inner solve that the spec chooses."""
+    """Return the keys by which the spec controls the solution of implicit steps: ``tolerance``, ``max_iterations``."""
     chosen = [key for key in ("tolerance", "max_iterations") if ("solver", key) in spec.locations]
     return [key for key in chosen if key != "tolerance" or spec.solver.tolerance is not None]
 
 
 def _choice(best: str, compilations: Mapping[str, Compilation], failures: Mapping[str, SpecError]) -> str:
-    """Return the reason for the scheme ``best``: the expected costs of the alternatives, relative to its cost."""
+    """Return the reason for choosing the scheme ``best``: the expected cost of each alternative, relative to
+    ``best``."""
     least = _expected(compilations[best])
     if least == 0:
         return f"{best}: one exact flow"
@@ -308,8 +313,8 @@ def _expected(compilation: Compilation) -> float:
 
 
 def _is_dearer(spec: Spec, source: System, least: float) -> bool:
-    """Whether a series of the order of the spec is expected to cost more than ``least``, judged by a series of low
-    order."""
+    """Whether a series is expected to cost more than ``least``; a series of low order gives a lower bound for its
+    cost."""
     order = spec.order or 0
     if math.isinf(least) or order <= PREVIEW_ORDER:
         return False
@@ -318,7 +323,7 @@ def _is_dearer(spec: Spec, source: System, least: float) -> bool:
 
 
 def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
-    """Compile a system by the scheme splitting, into parts of H with elementary flows."""
+    """Compile a system by the scheme splitting: H is split into parts whose flows are known in closed form."""
     gauge = Gauge() if isinstance(spec.gauge, str) else fixed_gauge(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: _parts(spec, discretised.frozen))
@@ -348,11 +353,11 @@ def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSpl
 
 
 def _parts(spec: Spec, system: System) -> SplitHamiltonian:
-    """Return the parts of H, each with its flow.
+    """Return H as a sum of parts, each with its flow.
 
-    With ``coordinates_from``, H is split by its bodies. With a monitor, or with a named composition for an H that is
-    one part, H is split into parts without exact flows of motions. Free rigid bodies may be parts if `_turns_bodies`
-    allows it.
+    With the key ``coordinates_from``, there is a part for each body. The exact flow of a whole motion, such as a Kepler
+    motion, is not used with a monitor, or if it would be the only part and the spec names a composition. Free rigid
+    bodies may be parts if `_turns_bodies` allows it.
     """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)
@@ -364,7 +369,8 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 
 
 def _turns_bodies(spec: Spec, system: System) -> bool:
-    """Whether free rigid bodies may be parts of H; if the spec asks for an attitude, it must be that of the bodies."""
+    """Whether free rigid bodies may be parts of H: if the spec reconstructs an attitude, it must be the body's
+    attitude."""
     group = _group(spec, system, "exponential")
     if group is None:
         return True
@@ -374,7 +380,7 @@ def _turns_bodies(spec: Spec, system: System) -> bool:
 
 
 def _compile_gauss(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
-    """Compile a system by the scheme gauss."""
+    """Compile a system by the scheme gauss: the unknowns of the collocation, the gauge, and the program."""
     expect_offered(spec)
     plan = plan_gauss(spec)
     realisation = clock.timed("momentum maps", lambda: realise_gauss(spec, source))
@@ -393,7 +399,7 @@ def _compile_gauss(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
     )
 
 
-#: The function that compiles an ordinary system, for each scheme. Lattices are compiled by `_swept`.
+#: Scheme → the function that compiles a system by it. Lattices are compiled by `_swept`.
 SCHEME_COMPILERS: Mapping[str, Callable[[Spec, System, _Clock], Compilation]] = {
     "auto": _cheapest,
     "series": _compile_series,
@@ -403,7 +409,7 @@ SCHEME_COMPILERS: Mapping[str, Callable[[Spec, System, _Clock], Compilation]] = 
 
 
 def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:
-    """Compile a lattice, for any sizes, to a plan of sweeps over its sites."""
+    """Compile a lattice, for any numbers of sites, to a plan of sweeps (updates of all sites)."""
     if spec.scheme == "gauss":
         expect_offered(spec)
     _expect_inputs_to_change(spec)
@@ -421,7 +427,7 @@ def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:
 
 
 def _expect_no_settings_of_the_solve(spec: Spec) -> None:
-    """Raise `SpecError` for settings of the inner solve, which lattices do not have."""
+    """Raise `SpecError` if the spec sets a tolerance or a number of iterations, which lattices do not offer."""
     message = "not for lattices, whose steps are exact flows, or are solved to round-off"
     diagnostics = [
         spec.diagnostic(("solver", key), f"solver: {key} is {message}", f"remove {key}")
@@ -432,7 +438,7 @@ def _expect_no_settings_of_the_solve(spec: Spec) -> None:
 
 
 def _group(spec: Spec, source: System, kind: str) -> Group | None:
-    """Return the group whose elements act as steps, if the spec asks for an attitude (``reconstruct``); else None."""
+    """Return the group to which the attitude increment of a step belongs; None unless the spec says ``reconstruct``."""
     if not spec.reconstruct:
         return None
     from phigen.attitude.group import group_of
@@ -442,7 +448,7 @@ def _group(spec: Spec, source: System, kind: str) -> Group | None:
 
 @contextmanager
 def bounded(spec: Spec) -> Iterator[None]:
-    """Context in which polynomials that would not fit into memory raise a `LimitError` of the spec."""
+    """Context in which polynomials that would not fit into memory raise a `LimitError` with the name of the spec."""
     try:
         yield
     except OverflowError as error:
@@ -451,7 +457,7 @@ def bounded(spec: Spec) -> Iterator[None]:
 
 
 class _Clock:
-    """Clock of the stages of a compilation; a stage that is entered several times adds up its ``seconds``."""
+    """Stopwatch for the stages of a compilation; ``seconds`` of a stage that is entered several times add up."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

@@ -36,7 +36,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """Message about a spec: its location, the error with the wrong value, and a hint how to correct it."""
+    """Message about a spec: what is wrong or doubtful, where in the spec, and a hint how to correct it."""
 
     message: str
     location: Location | None = None
@@ -58,9 +58,11 @@ class Diagnostic:
 
 
 def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
-    """Return at most ``width`` characters of a line around a column (from 0), and the position of the column in them.
+    """Return at most ``width`` characters of a line, around a column that counts from 0, and the column within this
+    text.
 
-    Characters that a terminal would not show as one character are replaced, so that the caret is below its character.
+    Characters that a terminal would not show as one character are replaced, so that a caret below the text points at
+    the right character.
     """
     start = 0 if len(line) <= width else max(0, min(column - width // 2, len(line) - width))
     part = "".join(c if c.isprintable() else " " if c == "\t" else "�" for c in line[start : start + width])
@@ -70,8 +72,10 @@ def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
 
 
 def missing_attribute(owner: object, name: str) -> AttributeError:
-    """Return the `AttributeError` for an attribute that a system lacks; for attributes of solvers, such as ``run``, it
-    has a hint."""
+    """Return the `AttributeError` for an attribute that a system lacks.
+
+    For attributes that only solvers have, such as ``run``, the message has a hint.
+    """
     hint = f"; solver = phigen.compile(system) has {name}" if name in ("run", "runs", "integrate") else ""
     return AttributeError(f"{type(owner).__name__!r} object has no attribute {name!r}{hint}")
 
@@ -82,13 +86,13 @@ class PhigenError(Exception):
     exit_code = 4
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # By default, an unpickled exception is created from its message alone, which fails for exceptions with further
+        # By default, pickle creates an exception from its message alone, which fails for exceptions with further
         # arguments.
         return _restored, (type(self), self.args, self.__dict__)
 
 
 class PhigenWarning(RuntimeWarning):
-    """A warning: work continues; the command line shows it like its own warnings."""
+    """A warning: the work continues. The command line prints it in the form of its own warnings."""
 
 
 class SpecError(PhigenError):
@@ -120,8 +124,10 @@ class ToolchainError(PhigenError):
 
 
 class DeviceError(ToolchainError):
-    """There is no usable device, or the device failed; ``trajectory`` has the results so far, with NaN for missing
-    ones."""
+    """There is no usable device (such as a graphics card), or the device failed.
+
+    ``trajectory`` has the results so far, with NaN for results that are missing.
+    """
 
     trajectory: Any = None
 
@@ -133,13 +139,13 @@ class MissingPackageError(PhigenError):
 
 
 class FileError(PhigenError):
-    """A file cannot be written, for a reason that the message of the operating system does not contain."""
+    """A file cannot be written, and the message of the operating system does not give the reason."""
 
     exit_code = 2
 
 
 class StepError(PhigenError):
-    """A step failed; the state is the one before this step.
+    """A step failed; the solver has the state before this step.
 
     Attributes: ``step`` (number of the failing step, from 0), ``status`` (the name of the solver's status, e.g.
     ``NO_CONVERGENCE``), ``trajectory`` (the results before the failing step, or ``None``), ``members`` (indices of the
@@ -156,7 +162,7 @@ class StepError(PhigenError):
 
 
 class ParameterError(StepError, ValueError):
-    """Parameters for which no step is possible: values computed from the parameters alone are not finite."""
+    """No step is possible with the given parameters, since values computed from the parameters alone are not finite."""
 
 
 def _restored(kind: type[PhigenError], args: tuple[Any, ...], parts: dict[str, Any]) -> PhigenError:

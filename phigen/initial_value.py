@@ -1,4 +1,5 @@
-"""`solve_ivp` with the interface of `scipy.integrate.solve_ivp`, which integrates by a solver of phigen."""
+"""The function `solve_ivp`, with the arguments and the result of `scipy.integrate.solve_ivp`, over a solver of
+phigen."""
 
 from __future__ import annotations
 
@@ -24,10 +25,12 @@ from phigen.runtime.trajectory import Trajectory
 if TYPE_CHECKING:
     from phigen.geometry.system import System
 
-#: An event of SciPy: a function of t and y (DIM,), with the optional attributes ``terminal`` and ``direction``.
+#: An event as in SciPy: a function of t and y (DIM,) whose zeros are located. It may have the attributes ``terminal``
+#: and ``direction``.
 Event = Callable[[float, Floats], float]
 
-#: Without ``h``: number of steps of the first attempt, and the maximum number of times that the step is halved.
+#: If the caller passes no step ``h``: number of steps of the first attempt, and largest number of attempts, each with
+#: half the step of the last one.
 _FIRST_STEPS, _MAX_HALVINGS = 64, 16
 
 _REACHED = "The solver successfully reached the end of the integration interval."
@@ -60,7 +63,7 @@ class OdeResult:
         return self.status >= 0
 
 
-#: Arguments of SciPy's solve_ivp that are refused → the reason, which the message states.
+#: Arguments of SciPy's solve_ivp that are refused → the reason, which the error message states.
 _SCIPY = {
     "method": "the method is that of the solver; order= changes its order",
     "jac": "the solver has its derivatives",
@@ -87,10 +90,10 @@ def solve_ivp(
 ) -> OdeResult:
     """Integrate from ``t_span[0]`` to ``t_span[1]``, with the arguments and the result of `scipy.integrate.solve_ivp`.
 
-    ``system`` replaces SciPy's function: a spec, a `System`, or a `Solver`. All steps have the size ``h``, in τ if the
-    system has a monitor. Without ``h``, the step is halved until the last state changes by less than atol + rtol |y|.
-    States between steps, at ``t_eval``, at ``events`` and of ``sol``, are computed by further steps rather than by
-    interpolation, so they have the Casimirs of the trajectory.
+    ``system`` replaces SciPy's function: a spec, a `System`, or a `Solver`. All steps have the size ``h``; with a
+    monitor, which rescales time by dt = g dτ, ``h`` is a step in τ. Without ``h``, the step is halved until the last
+    state changes by less than atol + rtol |y|. States between steps (at ``t_eval``, at ``events``, of ``sol``) are
+    computed by further steps rather than by interpolation, so they have the Casimirs of the trajectory.
 
     ``status`` is −1 if a step fails, or if the tolerances are not reached, as for chaotic motion over a long time.
     Raises `TypeError` for systems with noise, since steps of different sizes do not follow one path of the noise.
@@ -141,7 +144,8 @@ def solve_ivp(
 
 @dataclass(frozen=True)
 class _Problem:
-    """Initial value problem: a solver, the interval from ``begin`` to ``end``, an initial state and parameters."""
+    """Initial value problem: a solver, the interval of time from ``begin`` to ``end``, an initial state and
+    parameters."""
 
     solver: Solver
     begin: float
@@ -151,20 +155,21 @@ class _Problem:
 
     @property
     def offset(self) -> float:
-        """The difference between times of the problem and times of the solver.
+        """The difference between times as the user counts them and times of the solver.
 
-        Times of the solver begin at 0 if the Hamiltonian does not depend on the time; else the difference is 0.
+        It is 0 if the Hamiltonian depends on the time; otherwise times of the solver begin at 0.
         """
         return 0.0 if self.solver.interface.time else self.begin
 
     def integrated(self, h: float, until: float, stride: int = 1) -> Trajectory:
-        """Return the trajectory until a time of the problem, in steps of size ``h``."""
+        """Return the trajectory from the beginning of the interval to the time ``until``, in steps of size ``h``."""
         start: dict[str, Any] = {"t0": self.begin} if self.solver.interface.time else {}
         span = until - self.offset
         return self.solver.integrate(self.y0, h, until=span, stride=stride, parameters=self.values, **start)
 
     def chosen(self, rtol: float, atol: float) -> tuple[float, bool]:
-        """Return a step size at which another halving changes the last state by less than the tolerances, and True.
+        """Return a step size that reaches the tolerances, and True: with half this step, the last state changed by
+        less.
 
         If no step size reaches the tolerances, returns the smallest one tried, and False. Raises `StepError` if the
         last attempt fails.
@@ -185,8 +190,11 @@ class _Problem:
         return 2 * h, False
 
     def events(self, event_list: Sequence[Event], h: float) -> tuple[list[list[tuple[float, Floats]]], float | None]:
-        """Return the times and states of each event until the end, and the time of the first terminal event, or
-        None."""
+        """Return the times and states of each event until the end, and the time of the first terminal event, which is
+        the end.
+
+        The second result is None if there is no terminal event.
+        """
         by_event = [self._crossings(event, h) for event in event_list]
         sign, stops = math.copysign(1.0, self.end - self.begin), []
         for event, event_crossings in zip(event_list, by_event, strict=True):
@@ -197,10 +205,11 @@ class _Problem:
         return [[(t, x) for t, x in event_crossings if (t - last) * sign <= 0] for event_crossings in by_event], stop
 
     def _crossings(self, event: Event, h: float) -> list[tuple[float, Floats]]:
-        """Return the times and states at which an event changes its sign, in the direction that it states."""
+        """Return the times and states at which an event changes its sign, in the direction that its attribute
+        states."""
         direction_of_change = np.sign(getattr(event, "direction", 0)) * np.sign(
             self.end - self.begin
-        )  # SciPy's directions refer to the direction of integration, those of CrossingFinder to increasing time.
+        )  # SciPy's direction refers to the integration, that of CrossingFinder to increasing time.
         direction = {1: "rising", -1: "falling", 0: "both"}[int(direction_of_change)]
 
         def g(states: Floats, t: Floats) -> Floats:
@@ -223,7 +232,8 @@ class _Problem:
         return crossings_so_far
 
     def solution(self, trajectory: Trajectory) -> Callable[[ArrayLike], Floats]:
-        """Return the function ``sol``, which returns the state (DIM,) at a time, or states (DIM, times)."""
+        """Return the function ``sol`` of SciPy's result: it returns the state (DIM,) at a time, or states (DIM,
+        times)."""
 
         def sol(t: ArrayLike) -> Floats:
             times = np.asarray(t, dtype=np.float64)

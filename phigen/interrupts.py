@@ -14,12 +14,12 @@ from types import FrameType
 
 CODE = 130
 
-#: Whether a command is running that cleans up after an interrupt.
+#: Whether a command is running that must clean up after Ctrl-C, so that Ctrl-C raises `KeyboardInterrupt`.
 working = False
 
 
 def obey() -> None:
-    """Handle SIGINT, unless the process ignores it, as background jobs do."""
+    """Install the handler of Ctrl-C, unless the process ignores the signal, as background jobs do."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _handle)
         sys.unraisablehook = _unraisable
@@ -34,8 +34,11 @@ def _handle(number: int, frame: FrameType | None) -> None:
 
 
 def _imports(frame: FrameType | None) -> bool:
-    """Whether a module is being imported; a KeyboardInterrupt in compiled modules would become an error of another
-    kind."""
+    """Whether a module is being imported at the present frame.
+
+    During imports Ctrl-C ends the process at once, since compiled modules would convert `KeyboardInterrupt` to another
+    error.
+    """
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True
@@ -44,8 +47,7 @@ def _imports(frame: FrameType | None) -> bool:
 
 
 def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
-    """End the process if the interrupt occurred where Python cannot propagate it, such as in a callback of a weak
-    reference."""
+    """End the process if `KeyboardInterrupt` was raised where Python drops exceptions, such as in a destructor."""
     if issubclass(unraisable.exc_type, KeyboardInterrupt):
         _end()
     sys.__unraisablehook__(unraisable)

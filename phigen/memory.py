@@ -1,6 +1,6 @@
-"""Checks that arrays over sites fit into memory, before their allocation.
+"""Checks that arrays over the sites of a lattice fit into memory, before they are allocated.
 
-Linux lets a process allocate more memory than there is, and kills it later, when it writes to the pages.
+Without a check, Linux lets a process allocate more memory than there is, and kills the process when it writes to it.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 
 from phigen.errors import Diagnostic, LimitError, Location
 
-#: Requests of up to this number of bytes are not checked: reading the free memory takes longer than a step on an array
-#: of this size.
+#: Sizes in bytes up to which nothing is checked: to read the free memory takes longer than a step on an array of this
+#: size.
 UNCHECKED_BYTES = 2**24
 
 _HINT = "use fewer sites, frames in a file, real: float (half the memory), or phigen.mpi on several machines"
 
 
 def expect_room(what: str, byte_count: int, place: Location | None = None, hint: str = _HINT) -> None:
-    """Raise `LimitError` if ``byte_count`` bytes are not available; do nothing if the system does not report free
-    memory.
+    """Raise `LimitError` if ``byte_count`` bytes of memory are not available.
 
-    ``what`` is the plural subject of the message, such as "12 frames".
+    ``what`` is the plural subject of the message, such as "12 frames". Nothing is checked if the system does not report
+    its free memory.
     """
     if byte_count <= UNCHECKED_BYTES:
         return
@@ -39,7 +39,7 @@ def expect_room(what: str, byte_count: int, place: Location | None = None, hint:
 
 
 def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.float64) -> NDArray[Any]:
-    """Return a new array of NaN. Raises `LimitError` if it does not fit into memory, as `expect_room` does.
+    """Return a new array, filled with NaN. Raises `LimitError` if it does not fit into memory; ``what`` is its name.
 
     NaN is written to the whole array at once, because untouched pages of ``np.empty`` would still count as available
     when the next array is allocated.
@@ -49,8 +49,8 @@ def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.f
 
 
 def available() -> int | None:
-    """Return the bytes that this process can still allocate, swap space included; None if the system does not report
-    them."""
+    """Return the bytes of memory that this process can still allocate, swap space included; None if they are
+    unknown."""
     limits = [limit for limit in (_of_machine(), *_of_groups()) if limit is not None]
     return min(limits, default=None)
 
@@ -58,22 +58,22 @@ def available() -> int | None:
 def _of_machine() -> int | None:
     """Return the free memory of the machine in bytes.
 
-    Returns all its memory if the free memory is unknown, and None if that is unknown too.
+    If the free memory is unknown, returns the whole memory; if the whole memory is unknown too, None.
     """
     sizes = _table(Path("/proc/meminfo"), ":")
     if "MemAvailable" in sizes:
         return 1024 * (sizes["MemAvailable"] + sizes.get("SwapFree", 0))
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (ValueError, OSError, AttributeError):  # this system has no sysconf, or does not know these names
+    except (ValueError, OSError, AttributeError):  # the system has no sysconf, or sysconf does not know these names
         return None
 
 
 def _of_groups(root: Path = Path("/sys/fs/cgroup")) -> Iterator[int | None]:
-    """Yield the bytes left by the limits of control groups, of version 2 and of version 1; nothing for groups without
-    limits.
+    """Yield the bytes that the limits of control groups, of version 2 and of version 1, leave to this process.
 
-    Cached pages of files count as available, since the system can drop them.
+    Nothing is yielded for groups without limits. Cached pages of files count as available, since the system can drop
+    them.
     """
     for folder, limit, usage, files in (
         (root, "memory.max", "memory.current", "file"),
@@ -87,12 +87,12 @@ def _of_groups(root: Path = Path("/sys/fs/cgroup")) -> Iterator[int | None]:
 def _number(path: Path) -> int | None:
     try:
         return int(path.read_text())
-    except (OSError, ValueError):  # no such file, or "max", which means no limit
+    except (OSError, ValueError):  # there is no such file, or it says "max", which means no limit
         return None
 
 
 def _table(path: Path, separator: str | None = None) -> dict[str, int]:
-    """Return the numbers of a file with a name and a number in each line, by name; {} if the file cannot be read."""
+    """Return the numbers in a file whose lines have a name and a number, by name; {} if the file cannot be read."""
     try:
         rows = [line.split(separator, 1) for line in path.read_text().splitlines()]
         return {name: int(value.split()[0]) for name, value in rows}

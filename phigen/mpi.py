@@ -1,4 +1,4 @@
-"""Lattices on several processes, each of which has a domain of planes along the first axis; needs the extra ``mpi``.
+"""Lattices on several processes, each of which integrates a part of the sites; needs the extra ``mpi``.
 
     from phigen.mpi import DistributedLattice
 
@@ -7,10 +7,10 @@
 
     mpirun -n 8 python script.py
 
-A plane is the set of all sites with one index of the first axis. Each process runs the C solver on its planes and on
-copies of the neighbouring planes (a halo). Before a sweep that reads the halo, the process requests it from its
-neighbours by mpi4py, and works on its inner planes until the halo has arrived. The states are bitwise equal to those of
-`LatticeSolver`, for any number of processes.
+A plane is the set of all sites with one index of the first axis. Each process has adjacent planes. It runs the C solver
+on its planes and on copies of the neighbouring planes (a halo). Before a sweep (an update of sites) that reads the
+halo, the process requests it from its neighbours by mpi4py, and works on its inner planes until the halo has arrived.
+The states are bitwise equal to those of `LatticeSolver`, for any number of processes.
 """
 
 from __future__ import annotations
@@ -36,12 +36,13 @@ from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
 from phigen.writing import replacing
 
-#: Steps between two checks for finite values, and steps with full-range functions after a failed check. Both are the
-#: same as in templates/c/runtime/lattice.c, so that runs on one and on several processes are bitwise equal.
+#: Number of steps between two checks that all values are finite; number of steps with functions valid for all arguments
+#: after a failed check. These numbers are those of templates/c/runtime/lattice.c, so that runs on one and on several
+#: processes are bitwise equal.
 STRETCH, FAR_STEPS = 32, 64
 
-#: Arguments of `LatticeSolver.integrate` that several processes do not support: they need parts of steps, or copies of
-#: the solver.
+#: Arguments of `LatticeSolver.integrate` that are refused for several processes, since they need parts of steps, or
+#: copies of the solver.
 _WHOLE_ONLY = ("until", "every", "at", "stop", "section", "retry")
 
 #: An array over the whole lattice, or a function f(first, end) that returns the planes first … end − 1.
@@ -50,7 +51,7 @@ Given = Any
 
 @dataclass(frozen=True, eq=False)
 class DistributedRun:
-    """Results of a run, as one process has them.
+    """Results of a run on several processes, as one of the processes has them.
 
     ``t`` and ``energy`` (frames,) refer to the whole lattice. ``x`` (frames, coordinates, planes, …) has the planes
     ``planes[0]`` … ``planes[1]`` − 1 of this process, and is None if frames went to a file. ``waiting`` is the time in
@@ -66,7 +67,7 @@ class DistributedRun:
 
 
 class DistributedLattice:
-    """Solver of a lattice on the processes of an MPI communicator, by default on all processes.
+    """Solver of a lattice whose sites are divided among the processes of an MPI communicator, by default all processes.
 
     ``source`` is an argument of `phigen.compile`, or a `LatticeSolver` for C in profile fast. The lattice must be a
     grid with scheme splitting. Raises `ValueError` for other lattices.
@@ -86,7 +87,7 @@ class DistributedLattice:
 
         compilation = compilation_of(source, order=order, profile="fast")
         if self.comm.rank == 0:
-            lattice_solver_of(compilation, "c")  # compiles the C into the cache, from which the other processes load it
+            lattice_solver_of(compilation, "c")  # compiles the C into the cache, from which all other processes load it
         self.comm.barrier()
         return lattice_solver_of(compilation, "c")
 
@@ -142,7 +143,7 @@ class DistributedLattice:
         arrays = arguments.together(parameters, more)
         arrays |= self.solver.defaults(
             arrays, lattice_sizes
-        )  # defaults for the whole lattice, since this process has only some of its planes
+        )  # defaults are computed for the whole lattice, since this process has only some of its planes
         domain = _Domain(self, lattice_sizes, x0, h, arrays, begin, draws)
         marks = row_steps(steps, stride)
         shape = (len(marks), len(self.solver.coordinates), *lattice_sizes)
@@ -160,7 +161,7 @@ class DistributedLattice:
                     checkpoint.save(energy)
                 if progress:
                     progress(int(marks[k]))
-        except StepError:  # raised on all processes; the run cannot be continued
+        except StepError:  # raised on all processes; the run cannot be continued, so its files are removed
             frames.close()
             frames.discard()
             if checkpoint:
@@ -178,7 +179,7 @@ class DistributedLattice:
 
 
 class _Domain:
-    """The planes of one process, with copies of neighbouring planes.
+    """The planes of one process, with copies of neighbouring planes, and the steps of these planes.
 
     ``open`` says that the state lacks the last flow of its step, which is merged with the first flow of the next step.
     """
@@ -214,7 +215,7 @@ class _Domain:
         session = lattice.solver.started(Beginning(checked, h, values, t0, draws))
         assert isinstance(session, CLatticeSession)
         self.session = session
-        if self.noisy:  # each site receives the random numbers that it has in the whole lattice
+        if self.noisy:  # each site draws the random numbers that it has in the whole lattice
             session.set_planes((self.planes[0] - ghosts[0]) % sizes[0], sizes[0])
         self.session.begin(h)
         self.fields = len(lattice.solver.coordinates)
@@ -228,7 +229,8 @@ class _Domain:
     def _share(self, planes: int, reach: int) -> tuple[int, int]:
         """Return the first plane of this process and the plane after its last.
 
-        All processes have nearly the same number of planes, in multiples of the colour period.
+        All processes have nearly the same number of planes, which is a multiple of the number of planes after which the
+        colours of sites repeat.
         """
         period, count, rank = self.lattice.period, self.comm.size, self.comm.rank
         if planes < count * max(reach, period):
@@ -239,14 +241,18 @@ class _Domain:
         return first, end
 
     def _neighbours(self) -> list[int | None]:
-        """Return the ranks of the processes with the planes behind and ahead; None beyond an open end."""
+        """Return the ranks of the processes that have the planes before and after those of this process.
+
+        A rank is None if the planes of this process end at an open end of the lattice.
+        """
         rank, count, is_open = self.comm.rank, self.comm.size, self.lattice.solver.interface.first_open
         behind = None if is_open and rank == 0 else (rank - 1) % count
         ahead = None if is_open and rank == count - 1 else (rank + 1) % count
         return [behind, ahead]
 
     def _planes_of(self, values: Given, first: int, end: int, axis: int) -> Floats:
-        """Return the planes first … end − 1 of an array or of a function; indices beyond the ends wrap around."""
+        """Return the planes first … end − 1 of ``values``, an array or a function; indices beyond the ends wrap
+        around."""
         size = self.sizes[0]
         if not callable(values):
             return np.take(np.asarray(values, dtype=np.float64), np.arange(first, end) % size, axis)
@@ -258,7 +264,7 @@ class _Domain:
         return np.concatenate([np.asarray(part, dtype=np.float64) for part in parts], axis)
 
     def _local(self, value: Any, first: int, end: int, name: str) -> Any:
-        """Return the planes of a parameter at sites; other parameters are returned unchanged."""
+        """Return the planes first … end − 1 of a parameter at sites; other parameters are returned unchanged."""
         if name in self.lattice.solver.interface.at_sites and (callable(value) or np.ndim(value)):
             return self._planes_of(value, first, end, axis=0)
         return value
@@ -266,7 +272,7 @@ class _Domain:
     # --- steps
 
     def advance(self, steps: int) -> None:
-        """Make a number of steps, after which the state is complete (not open). Raises `StepError`."""
+        """Make a number of steps, including the last flow of the last step. Raises `StepError`."""
         if steps:
             self._put_all(self.saved)
         end, stretch = self.steps + steps, STRETCH
@@ -288,7 +294,8 @@ class _Domain:
         self._set_solver_time(self.steps)
 
     def _set_solver_time(self, steps: int) -> None:
-        """Set the time and the number of steps in the solver, if the Hamiltonian or the noise depends on them."""
+        """Set time and number of steps in the solver to those after ``steps`` steps, if H or the noise depends on
+        them."""
         if self.lattice.solver.interface.time or self.noisy:
             self.session.passed(self.h, steps)
 
@@ -296,7 +303,7 @@ class _Domain:
         """Make ``steps`` steps and return True; if a value is not finite, restore the saved state and return False."""
         for step in range(steps):
             self._set_solver_time(self.steps + step)
-            if self.noisy:  # with noise, the last flow of a step is not merged with the first flow of the next
+            if self.noisy:  # with noise, no flows of different steps are merged
                 for stage in range(self.joined):
                     self._stage(stage)
                 continue
@@ -313,7 +320,8 @@ class _Domain:
         return True
 
     def _apply_last_flow(self) -> None:
-        """Complete an open state by the last flow of its step; ``saved`` remains the open state."""
+        """Apply the last flow of the last step, if it is still missing; ``saved`` remains the state without this
+        flow."""
         if not self.open:
             return
         self._set_solver_time(self.steps - 1)
@@ -323,10 +331,10 @@ class _Domain:
             self._stage(self.joined - 1, far=True)
 
     def _stage(self, number: int, far: bool = False) -> None:
-        """Make one sweep over all planes of this process, with full-range functions if ``far``.
+        """Make one sweep (an update of sites) over all planes of this process; with ``far``, by full-range functions.
 
-        If the sweep reads outdated halos, the inner planes are updated while the halos are being received, and the
-        outer planes after that.
+        If the sweep reads halos that are out of date, they are requested first. The inner planes are updated while the
+        halos are being received, and the outer planes after that.
         """
         stage, (first, end) = self.stages[number], self.own
         way = 1 if far or self.far else 0
@@ -345,9 +353,10 @@ class _Domain:
         self.dirty = (self.dirty & ~stale) | stage.changed
 
     def _request_halos(self, fields: int) -> list[tuple[Any, int, tuple[int, int], Floats]]:
-        """Send the planes that the neighbours read, and request theirs, for each field of the bit mask ``fields``.
+        """Send the planes that neighbouring processes read, and request planes from them.
 
-        Returns (request, field, planes of the halo, buffer) for each message to be received.
+        ``fields`` is a bit mask of the coordinates to be exchanged. Returns (request, coordinate, planes of the halo,
+        buffer) for each message to be received.
         """
         (behind, ahead), (first, end), (reach_behind, reach_ahead) = self.beside, self.own, self.reach
         requests, sent = [], []
@@ -362,13 +371,13 @@ class _Domain:
                     sent.append(self.comm.Isend(self.session.planes(field, *mine), neighbour, 2 * field + tag))
                 if theirs[0] < theirs[1]:
                     buffer = np.empty((theirs[1] - theirs[0], *self.sizes[1:]))
-                    # A message from the neighbour ahead has the tag 2 field, one from behind has 2 field + 1.
+                    # messages from the process ahead have the tag 2 field, messages from the process behind 2 field + 1
                     requests.append((self.comm.Irecv(buffer, neighbour, 2 * field + 1 - tag), field, theirs, buffer))
         self._sent = sent
         return requests
 
     def _received(self, requests: Sequence[tuple[Any, int, tuple[int, int], Floats]]) -> None:
-        """Wait for the requested planes, and copy them into the halos."""
+        """Wait for the requested planes of neighbouring processes, and copy them into the halos of this process."""
         begin = time.perf_counter()
         _mpi().Request.Waitall([request for request, *_ in requests])
         self.waiting += time.perf_counter() - begin
@@ -379,7 +388,7 @@ class _Domain:
     # --- the state
 
     def _holds(self) -> bool:
-        """Whether all values of the state are finite, on every process."""
+        """Whether all values of the state are finite, on all processes."""
         return bool(self.comm.allreduce(int(self.session.holds(*self.own)), op=_mpi().MIN))
 
     def _all(self) -> list[Floats]:
@@ -395,7 +404,8 @@ class _Domain:
         return np.array([self.session.planes(field, *self.own) for field in range(self.fields)])
 
     def energy(self) -> float:
-        """Return H of the whole lattice, on all processes; the sums of the planes are added with a single rounding."""
+        """Return H of the whole lattice, on all processes. The sums over single planes are added with a single
+        rounding."""
         self._received(self._request_halos(self.dirty))
         self.dirty = 0
         density = self.session.density()[self.own[0] : self.own[1]]
@@ -403,10 +413,10 @@ class _Domain:
         return math.fsum(value for part in self.comm.allgather(sums) for value in part.tolist())
 
     def restore(self, x: Floats, steps: int, full_range: int, is_open: bool) -> None:
-        """Continue from a stored state; ``x`` has the planes of this process.
+        """Continue from a stored state; ``x`` (coordinates, planes, …) has the planes of this process.
 
-        ``steps``, ``full_range`` and ``is_open`` are the attributes ``steps``, ``far`` and ``open`` stored with the
-        state.
+        ``steps``, ``full_range`` and ``is_open`` are the values that the attributes ``steps``, ``far`` and ``open`` had
+        when the state was stored.
         """
         for field in range(self.fields):
             self.session.put_planes(field, *self.own, x[field])
@@ -416,24 +426,27 @@ class _Domain:
         self._set_solver_time(steps)
 
     def saved_state(self) -> Floats:
-        """Return the planes of this process in the state from which further steps continue; this state may be open."""
+        """Return the planes of this process in the last state from which further steps continue.
+
+        The last flow of its last step may be missing, if ``open`` is true.
+        """
         return np.array([values[self.own[0] : self.own[1]] for values in self.saved])
 
 
 def _part(path: Path) -> Path:
-    """Return the path of the file of frames while the run is incomplete."""
+    """Return the name that the file of frames has until the run is complete."""
     return path.with_name(path.name + ".part")
 
 
 def _objection(output: Path | None, checkpoints: Path | None, *, resume: bool) -> str:
-    """Return the reason why a run may not begin or continue with the existing files; "" if there is none."""
+    """Return the reason why a run may not begin, or continue, with the existing files; "" if it may."""
     if checkpoints:
         return objection(checkpoints, output, resume=resume, how="resume=True")
     return objection_to_frames(_part(output)) if output else ""
 
 
 class _SharedArrayFile:
-    """``.npy`` file of arrays (…, coordinates, *sizes), of which each process writes and reads its own planes."""
+    """File ``.npy`` with arrays (…, coordinates, *sizes), of which each process writes and reads its own planes."""
 
     def __init__(self, domain: _Domain, path: Path, shape: tuple[int, ...], *, new: bool) -> None:
         self.domain = domain
@@ -452,8 +465,10 @@ class _SharedArrayFile:
         self.file = mpi.File.Open(domain.comm, str(path), mpi.MODE_RDWR)
 
     def _place(self, block: int) -> int:
-        """Return the offset in bytes of this process's planes in block ``block``; the file has one block for each array
-        and coordinate."""
+        """Return the offset in the file, in bytes, of this process's planes in block ``block``.
+
+        The file has one block for each array and coordinate.
+        """
         planes = self.domain.sizes[0]
         plane = 8 * math.prod(self.domain.sizes[1:])
         return self.start + (block * planes + self.domain.planes[0]) * plane
@@ -478,7 +493,7 @@ class _SharedArrayFile:
 
 
 class _Frames:
-    """Frames of a run, in an array of each process, or in one file if there is a path."""
+    """Frames of a run: in one file for all processes or, without a path, in an array of each process."""
 
     def __init__(self, domain: _Domain, path: Path | None, shape: tuple[int, ...], *, new: bool) -> None:
         self.domain, self.path, self.array = domain, path, None
@@ -492,7 +507,7 @@ class _Frames:
         self.file = _SharedArrayFile(domain, self.part, shape, new=new)
 
     def put(self, k: int) -> None:
-        """Store the current state as frame ``k``."""
+        """Store the present state as frame ``k``."""
         x = self.domain.state()
         if self.array is not None:
             self.array[k] = x
@@ -504,7 +519,7 @@ class _Frames:
             self.file.close()
 
     def discard(self) -> None:
-        """Remove the incomplete output file."""
+        """Remove the output file of a run that failed."""
         self.domain.comm.barrier()
         if self.path and self.domain.comm.rank == 0:
             self.part.unlink(missing_ok=True)
@@ -519,7 +534,7 @@ class _Frames:
 
 
 class _StoredState:
-    """The stored state of a run, at ``path``, from which the run can be continued.
+    """The state of a run in files at ``path``, from which the run can be continued after an interruption.
 
     A JSON file at ``path`` describes the state; its values are in one of two files that are written alternately, so
     that the last complete state is never overwritten.
@@ -532,7 +547,7 @@ class _StoredState:
         self.identity = {"solver": domain.lattice.solver.backend.identity, **identity}
 
     def _file(self, count: int) -> Path:
-        """Return the file of the values after ``count`` frames."""
+        """Return the path of the file with the state after ``count`` frames, one of two paths."""
         return self.path.with_name(f"{self.path.name}.{count % 2}.npy")
 
     def save(self, energy: Sequence[float]) -> None:
@@ -548,9 +563,9 @@ class _StoredState:
                 file.write(json.dumps({"identity": self.identity, **record}).encode())
 
     def restored(self) -> list[float]:
-        """Continue from the stored state, and return the energies of its frames; [] if nothing is stored.
+        """Restore the stored state, and return the energies of the frames up to it; [] if nothing is stored.
 
-        Raises `ValueError` if the state is that of another run.
+        Raises `ValueError` if another run has stored the state.
         """
         domain = self.domain
         text = domain.comm.bcast(self._text() if domain.comm.rank == 0 else None)
@@ -566,7 +581,7 @@ class _StoredState:
         return energy
 
     def _text(self) -> str:
-        """Return the text of the stored description; "" if there is none."""
+        """Return the text of the JSON file that describes the stored state; "" if there is none."""
         if not self.path.exists():
             return ""
         with opened(self.path) as file:

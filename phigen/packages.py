@@ -11,7 +11,7 @@ from phigen.errors import MissingPackageError
 def imported(name: str, user: str = "this", installed_by: str = "") -> Any:
     """Return the module of that name. Raises `MissingPackageError` if the package is not installed.
 
-    The message says that ``user`` needs the package. ``installed_by`` are the arguments of ``pip install``, by default
+    The message says that ``user`` needs the package. ``installed_by`` are the arguments for ``pip install``, by default
     the name of the package.
     """
     package = name.partition(".")[0]

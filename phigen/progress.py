@@ -1,7 +1,7 @@
-"""Progress of the compiler: named, nested stages that an observer can follow.
+"""Progress of the compiler: named, nested stages that an observer, such as the command line, can follow.
 
 The compiler reports its stages by ``with stage("Jacobi identity", total=n) as progress: … progress.done = k``. Without
-an observer, a stage costs a microsecond. The command line shows the stages, see `phigen.cli.display`.
+an observer, a stage costs a microsecond. `phigen.cli.display` shows the stages.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ from contextlib import contextmanager
 
 
 class Stage:
-    """Stage of a compilation: ``done`` out of ``total`` parts (0 if the total is unknown), and the time of its
-    start."""
+    """Stage of a compilation, a context in which ``done`` of ``total`` parts of the work are done.
+
+    ``total`` is 0 if the number of parts is unknown. ``began`` is the time at which the stage started.
+    """
 
     __slots__ = ("_end", "_stack", "began", "done", "name", "total")
 
@@ -37,7 +39,7 @@ class Stage:
 
     @property
     def seconds(self) -> float:
-        """Duration in seconds, once the stage is over."""
+        """Duration in seconds of a stage that has ended."""
         return self._end - self.began
 
     def __str__(self) -> str:
@@ -46,14 +48,14 @@ class Stage:
         return f"{self.name}, {self.done}" if self.done else self.name
 
 
-#: Function that is called at the start and at the end of each stage, with the active stages, outermost first.
+#: Observer of a compilation: it is called with the active stages, outermost first, when a stage starts or ends.
 Watcher = Callable[[tuple[Stage, ...]], None]
 
 stage = Stage
 
 
 class _Here(threading.local):
-    """The active stages of one thread, and their observer."""
+    """The active stages of one thread, and the observer of its stages."""
 
     def __init__(self) -> None:
         self.stages: list[Stage] = []
@@ -65,7 +67,7 @@ _here = _Here()
 
 @contextmanager
 def watched(watcher: Watcher) -> Iterator[None]:
-    """Context in which ``watcher`` receives the stages of this thread."""
+    """Context in which the function ``watcher`` is called with the active stages of this thread."""
     previous_watcher, _here.watcher = _here.watcher, watcher
     try:
         yield

@@ -1,4 +1,4 @@
-"""Opening of files for reading, restricted to regular files.
+"""Opening of files for reading; everything other than a regular file is refused.
 
 A pipe or a terminal would block the reader, and devices such as /dev/zero have no end.
 """
@@ -16,10 +16,11 @@ from typing import BinaryIO
 def opened(path: str | Path) -> BinaryIO:
     """Open a regular file for reading bytes.
 
-    Raises `OSError` with the path for anything else, and `ValueError` for a path with a null character.
+    Raises `OSError` with the path for everything other than a regular file, and `ValueError` for a path with a null
+    character.
     """
-    # The type is checked on the open file, so that nobody can replace the file between check and opening. Opening
-    # without blocking lets pipes fail too.
+    # The type is checked after the file was opened, so that nobody can replace the file between check and opening.
+    # Opening without blocking makes pipes return too, so that they can be refused.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     mode = os.fstat(descriptor).st_mode
     if stat.S_ISREG(mode):

@@ -1,7 +1,7 @@
-"""Registry of the targets, the languages in which phigen writes solvers.
+"""Registry of the targets: the languages in which phigen writes solvers, and the devices that run solvers.
 
 Other lists of targets derive from this one: choices of the command line, allowed values in specs, suffixes of generated
-files, targets that can be loaded. Emitters and loaders are imported on request.
+files, targets that can be loaded. The modules that print and load code are imported on request.
 """
 
 from __future__ import annotations
@@ -42,18 +42,21 @@ class Target:
     device: bool = False
 
     def emit(self, program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
-        """Return file names and contents; ``command`` is the command line that regenerates the files."""
+        """Print a program in the language of the target, and return the files (name → text).
+
+        ``command`` is the command line that regenerates the files; it is written into their headers.
+        """
         options = {"single_file": True} if single_file and self.single_file else {}
         return cast(dict[str, str], import_module(self.emitter).emit(program, command, **options))
 
     def expect_offered(self, program: Program) -> None:
-        """Raise the `SpecError` with which ``emit`` would refuse a program."""
+        """Raise `SpecError` if the target cannot express the program, as ``emit`` would."""
         refuse = getattr(import_module(self.emitter), "expect_offered", None)
         if refuse is not None:
             refuse(program)
 
     def load(self, files: Mapping[str, str], interface: Interface, device: int | None = None) -> Backend:
-        """Return the back end that runs generated files; ``device`` is the number of a device. Raises
+        """Return the loaded solver of generated files; ``device`` is the number of a device. Raises
         `ToolchainError`."""
         options = {} if device is None else {"device": device}
         return cast("Backend", import_module(self.loader).load(files, interface, **options))
@@ -75,18 +78,18 @@ _LISTED = (
     Target("js", "JavaScript", (".mjs",), "phigen.targets.js.emitter"),
 )
 
-#: The targets by name.
+#: The targets that are languages, by name.
 TARGETS: Mapping[str, Target] = {target.name: target for target in _LISTED}
 
 _DEVICE = TARGETS["device"]
 
-#: The devices by name; they run the files of the target device.
+#: The targets that are devices, by name; they run the files that are printed for the device.
 DEVICES: Mapping[str, Target] = {
     name: replace(_DEVICE, name=name, title=title, loader=f"phigen.runtime.devices.{name}", device=True)
     for name, title in (("opencl", "OpenCL"), ("cuda", "CUDA"))
 }
 
-#: Default targets of specs, and targets that Python can load.
+#: Names of the targets that a spec has if it names none, and of the targets that Python can load.
 DEFAULT = tuple(target.name for target in _LISTED if target.default)
 LOADABLE = tuple(target.name for target in _LISTED if target.loader)
 
@@ -95,7 +98,7 @@ RUNNABLE = (*LOADABLE, *DEVICES)
 
 
 def find(name: str) -> Target:
-    """Return the target or device of that name. Raises `ValueError` with a hint if there is none."""
+    """Return the target, a language or a device, of that name. Raises `ValueError` with a hint if there is none."""
     if name in DEVICES:
         return DEVICES[name]
     if name not in TARGETS:
@@ -113,7 +116,10 @@ def find(name: str) -> Target:
 
 
 def automatic(*, compiler: bool) -> str:
-    """Return the name of the first target that Python can load; ``compiler`` says whether there is a C compiler."""
+    """Return the name of the target that ``auto`` stands for, the first that Python can load.
+
+    ``compiler`` says whether there is a C compiler; without one, targets that need it are left out.
+    """
     return next(name for name in LOADABLE if compiler or not TARGETS[name].compiled)
 
 
@@ -123,11 +129,12 @@ def suffixes(targets: Iterable[str] = TARGETS) -> list[str]:
 
 
 def loadable(targets: Iterable[str]) -> tuple[str, ...]:
-    """Return the targets, among those given by name, that Python can load."""
+    """Return the names of those of the ``targets`` whose solvers Python can load."""
     return tuple(target for target in targets if target in LOADABLE)
 
 
 def target_of(files: Iterable[str], name: str) -> Target:
-    """Return the target of the files of a solver, by the name of its main file; ``name`` is the name of the solver."""
+    """Return the target in whose language the files of the solver ``name`` are written, by the name of the main
+    file."""
     file_names = set(files)
     return next(target for target in _LISTED if f"{name}{target.suffixes[0]}" in file_names)

@@ -1,4 +1,4 @@
-"""Locations of templates and bundled specs, which a wheel has inside the package and a checkout beside it."""
+"""Paths of the templates and of the bundled specs: inside the package in a wheel, beside the package in a checkout."""
 
 from __future__ import annotations
 
@@ -26,38 +26,38 @@ def bundled_specs() -> Path:
 
 
 def bundled() -> dict[str, Path]:
-    """Return the paths of the bundled spec files by name, lattices last."""
+    """Return the names of the bundled specs with the paths of their files, lattices last."""
     folder = bundled_specs()
     files = [*sorted(folder.glob("*.yaml")), *sorted(folder.glob("lattices/*.yaml"))]
     return {path.stem: path for path in files}
 
 
 def bundled_name(file: str) -> str | None:
-    """Return the name of a bundled spec by the path of its file; None for other files."""
+    """Return the name of a bundled spec, if ``file`` is the path of its file; None for other files."""
     path = Path(file)
     return path.stem if path.is_absolute() and bundled().get(path.stem) == path else None
 
 
 def file_of(source: str) -> str:
-    """Return the path of a spec file: ``source`` if this is a file, or else the bundled spec of that name.
+    """Return the path of a spec file: ``source`` if this is a file, or else the bundled spec with the name ``source``.
 
     If there is neither, ``source`` is returned unchanged.
     """
     try:
         exists = Path(source).is_file()
-    except OSError:  # the text is too long for a file name
+    except OSError:  # the text cannot be a path: it is too long for a file name
         exists = False
     return source if exists else str(bundled().get(source, source))
 
 
 def missing(source: str) -> Diagnostic:
-    """Return the error for a text that names neither a file nor a bundled spec, with a hint."""
+    """Return the error for a ``source`` that is neither a file nor the name of a bundled spec, with a hint."""
     also = "" if set(source) & {"/", "."} else ", and no bundled spec has that name"
     return Diagnostic(f"there is no file {source!r}{also}", hint=suggestion(source))
 
 
 def suggestion(source: str) -> str:
-    """Return the hint for a spec that was not found: a bundled spec or a file with a similar name, or how to list the
+    """Return a hint for a spec that was not found: a similar name of a spec or file, or the command that lists the
     specs."""
     from difflib import get_close_matches
 
@@ -76,7 +76,8 @@ def suggestion(source: str) -> str:
 
 
 def _find(name: str) -> Path:
-    # The checkout is tried second, since beside an installed package there may be an unrelated folder of that name.
+    # In a checkout the folder is beside the package. This is tried second: beside an installed package, an unrelated
+    # folder may have the same name.
     for folder in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):
         if folder.is_dir():
             return folder

@@ -1,4 +1,4 @@
-"""Runs of solvers as functions of PyTorch, with gradients. Needs torch.
+"""Runs of solvers as functions of PyTorch, with gradients. Needs the package torch.
 
 The solver runs on the CPU, in double precision. Gradients are computed by `Solver.pullback`; there are no second
 derivatives.
@@ -31,13 +31,13 @@ def propagator(
 ) -> Callable[..., Any]:
     """Return the run of a solver as a function f(x0, parameters={}) of tensors, with gradients exact to round-off.
 
-    ``x0`` has the shape (…, DIM), and so has the result, the last state. With a ``stride``, the result has all rows of
+    f returns the last state, of the same shape (…, DIM) as ``x0``. With a ``stride``, f returns all rows of
     `Solver.integrate`, (…, rows, DIM). For a lattice, DIM stands for (coordinates, *sizes). ``parameters`` are tensors
-    by name, whose shapes broadcast to (…); other parameters have their defaults. Results have the precision and the
-    device of ``x0``.
+    by name, whose shapes broadcast to (…); missing ones have their defaults. Results have the precision and the device
+    of ``x0``.
 
-    Gradients need a solver compiled with ``adjoint=True``. Further arguments, such as ``bonds=``, apply to all runs of
-    the function, which raises `StepError`.
+    Gradients need a solver compiled with ``adjoint=True``. Further arguments, such as ``bonds=``, apply to all runs. f
+    raises `StepError` if a step fails.
     """
     runs = Propagation(solver, h, steps, stride, t0, shared)
 
@@ -50,7 +50,7 @@ def propagator(
 
 
 class _DifferentiableRun(torch.autograd.Function):  # type: ignore[misc]
-    """PyTorch function of a run, with its transposed derivative for the backward pass."""
+    """Function of PyTorch that integrates a run, and whose backward pass is the transposed derivative of the run."""
 
     @staticmethod
     def forward(runs: Propagation, names: tuple[str, ...], x0: Any, *values: Any) -> Any:

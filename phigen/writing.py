@@ -1,7 +1,7 @@
-"""Atomic writing: a file, or several files together, are written completely or not at all.
+"""Atomic writing of files: a file, or several files together, are written completely or not at all.
 
-Contents are first written to temporary files in the same folder, which replace the files when all are on the disk. So
-readers never see incomplete files, and a full disk leaves the old files unchanged. Errors name the file.
+Contents are first written to temporary files in the same folder, which replace the files when all contents are on the
+disk. So readers never see incomplete files, and a full disk leaves the old files unchanged. Errors name the file.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-#: Folders whose entries are devices or open file descriptors, which are written directly rather than replaced.
+#: Folders whose entries are devices or open file descriptors. They are written directly, since they cannot be replaced.
 _DEVICES = ("/dev/", "/proc/")
 
 
 @contextmanager
 def naming(path: str | Path) -> Iterator[None]:
-    """Context in which errors of the operating system name this file.
+    """Context in which errors of the operating system get this file's name.
 
-    Errors of a full disk name no file, and errors of a temporary file name one that users do not know.
+    Without it, errors of a full disk name no file, and errors of a temporary file name a file that users do not know.
     """
     try:
         yield
@@ -31,7 +31,7 @@ def naming(path: str | Path) -> Iterator[None]:
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Replace a file atomically, or write to a device or a pipe. Raises `OSError` that names the file."""
+    """Replace a file atomically; devices and pipes are written directly. Raises `OSError` with the name of the file."""
     if str(path).startswith(_DEVICES) or (path.exists() and not path.is_file()):
         with naming(path):
             path.write_bytes(_encoded(content))
@@ -41,7 +41,8 @@ def write(path: Path, content: str | bytes) -> None:
 
 
 def write_all(contents: Mapping[Path, str | bytes]) -> None:
-    """Replace all files or none; missing folders are created. Raises `OSError` that names the file with the error."""
+    """Replace all files or none; missing folders are created. Raises `OSError` with the name of the file that
+    failed."""
     pending: list[_Pending] = []
     with ExitStack() as cleanup:
         for path, content in contents.items():
@@ -58,9 +59,9 @@ def write_all(contents: Mapping[Path, str | bytes]) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Context with a binary file to write, which replaces ``path`` at the end. Raises `OSError` that names ``path``.
+    """Context with a binary file to write, which replaces ``path`` at the end. Raises `OSError` with this path.
 
-    If the context raises, ``path`` remains unchanged.
+    If the body of the context raises an exception, ``path`` remains unchanged.
     """
     pending = _Pending(path)
     try:
@@ -86,7 +87,7 @@ class _Pending:
         self._temporary = Path(temporary)
 
     def settle(self) -> None:
-        """Write everything to the disk, which reports only now if it is full."""
+        """Write buffered contents to the disk, so that an error of a full disk is raised now."""
         self.file.flush()
         os.fsync(self.file.fileno())
         self.file.close()
@@ -116,14 +117,14 @@ def _make_folder(folder: Path, cleanup: ExitStack) -> None:
 
 
 def _remove_folder(folder: Path) -> None:
-    with suppress(OSError):  # not empty: another process has created a file in the folder
+    with suppress(OSError):  # the folder is not empty: another process has created a file in it
         folder.rmdir()
 
 
 def _mode(path: Path) -> int:
-    """Return the permissions of the file to be replaced, or of a new file if there is none.
+    """Return the permissions of the file that is replaced or, if there is none, those of a new file.
 
-    Temporary files need them explicitly, since mkstemp creates files that only their owner can read.
+    They must be set explicitly, since mkstemp creates temporary files that only their owner can read.
     """
     try:
         return path.stat().st_mode & 0o777
@@ -134,5 +135,5 @@ def _mode(path: Path) -> int:
 
 
 def _encoded(content: str | bytes) -> bytes:
-    # Names of files that are no valid UTF-8 contain surrogates, which are written as escapes.
+    # A text may contain names of files that are no valid UTF-8; their surrogates are written as escapes.
     return content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")
