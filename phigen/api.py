@@ -1,9 +1,9 @@
 """The functions of phigen for Python: `load` a system, `compile` it to a solver, get its `formulas` in sympy.
 
-    import phigen
-    system = phigen.load("rigid_body.yaml")
-    solver = phigen.compile(system, target="c", order=4)
-    trajectory = solver.integrate([1, 1, 1], h=0.05, steps=20_000, stride=10, I2=2.5)
+import phigen
+system = phigen.load("rigid_body.yaml")
+solver = phigen.compile(system, target="c", order=4)
+trajectory = solver.integrate([1, 1, 1], h=0.05, steps=20_000, stride=10, I2=2.5)
 """
 
 from __future__ import annotations
