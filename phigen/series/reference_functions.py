@@ -109,9 +109,8 @@ class Functions:
 
         False is no proof of the contrary: the relations between the functions did not reduce the element to 0.
         """
-        for f in reversed(
-            self._generators
-        ):  # in reverse order, since the relation of f contains earlier functions only
+        # The functions are treated in reverse order, since the relation of a function contains earlier functions only.
+        for f in reversed(self._generators):
             relation = _relation(f)
             if relation is None:
                 continue

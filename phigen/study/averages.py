@@ -1,8 +1,8 @@
 """Time averages of observables along a run, with standard errors from block averages.
 
 Successive rows of a run are correlated, so the standard error of their mean is estimated from means of blocks that are
-longer than the correlation time. The length of the blocks is doubled whenever their number reaches twice the requested
-one (Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461), so the memory does not depend on the length of the run.
+longer than the correlation time. Whenever there are twice as many blocks as requested, pairs of blocks are merged
+(Flyvbjerg and Petersen, J. Chem. Phys. 91 (1989) 461). So the memory does not depend on the length of the run.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ from phigen.spec.model import Run
 #: Default number of blocks for the standard error. With 20 blocks, the standard error itself has a
 #: relative standard deviation of 1/sqrt(2·19) = 0.16.
 BLOCKS = 20
-#: Least length of blocks in correlation times τ. For blocks of length L, the variance of their means is underestimated
-#: by the factor 1 − τ/L, 10 % here.
+#: Least length of blocks, in correlation times τ, for a reliable error. Means of blocks of length L give 1 − τ/L times
+#: the true variance of the mean; at this length they underestimate it by 10 %.
 LEAST_LENGTH = 10.0
-#: Relative range of an observable below which it is conserved up to the error of the method; its mean needs no blocks.
+#: An observable counts as conserved, up to the error of the method, if its values differ by less than this fraction of
+#: their size. Then its mean counts as resolved, whatever the length of the blocks.
 CONSERVED = 1e-6
 
 
@@ -33,9 +34,9 @@ CONSERVED = 1e-6
 class Average:
     """Statistics of one observable over the rows of a run.
 
-    ``error`` is the standard error of the mean, NaN with fewer than two blocks. ``correlation_time`` is the integrated
-    autocorrelation time in the time unit of the run. Both are estimated from blocks. ``resolved`` says that blocks are
-    much longer than the correlation time; otherwise both estimates are too small.
+    ``error`` is the standard error of the mean, NaN if there are fewer than two blocks. ``correlation_time`` is the
+    integrated autocorrelation time in the time unit of the run. Error and correlation time are estimated from blocks.
+    ``resolved`` says that the blocks are much longer than the correlation time; otherwise both estimates are too small.
     """
 
     mean: float
@@ -48,10 +49,10 @@ class Average:
 
 
 class Averages:
-    """Running averages of ``width`` observables; ``state`` is the complete state of the accumulation, as arrays.
+    """Running averages of ``width`` observables; ``state`` has all intermediate results, as arrays that can be saved.
 
-    Rows before the time ``after``, in the direction of the run, are left out. The standard errors come from ``blocks``
-    to 2·``blocks`` − 1 blocks as soon as there are at least ``blocks`` rows.
+    Rows before the time ``after`` are left out; in a run backwards in time, rows after it. The standard errors come
+    from at least ``blocks`` and fewer than 2·``blocks`` blocks, as soon as there are ``blocks`` rows.
     """
 
     def __init__(
@@ -73,12 +74,12 @@ class Averages:
 
     @property
     def count(self) -> int:
-        """Number of rows so far."""
+        """Number of rows that have been averaged so far."""
         return int(self.state["count"])
 
     @property
     def times(self) -> tuple[float, float]:
-        """Times of the first and the last row; NaN if there are no rows."""
+        """Times of the first and the last row that were averaged; NaN if there are none."""
         first, last = self.state["times"].tolist()
         return first, last
 
@@ -150,11 +151,12 @@ class Averages:
 def averages(
     trajectory: Trajectory | LatticeTrajectory | LatticeSeries, *, after: float | None = None, blocks: int | None = None
 ) -> dict[str, Average]:
-    """Return the averages over time of the observables of a trajectory, or of the columns of a series, by name.
+    """Return the time averages of the observables of a trajectory, or of the columns of a series, by name.
 
-    The averages are over the rows from the time ``after`` on, with standard errors from at least ``blocks`` blocks. A
-    trajectory does not contain the setting ``average:`` of its run: to reproduce the numbers of ``phigen run`` and of
-    sweeps, pass its ``after`` and ``blocks``. Fields of lattices, with a value at each site, are left out.
+    Rows from the time ``after`` on are averaged; standard errors come from at least ``blocks`` blocks. A trajectory
+    does not contain the setting ``average:`` of its run. To obtain the numbers of ``phigen run`` and of sweeps, pass
+    the values of ``after`` and ``blocks`` in that setting. Observables of lattices with a value at each site are left
+    out.
     """
     column_values = trajectory.columns if isinstance(trajectory, LatticeSeries) else trajectory.observables
     columns = {name: values for name, values in column_values.items() if np.ndim(values) == 1}
@@ -164,7 +166,7 @@ def averages(
 
 
 def averages_of(run: Run, width: int) -> Averages:
-    """Return empty averages of ``width`` observables, over the rows that the run selects."""
+    """Return an accumulator for averages of ``width`` observables, with the setting ``average:`` of a run."""
     choice = run.average
     start_time = None if choice.after is None else float(choice.after)
     return Averages(width, after=start_time, backwards=run.step < 0, blocks=choice.blocks)

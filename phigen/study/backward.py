@@ -1,8 +1,8 @@
 """Measurement of the modified Hamiltonian (backward error analysis) along trajectories of a solver.
 
-A step agrees to all orders in h with the exact flow of H̃ = H + h^p H_p + … . With m corrections, H̃ is constant along
-the numerical solution up to O(h^q), where q is the power of the first omitted term. Each correction raises q by one, or
-by two for a symmetric method.
+A step agrees to all orders in h with the exact flow of the modified Hamiltonian H̃ = H + h^p H_p + … . If H̃ is
+truncated after m corrections, it is constant along the numerical solution up to O(h^q), where q is the power of the
+first omitted term. Each correction raises q by one, or by two for a symmetric method.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from phigen.study.methods import Method
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
-#: Number of corrections of the modified Hamiltonian, and the largest order of a method for which they are computed.
+#: Number of corrections of the modified Hamiltonian, and largest order of a method for which corrections are computed.
 CORRECTIONS, MOST_ORDER = 2, 6
-#: Steps made at the largest step size; number of doublings of the run's step and of halvings of the largest step that
-#: are tried.
+#: STEPS: number of steps at the largest step size. DOUBLINGS: how often the step of the run is doubled to find that
+#: size. HALVINGS: how often it is then halved for the measurement.
 STEPS, DOUBLINGS, HALVINGS = 16, 8, 6
-#: ROUNDING: changes of H̃ below this fraction of the terms of H are rounding errors. ASYMPTOTIC: changes of H above
-#: this fraction show that the steps are too large to determine an order.
+#: ROUNDING: changes of H̃ below this fraction of the largest term of H are rounding errors. ASYMPTOTIC: if H changes by
+#: more than this, in units of the energy, the steps are too large to determine an order.
 ROUNDING, ASYMPTOTIC = 1e-13, 1e-3
 
 
@@ -38,9 +38,10 @@ class NotOfferedError(ValueError):
 
 @dataclass(frozen=True)
 class ModifiedHamiltonian:
-    """Terms of H̃ = Σ h^j terms[j], in which all symbols except the coordinates have numerical values.
+    """Modified Hamiltonian H̃ = Σ h^j terms[j]; ``values`` has the values of all symbols except the coordinates.
 
-    With m corrections, H̃ consists of the first powers[m] terms. ``hamiltonian`` is H; errors are in units of H.
+    With m corrections, H̃ consists of the first powers[m] terms. ``hamiltonian`` is H, from which the unit of the
+    errors follows.
     """
 
     terms: tuple[Expression, ...]
@@ -50,7 +51,10 @@ class ModifiedHamiltonian:
     values: Mapping[str, float]
 
     def errors(self, rows: Floats, h: float) -> Floats:
-        """Return |H̃(x_n) − H̃(x_0)| with 0, 1, … corrections along steps of size h, (corrections + 1, rows)."""
+        """Return |H̃(x_n) − H̃(x_0)| for H̃ with 0, 1, … corrections, as an array (corrections + 1, rows).
+
+        ``rows`` are the states x_n after steps of size h. The errors are in units of the energy.
+        """
         values = {**self.values, **{c: rows[:, i] for i, c in enumerate(self.coordinates)}}
         terms = [np.broadcast_to(t, len(rows)) for t in evaluate(list(self.terms), values)]
         sums: Floats = np.array([sum(h**j * t for j, t in enumerate(terms[:power])) for power in self.powers])
@@ -58,12 +62,15 @@ class ModifiedHamiltonian:
         return errors
 
     def unit(self, x: Floats) -> Unit:
-        """Return the unit of the energy along trajectories from a state (DIM,)."""
+        """Return the unit in which energy errors of trajectories from the state ``x`` (DIM,) are measured."""
         (unit,) = units([self.hamiltonian], self.coordinates, self.values, x)
         return unit
 
     def changes(self, method: Method, x: Floats, h: float, steps: int) -> Floats:
-        """Return the largest of the `errors` within ``steps`` steps from x, (corrections + 1,). Raises `StepError`."""
+        """Return the largest change of H̃ with 0, 1, … corrections within ``steps`` steps from x, (corrections + 1,).
+
+        Changes are in units of the energy. Raises `StepError` if a step fails.
+        """
         changes: Floats = self.errors(method.rows(x, h, steps, 1), h).max(axis=1)
         if not np.isfinite(changes).all():
             raise StepError(
@@ -89,7 +96,8 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
         raise NotOfferedError("with forces a step is not the flow of a Hamiltonian")
     if order.order > MOST_ORDER:
         raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
-    # Numerical parameters make the terms shorter, but the series may not be able to represent roots of them.
+    # With numbers for the parameters the terms are shorter. If the series cannot represent roots of these numbers, it
+    # is computed with symbols.
     chart = compilation.by_series().realisation
     exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
     for exact_values in (exact, {}):
@@ -113,9 +121,9 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
 
 
 def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> list[float]:
-    """Return the powers of h with which the changes of H̃ with 0, 1, … corrections decrease; infinity at rounding level.
+    """Return the powers of the step size with which the changes of H̃ with 0, 1, … corrections decrease.
 
-    The run's step ``h`` is doubled until the changes exceed the rounding errors.
+    The step ``h`` of the run is doubled until the changes exceed rounding errors; a power is infinite if they never do.
     """
     observed, rounding = [math.inf] * len(hamiltonian.powers), ROUNDING * hamiltonian.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
@@ -128,7 +136,7 @@ def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats,
         if doubling > 1 and coarse[0] > ASYMPTOTIC:
             break
         if fine[0] <= rounding:
-            continue  # an exactly conserved energy shows no order
+            continue  # H changes by rounding errors only, from which no order follows: double the step again
         for m, (coarse_change, fine_change) in enumerate(zip(coarse.tolist(), fine.tolist(), strict=True)):
             if math.isinf(observed[m]) and fine_change > rounding:
                 observed[m] = math.log2(coarse_change / fine_change)
@@ -137,11 +145,12 @@ def observed_powers(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats,
 
 @dataclass(frozen=True, eq=False)
 class Constancy:
-    """Changes of H̃ with 0, 1, … corrections; ``powers[m]`` is the expected power of the step with m corrections.
+    """Measured changes of the modified Hamiltonian H̃ with m = 0, 1, … corrections.
 
-    ``errors`` (corrections + 1, rows) are the changes at ``times`` (rows,), up to ``end``, with steps of size ``step``.
-    ``changes`` (sizes, corrections + 1) are the largest changes for each of the step sizes ``sizes``, in descending
-    order.
+    With m corrections, the changes should decrease with the power ``powers[m]`` of the step size; ``observed[m]`` is
+    the measured power. ``errors`` (corrections + 1, rows) are the changes at ``times`` (rows,), up to ``end``, with
+    steps of size ``step``. ``changes`` (sizes, corrections + 1) are the largest changes for each of the step sizes
+    ``sizes``, in descending order.
     """
 
     powers: tuple[int, ...]
@@ -155,9 +164,10 @@ class Constancy:
 
 
 def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: float) -> Constancy:
-    """Measure the changes of H̃ at the largest steps that show an order; these may be larger than the run's step.
+    """Measure the changes of H̃ at the largest step sizes that still show an order.
 
-    Raises `StepError`, and `NotOfferedError` if H itself changes only by rounding errors.
+    These sizes may be larger than the step ``h`` of the run. Raises `StepError` if a step fails, and `NotOfferedError`
+    if H itself changes by rounding errors only.
     """
     largest, most, rounding = h, 0.0, ROUNDING * hamiltonian.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
@@ -172,7 +182,7 @@ def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: fl
         raise NotOfferedError("H itself changes by no more than rounding")
     sizes: Floats = largest / 2.0 ** np.arange(HALVINGS + 1, dtype=np.float64)
     changes = np.array([hamiltonian.changes(method, x, size, STEPS * 2**k) for k, size in enumerate(sizes.tolist())])
-    # Indices of steps at which the change of H̃ with all corrections exceeds the rounding errors.
+    # Indices of the step sizes for which the change of H̃ with all corrections exceeds rounding errors.
     telling = np.flatnonzero(changes[:, -1] > rounding)
     shown_step = float(sizes[telling[-1] if len(telling) else 0])
     rows = method.rows(x, shown_step, round(STEPS * largest / shown_step), 1)
@@ -191,5 +201,5 @@ def constancy(hamiltonian: ModifiedHamiltonian, method: Method, x: Floats, h: fl
 
 
 def truncation(m: int) -> str:
-    """Return the name of H̃ with m corrections."""
+    """Return words for H̃ with m corrections: "H itself" for m = 0, else "H̃ with 1 correction" and so on."""
     return "H itself" if m == 0 else f"H̃ with {m} correction{'s' * (m > 1)}"

@@ -1,9 +1,9 @@
-"""Energy balance if H depends on the time or forces act: H − ∫ P dt is constant along the motion, H is not.
+"""Energy balance of systems in which H depends on the time, or forces act: H − ∫ P dt is constant along the motion.
 
-P = ∂_tH + ∇H·(πζ + f) is the power supplied by the explicit time dependence and by the forces. The integral is
-evaluated between successive stored states by Hermite's rule of order 8. The rule needs only P and its first three
-derivatives along the motion at both ends of an interval, so the integral can be continued state by state, at any
-spacing. The difference from the rule of order 6 estimates the error.
+P = ∂_tH + ∇H·(πζ + f) is the power supplied by the explicit time dependence and by the forces ζ and f, so that ∫ P dt
+is the work. It is integrated between successive stored states by Hermite's rule of order 8, which uses P and its first
+three derivatives along the motion at both ends of an interval. So the integral can be continued state by state, with
+any spacing in time. The difference from the rule of order 6 estimates the error.
 """
 
 from __future__ import annotations
@@ -14,13 +14,16 @@ from phigen.geometry.system import System
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import ONE, Expression, gradient, total
 
-#: Weights of f, f′, … at both ends of an interval of length 1, for the rules of order 8 and of order 6.
+#: Weights of f, f′, f″, f‴ at the ends of an interval of length 1, for the rule of order 8 and that of order 6. At the
+#: second end, weights of odd derivatives change their sign.
 FINE, COARSE = (1 / 2, 3 / 28, 1 / 84, 1 / 1680), (1 / 2, 1 / 10, 1 / 120, 0.0)
 
 
 def powers(system: System) -> list[Expression]:
-    """Return P and its derivatives along the motion; no expressions if H is an invariant, or if noise changes H as
-    well."""
+    """Return the power P = dH/dt and its first three time derivatives along the motion, as expressions.
+
+    The list is empty if H is constant along the motion, or if noise changes H as well.
+    """
     if not system.driven or system.noise:
         return []
     time_derivatives, field = [], [*system.vector_field(), *(ONE for _ in system.times)]
@@ -33,7 +36,8 @@ def powers(system: System) -> list[Expression]:
 
 
 def works(t: Floats, f: Floats) -> tuple[Floats, Floats]:
-    """Return ∫ f dt over each interval between times (rows,), and the estimated errors.
+    """Return the integrals of f between successive times ``t`` (rows,), and estimates of their errors, (rows − 1,)
+    each.
 
     ``f`` (4, rows) has the values of f and of its first three derivatives.
     """

@@ -1,4 +1,4 @@
-"""Classical one-step methods of fixed step size, for comparison; they use only the vector field."""
+"""Classical one-step methods of fixed step size, with which solvers are compared. They use the vector field only."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from phigen.runtime.interface import row_steps
 from phigen.study import dop853
 
 Floats = NDArray[np.float64]
-#: The methods with which a solver is compared if the run names none.
+#: Methods with which a solver is compared if the run has no key ``compare``.
 COMPARED = ("rk4",)
 
 Field = Callable[[Floats], Floats]
 Step = Callable[[Field, Floats, float], Floats]
 
-#: Largest number of fixed-point iterations of the implicit midpoint rule; each reduces the error by a factor O(h).
+#: Largest number of fixed-point iterations in a step of the implicit midpoint rule. Each multiplies the error by O(h).
 _ITERATIONS = 100
 _TOLERANCE = 4e-16
-#: Number of steps in one part of a long run.
+#: Number of steps after which a long run yields its rows so far, so that the memory is bounded.
 _PIECE = 500
 
 
@@ -52,7 +52,7 @@ def implicit_midpoint(f: Field, x: Floats, h: float) -> Floats:
         last, size = size, float(np.max(np.abs(following - change)))
         change = following
         floor = _TOLERANCE * float(np.max(np.abs(x)))
-        # At rounding level the corrections no longer shrink.
+        # The iteration ends when corrections are rounding errors: below the floor, or near it and no longer decreasing.
         if size <= floor or (size <= 100 * floor and size >= last):
             return x + change
         if not np.isfinite(size):
@@ -61,7 +61,7 @@ def implicit_midpoint(f: Field, x: Floats, h: float) -> Floats:
 
 
 def dormand_prince(f: Field, x: Floats, h: float) -> Floats:
-    """Return the state after a step of DOP853 with fixed step size, order 8."""
+    """Return the state after a step of size h of DOP853, the method of Dormand and Prince of order 8."""
     stages: list[Floats] = []
     for row in dop853.A:
         stages.append(f(x + h * _combination(stages, row)))
@@ -72,7 +72,7 @@ def _combination(stages: list[Floats], weights: Mapping[int, float]) -> Floats |
     return sum((w * stages[j] for j, w in weights.items()), 0.0)
 
 
-#: Methods by their name in a spec, with their order.
+#: Step functions of the methods, with their orders, by the name of the method in a spec.
 METHODS: Mapping[str, tuple[Step, int]] = {
     "euler": (euler, 1),
     "rk2": (rk2, 2),
@@ -83,8 +83,10 @@ METHODS: Mapping[str, tuple[Step, int]] = {
 
 
 def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, stride: int = 1) -> Floats:
-    """Return the states (rows, DIM) after 0, stride, 2·stride, … steps and after the last; rows after a failure are
-    NaN."""
+    """Return the states (rows, DIM) after 0, stride, 2·stride, … steps and after the last step.
+
+    If the method fails, the rows from the failure on are NaN.
+    """
     rows = row_steps(steps, stride)
     row_parts = [x for _, x in pieces_of(method, field, x0, h, rows.tolist())]
     states = np.full((len(rows), len(x0)), np.nan)
@@ -96,10 +98,11 @@ def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, strid
 def pieces_of(
     method: str, field: Field, x0: Floats, h: float, rows: Iterable[float]
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Yield parts of a run: increasing step numbers (rows,), from 0 on, and the states (rows, DIM) at these.
+    """Yield the rows of a run in parts: arrays of step numbers (rows,) and of the states (rows, DIM) at these steps.
 
-    A fractional step number is reached from the step before it by a shorter step; the run does not continue from there.
-    If the method fails, the run ends with the last finite row.
+    ``rows`` are the increasing step numbers, from 0 on, at which states are wanted. A number may have a fraction: that
+    state is computed by a shorter step from the last whole step, and the run continues from the whole step. If the
+    method fails, the run ends with the last finite row.
     """
     step, _ = METHODS[method]
     x = np.array(x0, dtype=np.float64)
@@ -111,7 +114,8 @@ def pieces_of(
         whole_steps = round(number) if abs(number - round(number)) <= 1e-12 * max(1.0, number) else int(number)
         while steps_done < whole_steps:
             with np.errstate(all="ignore"):
-                # Compensated summation, as in phigen's solvers, so that the comparison concerns the methods only.
+                # The steps are added by compensated summation, as in solvers of phigen, so that differences of results
+                # come from the methods alone.
                 change = (step(field, x, h) - x) + carry
                 following = x + change
                 carry = change - (following - x)

@@ -1,7 +1,8 @@
 """DOP853: the twelve stages of the eighth-order method of Dormand and Prince.
 
 E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd edition, Springer, 1993,
-section II.10. ``A[i]`` maps the index of an earlier stage to its weight in stage i; ``B`` are the weights of the step.
+section II.10. ``A[i]`` maps the index of an earlier stage to its weight in stage i. ``B`` maps the index of a stage to
+its weight in the step.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Verification of gradients of runs against tangent maps and against finite differences of the runs."""
+"""Verification of gradients of runs: comparison with tangent maps, and with finite differences of the runs."""
 
 from __future__ import annotations
 
@@ -15,36 +15,36 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 
-#: Number of steps and stride of the runs: rows lie within a block of eight steps, at its end, and after a shorter last
-#: stride.
+#: Number of steps and stride of the runs. Rows are after 4, 8 and 11 steps: the reverse pass works in blocks of eight
+#: steps, so that one row lies inside a block, one at its end, and one after a shorter last stride.
 STEPS, STRIDE = 11, 4
-#: Largest difference between a gradient and the transposed tangent maps, relative to their terms: both are exact to
-#: rounding.
+#: Largest accepted difference between a gradient and the product of the transposed tangent maps, relative to their
+#: terms. Both are exact up to rounding.
 TRANSPOSED = 1e-12
-#: Largest difference between a gradient and finite differences of order 6, which is the error of the differences. They
-#: are taken at two displacements, in units of the displaced quantity.
+#: Largest accepted difference between a gradient and finite differences of order 6, whose error is of this size. Below:
+#: the two displacements with which differences are computed, in units of the displaced quantity.
 DIFFERENCES = 1e-7
 _DISTANCES = (2e-3, 2e-3 / 256)
 _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60), (-1, -3 / 4), (-2, 3 / 20), (-3, -1 / 60))
 _FORWARD_WEIGHTS = ((1, 6.0), (2, -15 / 2), (3, 20 / 3), (4, -15 / 4), (5, 6 / 5), (6, -1 / 6))
-#: Derivatives below this fraction of the function value are measured relative to that fraction, as differences cannot
-#: resolve them.
+#: The error of a derivative is relative to the derivative, or to this fraction of the function value if that is larger,
+#: because finite differences cannot resolve smaller derivatives.
 _LEAST = 1e-3
-#: Number of random directions in which a start is displaced, and the largest number of coordinates of which each has
-#: its own tangent vector.
+#: Number of random directions in which the initial state is displaced; and largest number of coordinates for which
+#: tangent vectors are all unit vectors, instead of random vectors.
 _DIRECTIONS, _MOST_COLUMNS = 3, 64
 
-#: Name, value, limit, and the cause if the value exceeds the limit.
+#: Result of a check: its name, the measured value, the limit, and the cause to report if the value exceeds the limit.
 Measured = tuple[str, float, float, str]
 
 
 @dataclass(frozen=True)
 class GradedRun:
-    """Short differentiable run of one target from the state ``x`` (numbers,).
+    """Short run of a solver of one target from the state ``x`` (numbers,), with its derivatives.
 
-    ``rows(x, parameters)`` are the states (rows, numbers), ``pullback(bars)`` the cotangents of x and of the parameters
-    by name. ``carried(vectors)`` are tangent vectors (count, numbers) propagated to each row after the first. ``units``
-    are typical magnitudes of the numbers of a state.
+    ``rows(x, parameters)`` returns the states (rows, numbers). ``pullback(bars)`` returns the cotangents of x and of
+    the parameters, by name, for the cotangents ``bars`` of the rows. ``carried(vectors)`` propagates tangent vectors
+    (count, numbers) to each row after the first. ``units`` are typical magnitudes of the numbers of a state.
     """
 
     x: Floats
@@ -56,7 +56,7 @@ class GradedRun:
     bars: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        """Draw the cotangents of all rows, the same for all targets."""
+        """Draw random cotangents ``bars`` of all rows, with a fixed seed, so that all targets get the same ones."""
         random_bars = np.random.default_rng(1).normal(size=(len(row_steps(STEPS, STRIDE)), len(self.x)))
         object.__setattr__(self, "bars", random_bars / self.units)
 
@@ -64,7 +64,7 @@ class GradedRun:
 def of_solver(
     solver: Solver, x: Floats, units: Floats, h: float, parameters: Mapping[str, float], t0: float
 ) -> GradedRun:
-    """Return a run of an ordinary solver."""
+    """Return the run of a solver without lattice from ``x`` (DIM,) at the time ``t0``, with `STEPS` steps of size h."""
     begin = t0 if solver.interface.time else None
 
     def carried(vectors: Floats) -> Floats:
@@ -88,7 +88,10 @@ def of_solver(
 def of_lattice(
     solver: LatticeSolver, x: Floats, units: Floats, h: float, parameters: Mapping[str, Any], t0: float | None
 ) -> GradedRun:
-    """Return a run of a lattice from ``x`` (coordinates, *sizes); ``units`` are typical magnitudes in this order."""
+    """Return the run of a lattice from ``x`` (coordinates, *sizes), with `STEPS` steps of size h.
+
+    ``units`` are typical magnitudes of the numbers of ``x``, in one dimension.
+    """
     arguments: dict[str, Any] = {"t0": t0}
 
     def carried(vectors: Floats) -> Floats:
@@ -111,10 +114,12 @@ def of_lattice(
 def measured(
     fixed_level_runs: Sequence[GradedRun], free_level_runs: Sequence[GradedRun], place: str = ""
 ) -> Iterator[Measured]:
-    """Yield the errors of gradients of runs, against tangent maps and against finite differences.
+    """Yield the results of two checks of gradients: against tangent maps, and against finite differences.
 
-    ``fixed_level_runs`` have a fixed energy level e, as tangent maps do. The gradients of ``free_level_runs`` include
-    the dependence of e on the initial state and on the parameters.
+    In systems with a monitor, the equations contain the energy level e = −H(x₀). The first check needs runs in which e
+    is fixed (``fixed_level_runs``), since tangent maps hold e fixed. For the second check, gradients of
+    ``free_level_runs`` include the dependence of e on initial state and parameters. ``place`` is added to the names of
+    the checks.
     """
     apart = _largest(fixed_level_runs, transposition_error)
     reason = f"the gradient is not the transpose of the tangent maps, {apart:.1e} off"
@@ -124,7 +129,7 @@ def measured(
 
 
 def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> float:
-    """Return the largest error of all runs; infinity if a run fails or an error is not finite."""
+    """Return the largest value of ``error`` for the runs; infinity if a run fails or a value is not finite."""
     largest = 0.0
     for run in runs:
         try:
@@ -136,9 +141,10 @@ def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> 
 
 
 def transposition_error(run: GradedRun) -> float:
-    """Return the difference between ⟨bar, DΦ v⟩ and ⟨DΦᵀ bar, v⟩, relative to the terms of the former.
+    """Return the largest difference between ⟨bar, DΦ v⟩ and ⟨DΦᵀ bar, v⟩ for several tangent vectors v.
 
-    The v are all unit vectors or, for states of many numbers, random vectors.
+    DΦ v comes from tangent maps, DΦᵀ bar from the gradient of the run. The difference is relative to the sum of the
+    absolute values of the terms of ⟨bar, DΦ v⟩. The v are all unit vectors or, for long states, random vectors.
     """
     count = len(run.x)
     vectors = run.units * (np.eye(count) if count <= _MOST_COLUMNS else _directions(count, _DIRECTIONS))
@@ -152,11 +158,10 @@ def transposition_error(run: GradedRun) -> float:
 
 
 def difference_error(run: GradedRun) -> float:
-    """Return the error of the gradient against finite differences of the run, in random directions and for each
-    parameter.
+    """Return the largest difference between derivatives from the gradient and finite differences of the run.
 
-    The error of each derivative is relative to the derivative or, if that is small, to a fraction of the function
-    value.
+    The derivatives are those along random directions of the initial state, and with respect to each parameter. The
+    difference is relative to the derivative or, if that is small, to a fraction of the function value.
     """
     x_bar, parameters_bar = run.pullback(run.bars)
     least = _LEAST * float(np.sum(np.abs(run.bars * run.rows(run.x, run.parameters))))
@@ -167,22 +172,25 @@ def difference_error(run: GradedRun) -> float:
     return worst
 
 
-#: Function from a displacement to the displaced initial state and parameters.
+#: Function of a distance that returns the initial state and the parameters, displaced by this distance.
 _Moved = Callable[[float], tuple[Floats, Mapping[str, Any]]]
 
 
 def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any]) -> Iterator[tuple[float, _Moved]]:
-    """Yield the directional derivatives according to the gradient, each with the function that makes its
-    displacement."""
+    """Yield directional derivatives computed from the gradient, each with the function that displaces the run.
+
+    The function returns initial state and parameters, displaced by a distance along the direction.
+    """
     for v in _directions(len(run.x), _DIRECTIONS) * run.units:
         yield float(x_bar @ v), lambda e, v=v: (run.x + e * v, run.parameters)  # type: ignore[misc]
     for name, bar in parameters_bar.items():
         value = np.asarray(run.parameters[name], dtype=np.float64)
         largest = float(np.max(np.abs(value), initial=0.0)) or 1.0
-        # Entries that must be positive may differ by powers of ten, so each is displaced in proportion to its size.
+        # Entries of an array may differ by powers of ten and must perhaps stay positive, so each is displaced in
+        # proportion to its size.
         units = np.where(value != 0, np.abs(value), largest)
         v = units * (_directions(value.size, 1).reshape(value.shape) if value.ndim else np.ones(()))
-        v = np.where(value != 0, v, np.abs(v))  # a parameter may have to be 0 or positive
+        v = np.where(value != 0, v, np.abs(v))  # 0 is increased only, since a parameter may have to be nonnegative
         yield (
             float(np.sum(bar * v)),
             lambda e, name=name, value=value, v=v: (run.x, {**run.parameters, name: _as_number(value + e * v)}),  # type: ignore[misc]
@@ -190,16 +198,20 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
 
 
 def _differences(run: GradedRun, displaced: _Moved) -> Iterator[float]:
-    """Yield the derivative along a displacement by finite differences, for each distance at which all runs succeed.
+    """Yield the derivative along a displacement by finite differences, once for each distance in `_DISTANCES`.
 
-    Differences are central, or one-sided if runs on one side fail.
+    Differences are central, or one-sided if a run on the other side fails. A distance at which runs of the one-sided
+    difference fail as well is skipped.
     """
     middle = run.rows(run.x, run.parameters)
     for apart in _DISTANCES:
         for weights in (_WEIGHTS, _FORWARD_WEIGHTS):
             try:
                 changes = [(w, run.rows(*displaced(k * apart)) - middle) for k, w in weights]
-            except (StepError, ValueError):  # beyond a singularity, or outside the bounds of a parameter
+            except (
+                StepError,
+                ValueError,
+            ):  # the displaced run meets a singularity, or violates the bound of a parameter
                 continue
             yield float(sum(w * np.sum(run.bars * change) for w, change in changes)) / apart
             break
@@ -208,7 +220,10 @@ def _differences(run: GradedRun, displaced: _Moved) -> Iterator[float]:
 def members_error(
     solver: Solver, states: Floats, units: Floats, h: float, parameters: Mapping[str, float], t0: float
 ) -> float:
-    """Return the relative difference between gradients of members run as one batch and gradients of single runs."""
+    """Return the largest difference between gradients of an ensemble, run as one batch, and gradients of single runs.
+
+    ``states`` (members, DIM) are the initial states. The difference is relative to the largest entry of the gradients.
+    """
     arguments: dict[str, Any] = {"t0": t0 if solver.interface.time else None, "parameters": parameters}
     bars = _directions(states.shape[1], len(states)) / units
     try:
@@ -222,7 +237,7 @@ def members_error(
 
 
 def _directions(size: int, count: int) -> Floats:
-    """Return random directions, the same at every call."""
+    """Return random vectors (count, size), the same at every call."""
     return np.random.default_rng(2).normal(size=(count, size))
 
 

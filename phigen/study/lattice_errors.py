@@ -1,4 +1,4 @@
-"""Conserved quantities along a run of a lattice: energy, Casimirs, invariants, frame by frame."""
+"""Errors of conserved quantities (energy, Casimirs, invariants) of a lattice at each stored state of a run."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
-#: Names of the energy quantity: conserved energy; energy minus work; change of an energy that is not conserved.
+#: Names of the three quantities that are reported for the energy: the energy if it is conserved; otherwise the energy
+#: minus the work done, or, if the work is not computed, the change of the energy.
 ENERGY, BALANCE, CHANGE = "energy", "energy balance", "change of the energy"
-#: Largest number of steps times sites for which the work is integrated, as this takes a second run, step by step.
+#: Largest number of steps times sites of a run whose work is integrated: this repeats the run step by step.
 MAX_BALANCED_SITE_STEPS = 20_000_000
 
 
 def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
     """Return the deviations of energy, Casimirs and invariants from their initial values, by name, each (frames,).
 
-    Energy and invariants are in the units of `units_of`. A Casimir of sites is reported at the site with the largest
-    change. If H depends on the time, or forces act, the work done is subtracted from the energy, unless the run is too
-    long, continues an earlier run, or contains steps split into parts.
+    Deviations of energy and invariants are in the units of `units_of`. Of a Casimir at every site, the largest change
+    at a site is returned. If H depends on the time, or forces act, the work done is subtracted from the energy, unless
+    the run is too long, continues an earlier run, has noise, or contains steps that were split because they failed.
     """
     errors = _of_energy(cell, run) | run.casimir_changes()
     for name, density in cell.invariants.items():
@@ -40,7 +41,7 @@ def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 
 
 def units_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Unit]:
-    """Return the units of the errors of the energy and the invariants, by name."""
+    """Return the units in which errors of the energy and the invariants of a run are measured, by name."""
     values = {**run.parameters, **{t: float(run.t[0]) for t in cell.times}}
     invariants = {name: summed(cell, density, run.x[0], values) for name, density in cell.invariants.items()}
     units = {name: unit_of(value, terms, SITES) for name, (value, terms) in invariants.items()}
@@ -61,9 +62,9 @@ def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 
 
 def works(cell: Cell, run: LatticeTrajectory) -> tuple[Floats, float]:
-    """Return the work done until each frame (frames,), and an estimate of its error.
+    """Return the work done up to each stored state (frames,), and an estimate of its error.
 
-    The run is integrated once more to evaluate the power after every step.
+    The run is repeated step by step, and the power is evaluated after every step. Raises `StepError` if a step fails.
     """
     power, solver, start_time = Power(cell), run.solver, float(run.t[0])
     session, powers = solver.started(Beginning(run.x[0], run.h, run.parameters, start_time)), []
@@ -83,13 +84,13 @@ def _relative(values: Floats, unit: Unit) -> Floats:
 
 
 def summed(cell: Cell, density: Expression, x: Floats, parameters: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the sum of a density over the sites and the sum of the magnitudes of its terms."""
+    """Return the sum of a density over the sites, and the sum over the sites of the absolute values of its terms."""
     sums = [_term(cell, term, x, parameters) for term in cell.additive_terms(density)]
     return float(sum(values.sum() for values in sums)), float(sum(np.abs(values).sum() for values in sums))
 
 
 def _term(cell: Cell, term: Expression, x: Floats, parameters: Mapping[str, Any]) -> Floats:
-    """Return the values of a term at all sites; 0 if the term reaches beyond an open end."""
+    """Return the values of a term of a density at all sites; 0 where the term needs a site beyond an open end."""
     sizes = x.shape[1:]
     values: dict[str, Any] = {n: v for n, v in parameters.items() if np.ndim(v) == 0}
     for name, (base, offset) in cell.places(term).items():

@@ -1,4 +1,4 @@
-"""Strong orders of steps of lattices with noise, along common Wiener paths, with an independent path for each site."""
+"""Measurement of strong orders of steps of lattices with noise, which has an independent Wiener path for each site."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from phigen.study.stochastic import BEYOND, LEVELS, SEED, SIGNS
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import ZERO
 
-#: Number of coarsest steps along a path.
+#: Number of steps along a path at the largest step size; smaller steps follow the same path.
 STEPS = 2
 
 
@@ -32,11 +32,11 @@ def strong_order(
     h: float,
     paths: int,
 ) -> float:
-    """Return the strong order: the slope of the errors of the NumPy solver with steps h, h/2, h/4, … along common
-    paths.
+    """Return the strong order of the NumPy solver; NaN if a step fails.
 
-    Reference solutions follow the piecewise linear interpolation of each path and use only the vector fields. ``x0``
-    has the shape (fields, *sizes), ``parameters`` are those of a solver. NaN if a step fails.
+    It is the power of the step size with which the error at the end of the same Wiener paths decreases, for the steps
+    h, h/2, h/4, … Reference solutions follow the piecewise linear interpolation of a path; they use only the vector
+    fields. ``x0`` has the shape (fields, *sizes). ``paths`` is the number of paths.
     """
     solver = lattice_solver_of(compilation, "numpy")
     noise = compilation.program.noise
@@ -46,7 +46,7 @@ def strong_order(
     finest = STEPS << (LEVELS + BEYOND)
     random, errors = np.random.default_rng(SEED), np.zeros(LEVELS)
     for _ in range(paths):
-        # one increment for each part of each finest step
+        # The path is given by its increments over equal times: one for each part of each step of the finest size.
         size = np.sqrt(abs(h) * STEPS / finest / parts)
         path = random.normal(size=(finest * parts, kinds, *x0.shape[1:])) * size
         end = _along_lines(solver, fields, x0, parameters, t0, h * STEPS / finest, path, parts)
@@ -63,7 +63,10 @@ def strong_order(
 
 
 def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any], t0: float | None, h: float) -> int:
-    """Return the number of steps from a state that fail with the largest possible increments."""
+    """Return the number of steps that fail, among `SIGNS` steps from a state with the largest possible increments.
+
+    The signs of the increments are random.
+    """
     solver, noise = lattice_solver_of(compilation, "numpy"), compilation.program.noise
     assert noise is not None
     random, failed = np.random.default_rng(SEED), 0
@@ -79,7 +82,7 @@ def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any]
 
 
 def _field(spec: Spec, name: str) -> LatticeSolver:
-    """Return the vector field σ π∇g of a noise source as a solver of a lattice."""
+    """Return a solver of the lattice whose vector field is σ π∇g, that of a noise source of the spec."""
     source = spec.noise[name]
     quiet = replace(spec, hamiltonian=source.amplitude * source.hamiltonian, noise={}, forces=SpecForces(), order=2)
     quiet = replace(quiet, casimirs={}, invariants={}, runs={}, terms=None, composition="auto", scheme="auto")
@@ -98,9 +101,10 @@ def _along_lines(
     path: Floats,
     parts: int,
 ) -> Floats:
-    """Return the end of a path from x, by one RK4 step for each increment.
+    """Return the state at the end of a piecewise linear path from ``x``, by one RK4 step of size h for each piece.
 
-    ``path`` are the increments (steps·parts, sources, *sizes).
+    ``path`` has the increments (steps·parts, sources, *sizes), of which ``parts`` are added up for each step. The drift
+    is the vector field of ``solver``; ``sources`` have the fields σ π∇g.
     """
     drift, *spread = (_slope(s, x, parameters, t0) for s in (solver, *sources))
     begin = t0 or 0.0
@@ -122,7 +126,7 @@ def _along_lines(
 def _slope(
     solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any], t0: float | None
 ) -> Callable[[Floats, float], Floats]:
-    """Return the vector field of a NumPy solver as a function that skips the argument checks of the public method."""
+    """Return the vector field of a NumPy solver as a function of state and time, without checks of the arguments."""
     session = _session(solver, x, parameters, t0)
 
     def slope(state: Floats, t: float) -> Floats:
@@ -135,5 +139,5 @@ def _slope(
 
 
 def _session(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any], t0: float | None) -> Any:
-    """Return a session of a NumPy solver at a state."""
+    """Return a session of a NumPy solver, which makes single steps, at the state ``x`` and the time ``t0``."""
     return solver.started(Beginning(x, 1.0, solver.values(parameters, {}, x.shape[1:]), t0 or 0.0))

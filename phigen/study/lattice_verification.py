@@ -1,7 +1,7 @@
 """Verification of lattices: properties of their solvers, measured on a run and on small lattices.
 
-The Poisson identity is measured on a lattice of a few sites, whose initial states are those of sites of the run. For
-all sizes the identity is proved; the measurement detects errors of the generated code.
+The identity DΦ π DΦᵀ = π∘Φ of Poisson maps is measured on a lattice of a few sites, whose initial states are those of
+sites of the run. The identity is proved for all sizes; the measurement detects errors of the generated code.
 """
 
 from __future__ import annotations
@@ -29,28 +29,29 @@ from phigen.study.lattice_errors import BALANCE, CHANGE, ENERGY, MAX_BALANCED_SI
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification, order_limit
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Largest numbers of steps times sites of a run, without and with ``quick``; longer runs are shortened. FRAMES is the
-#: number of frames.
+#: Largest number of steps times sites of a run, without and with ``quick``; longer runs are shortened. FRAMES is the
+#: number of states of the run at which conserved quantities are evaluated.
 MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
 #: Limit for the ratio of the largest energy error in the last quarter of a run to that in the first three quarters.
 GROWTH = 4.0
-#: Limits for the Poisson identity on a small lattice, and for exact tangent maps against differences of order 6.
+#: Largest accepted relative errors of the Poisson identity on a small lattice, and of its tangent map against finite
+#: differences of order 6.
 IDENTITY, DIFFERENCES = 1e-12, 1e-9
 #: Largest number of sites for which gradients are measured on the whole lattice.
 MOST_GRADED = 16384
-#: Largest error that may be rounding alone, in measurements of the order, relative to the state.
+#: In measurements of the order, errors up to this fraction of the state may be rounding errors.
 MAX_ROUNDING = 1e-11
-#: Sites along each axis in measurements of the strong order, for lattices with one, two and three axes.
+#: Number of sites along each axis in measurements of the strong order, for lattices with one, two and three axes.
 SOME = (32, 6, 4)
-#: Number of Wiener paths of single sites in these measurements, with ``quick`` and without.
+#: Number of Wiener paths in measurements of the strong order, counted over all sites, with ``quick`` and without.
 FEW_PATHS, MANY_PATHS = 32, 96
-#: Sentence about the errors of Casimirs of sites.
-WORST_SITE = "Casimirs of sites are those of the site where they changed most."
+#: Sentence below the table of results on the errors of Casimirs at every site.
+WORST_SITE = "The error of a Casimir at every site is that at the site where it changed most."
 
 
 @dataclass(frozen=True)
 class _Subject:
-    """Subject of a verification: the compiled lattice, its solvers and its run."""
+    """Subject of a verification: the compiled lattice, its solvers by target, and initial state and step of the run."""
 
     compilation: CompiledLattice
     solvers: Mapping[str, LatticeSolver]
@@ -61,11 +62,11 @@ class _Subject:
 
     @property
     def solver(self) -> LatticeSolver:
-        """The solver for measurements that need only one target: C if available."""
+        """The solver of the first target, C if available, for measurements that need only one target."""
         return next(iter(self.solvers.values()))
 
     def time(self, trajectory: LatticeTrajectory, frame: int) -> float | None:
-        """Return the time of a frame; None if the system has no time."""
+        """Return the time of a stored state (frame); None if the equations do not depend on the time."""
         return None if self.t0 is None else float(trajectory.t[frame])
 
     def stepped(
@@ -76,9 +77,9 @@ class _Subject:
         t0: float | None = None,
         held_level: Mapping[str, float] | None = None,
     ) -> Floats:
-        """Return the state after some steps from the time t0 on, by default that of the run.
+        """Return the state after ``steps`` steps of size h from the state ``x`` at the time ``t0``.
 
-        ``held_level`` fixes the energy level e.
+        The default of ``t0`` is the start of the run. ``held_level`` is the argument that fixes the energy level e.
         """
         t0 = self.t0 if t0 is None else t0
         options: dict[str, Any] = {
@@ -105,11 +106,12 @@ def verify_lattice(
     quick: bool = False,
     single: LatticeSolver | None = None,
 ) -> Verification:
-    """Measure and judge the solvers of a lattice, by target, on the numbers of a run, which is shortened if it is long.
+    """Measure properties of the solvers of a lattice on a run, and judge them.
 
-    The solvers have tangent maps. ``t0`` is the start time of the run, None for systems without time; ``seed`` is that
-    of the noise, None for systems without noise. ``single`` is the same solver in single precision, if there is one: it
-    is measured against the others. Raises `StepError` where a step of the run fails.
+    ``solvers`` maps targets to solvers with tangent maps. A long run is shortened, more so with ``quick``. ``t0`` is
+    the time at the start, None if the equations do not depend on the time; ``seed`` is the seed of the noise, None
+    without noise. ``single`` is the solver in single precision, if there is one; it is compared with the others. Raises
+    `StepError` if a step of the run fails.
     """
     cell = compilation.cell
     subject = _Subject(compilation, solvers, start, h, t0, seed)
@@ -139,13 +141,13 @@ def verify_lattice(
 
 
 def _sampled(stride: int) -> str:
-    """Return a sentence about the states at which conserved quantities are evaluated; "" if these are all states."""
+    """Return a sentence that says at which states conserved quantities are evaluated; "" if at all states."""
     every = f"at the start, after every {stride} steps and at the end"
     return f"Energy, Casimirs and invariants are evaluated {every}." if stride > 1 else ""
 
 
 def _without_noise(subject: _Subject) -> _Subject:
-    """Return the same subject without noise, with the NumPy solver only."""
+    """Return the subject without the noise of the spec, with the NumPy solver only."""
     from phigen.api import lattice_solver_of
     from phigen.compiler import compile_spec
 
@@ -159,7 +161,11 @@ def _without_noise(subject: _Subject) -> _Subject:
 
 
 def _order(subject: _Subject, *, quiet: bool = False) -> Check:
-    """Return the check of the observed order, from the two step sizes with the smallest errors above rounding."""
+    """Return the check of the observed order of a lattice.
+
+    The order follows from two step sizes, one half of the other, with the smallest errors that are larger than
+    rounding. ``quiet`` says that the noise of the spec was removed.
+    """
     name = "observed order, without the noise" if quiet else "observed order"
     step = subject.compilation.program.step.swept
     if step and len(step.parts) == 1 and not step.by_colour:
@@ -174,7 +180,7 @@ def _order(subject: _Subject, *, quiet: bool = False) -> Check:
             break
         slopes |= {b: math.log2(a / b) for a, b in pairwise(errors) if MAX_ROUNDING < b < a < 0.1}
         span, largest = 2 * span, max(largest, *errors)
-    if 0 < largest <= MAX_ROUNDING:  # steps of different sizes agree, so they are exact
+    if 0 < largest <= MAX_ROUNDING:  # results with steps of all sizes agree, so each step is exact
         return Check(f"{name} (errors at round-off)", math.inf, order_limit(order))
     measured = slopes[min(slopes)] if slopes else math.nan
     is_passed = measured >= order - ORDER_SLACK
@@ -182,8 +188,10 @@ def _order(subject: _Subject, *, quiet: bool = False) -> Check:
 
 
 def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) -> Iterator[Check]:
-    """Yield the checks of Casimirs, invariants and the energy along the run; ``coarser`` multiplies the rounding
-    unit."""
+    """Yield the checks of energy, Casimirs and invariants along a run.
+
+    ``coarser`` is the rounding unit of the solver in units of double precision: 1, or more for single precision.
+    """
     errors = errors_of(cell, trajectory)
     least = coarser * rounding(trajectory.steps)
     yield from _energy(cell, trajectory, errors, least)
@@ -192,7 +200,7 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
             yield Check(f"Casimir {name}: largest change", float(errors[name].max()))
             continue
         value = float(np.max(np.abs(trajectory.casimirs[name][0])))
-        # the limit allows for the worst of many sites, by the logarithm of their number
+        # The limit is 8 times larger for Casimirs at every site, since the error is the largest one of many sites.
         limit = {"sites": 8.0, "sum": 1.0, "product": max(1.0, math.sqrt(trajectory.x[0][0].size))}[kind] * least
         error = float(errors[name].max()) / (value if kind == "product" and value else max(1.0, value))
         yield Check(
@@ -206,7 +214,10 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
 
 
 def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
-    """Yield the check that the energy, or the energy balance, does not drift."""
+    """Yield the checks of the largest error of the energy, or of the energy balance, and of its drift.
+
+    ``least`` is the relative error that rounding may cause.
+    """
     quantity = next(name for name in (ENERGY, BALANCE, CHANGE) if name in errors)
     energy = errors[quantity]
     if quantity == CHANGE:
@@ -232,18 +243,18 @@ def _reversal(subject: _Subject, trajectory: LatticeTrajectory) -> Check:
         forward_state = subject.stepped(x, subject.h, 1, t0, held_level)
         returned_state = subject.stepped(forward_state, -subject.h, 1, time_after, held_level)
         worst = max(worst, float(np.abs(returned_state - x).max()) / _size(x))
-    if subject.compilation.program.step.corrected:  # a step with corrector is not exactly the inverse of the step −h
+    if subject.compilation.program.step.corrected:  # with a corrector, Φ₋ₕ is not exactly the inverse of Φₕ
         return Check("reversibility", worst, "", True, "")
     return Check("reversibility", worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
 
 
 def _level_argument(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any]) -> dict[str, float]:
-    """Return the argument that fixes the energy level e in steps uniform in τ; {} for other steps."""
+    """Return the argument that fixes the energy level e = −H(x) in steps of systems with a monitor; {} without one."""
     return {"gauge": -solver.hamiltonian(x, parameters=parameters)} if solver.interface.monitored else {}
 
 
 def _agreement(subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Yield the differences between one step of the first target and one of each other target."""
+    """Yield the checks that single steps of each further target agree with those of the first target."""
     first, *other_solvers = subject.solvers.items()
     for target, solver in other_solvers:
         worst = 0.0
@@ -257,11 +268,11 @@ def _agreement(subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Che
 
 
 def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Yield the errors of single precision: of a step, and of the Casimirs along a run."""
+    """Yield the checks of the solver in single precision: of single steps, and of Casimirs along a run."""
     single = replace(subject, solvers={"c": solver})
     worst = single_precision.farthest(single.stepped, subject.stepped, [trajectory.x[0], trajectory.x[-1]], subject.h)
     limit = single_precision.ONE_STEP
-    name, reason = "single precision: a step, beside double", f"{worst:.1e} is more than rounding"
+    name, reason = "single precision: a step against double precision", f"{worst:.1e} is more than rounding"
     yield Check(name, worst, f"≤ {limit:.0e}", worst <= limit, reason)
     stride, arguments = max(1, trajectory.steps // FRAMES), subject.start.arguments
     run = solver.integrate(
@@ -272,14 +283,14 @@ def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, trajectory: La
             yield replace(check, name=f"single precision: {check.name}")
 
 
-# --- a lattice of a few sites
+# --- measurements on a lattice of a few sites
 
 
 def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
-    """Yield the checks, on a few sites, of the strong order and that steps with the largest increments succeed."""
+    """Yield two checks on a lattice of a few sites: of the strong order, and of steps with the largest increments."""
     interface, start = subject.solver.interface, subject.start
     few_sizes = [SOME[len(start.sizes) - 1]] * len(start.sizes)
-    if cell.relation == PAIRS:  # each site may be picked once
+    if cell.relation == PAIRS:  # there each site of the run is taken once at most
         few_sizes = [min(few_sizes[0], *start.sizes)]
     sizes = [
         -(-max(size, least) // p) * p
@@ -297,14 +308,16 @@ def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
         "strong order, along common paths", observed_order, limit, observed_order >= stated - STRONG_SLACK, reason
     )
     failed = lattice_noise.failures(*subject_arguments)
-    name, reason = "steps that fail, of increments as large as can be", f"{failed} fail; a smaller step helps"
+    name, reason = "steps that fail with the largest increments", f"{failed} fail; a smaller step helps"
     yield Check(name, failed, "none", failed == 0, reason)
 
 
 def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Yield the checks of the Poisson identity, with the exact tangent maps of all targets, and of these tangent maps.
+    """Yield two checks on a lattice of a few sites: of the Poisson identity DΦ π DΦᵀ = π∘Φ, and of the tangent maps DΦ.
 
-    The largest entry of DΦ π DΦᵀ − π∘Φ is relative to that of |DΦ| |π| |DΦ|ᵀ, with each field in its typical magnitude.
+    Each target computes its own DΦ. The error of the identity is the largest entry of DΦ π DΦᵀ − π∘Φ, divided by that
+    of |DΦ| |π| |DΦ|ᵀ; each field is measured in units of its typical magnitude. Tangent maps are compared with finite
+    differences. With forces a step is no Poisson map, and the identity is not checked.
     """
     interface, sizes = subject.solver.interface, _few_sizes(subject)
     expansion, site_count = expand(cell, sizes, ring(sizes[0]) if interface.graph else ()), int(np.prod(sizes))
@@ -319,8 +332,8 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
         defect = max(finite.defect(solver, f * subject.h, fields) for solver in solvers for f in (1, -1))
         name, limit = f"Poisson identity {sizes_text}{replaced}", f"≤ {IDENTITY:.0e}"
         yield Check(name, defect, limit, defect <= IDENTITY, f"is off by {defect:.1e}")
-    # differences are taken in units of each field and in units of each site, and with two displacements; the
-    # smallest deviation counts, as the larger ones contain the error of the differences
+    # Finite differences are computed four times: with two displacements, each in units of fields and in units of values
+    # at sites. The smallest deviation counts, since the larger ones are errors of the differences.
     sampled_values = usual[:, _picked(cell, subject.start, sizes).reshape(-1)]
     site_units = _units(np.maximum(sampled_values, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
     trials = [(units, apart) for units in (fields, site_units) for apart in (3e-3, 3e-4)]
@@ -330,8 +343,10 @@ def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> I
 
 
 def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
-    """Yield the checks of gradients: of all targets on a few sites, and of the first target on the run's lattice if
-    it is small."""
+    """Yield the checks of gradients of all targets on a lattice of a few sites.
+
+    If the lattice of the run is small enough, gradients of the first target are also checked on that lattice.
+    """
     sizes, start, step_and_time = _few_sizes(subject), subject.start, (subject.h, subject.t0)
     x, parameters = _on_few(cell, start, sizes, ring(sizes[0]) if subject.solver.interface.graph else ())
     usual = _units(np.abs(trajectory.x).max(axis=tuple(i for i in range(trajectory.x.ndim) if i != 1)))
@@ -352,19 +367,19 @@ def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> 
 
 
 def _few_sizes(subject: _Subject) -> list[int]:
-    """Return sizes of a small lattice that the method accepts and that has the same boundary seams as the run."""
+    """Return sizes of a small lattice that the solver accepts, and on which its boundary seams are those of the run."""
     interface = subject.solver.interface
     least = 3 if len(interface.axes) < 3 else 2
-    if subject.compilation.cell.relation == PAIRS:  # each site may be picked once
+    if subject.compilation.cell.relation == PAIRS:  # there each site of the run is taken once at most
         least = min(least, *subject.start.sizes)
     sizes = [-(-max(size, least) // p) * p for size, p in zip(interface.least, interface.periods, strict=True)]
     return _with_seams(subject, sizes)
 
 
 def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
-    """Return sizes increased until the boundary seams are those of the run.
+    """Return the sizes, increased until the boundary seams of the lattice are those of the run.
 
-    With one or two axes, some sites then lie away from the seams.
+    With one or two axes, the sizes are increased further, so that some sites lie away from the seams.
     """
     seams = subject.compilation.sweeps.colouring.seams
     for axis, (seam, size) in enumerate(zip(seams, subject.start.sizes, strict=False)):
@@ -375,7 +390,7 @@ def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
 
 @dataclass(frozen=True)
 class _SmallLattice:
-    """Lattice of a few sites with its initial state."""
+    """Lattice of a few sites: its expansion to an ordinary system (``whole``), parameters, and initial state ``x``."""
 
     whole: Expansion
     subject: _Subject
@@ -384,18 +399,21 @@ class _SmallLattice:
 
     @property
     def given(self) -> dict[str, Any]:
-        """Keyword arguments of the steps: time, seed of the noise, parameters and bonds, and a fixed energy level."""
+        """Keyword arguments for steps: time, seed of the noise, parameters with bonds, and a fixed energy level."""
         held_level = _level_argument(self.subject.solver, self.x, self.parameters)
         return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters, **held_level}
 
     def tangent(self, solver: LatticeSolver, h: float) -> tuple[Floats, Floats]:
-        """Return the state after a step and the tangent map of the step (numbers, numbers)."""
+        """Return the state after a step, and the tangent map of the step as a matrix (numbers, numbers)."""
         count = self.x.size
         image, columns = solver.step_tangent(self.x, h, np.eye(count).reshape(count, *self.x.shape), **self.given)
         return image, columns.reshape(count, count).T
 
     def defect(self, solver: LatticeSolver, h: float, units: Floats) -> float:
-        """Return the largest entry of DΦ π DΦᵀ − π∘Φ, relative to its terms, for states in given units (numbers,)."""
+        """Return the largest entry of DΦ π DΦᵀ − π∘Φ for a step Φ of size h, relative to the terms in it.
+
+        The numbers of a state are measured in ``units`` (numbers,).
+        """
         after, slopes = self.tangent(solver, h)
         slopes = slopes * units / units[:, None]
         start_tensor, image = (
@@ -405,10 +423,10 @@ class _SmallLattice:
         return float(np.abs(slopes @ start_tensor @ slopes.T - image).max()) / size
 
     def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
-        """Return the error of the tangent map against differences of order 6, relative to its largest entry, in these
-        units.
+        """Return the largest difference between the tangent map and finite differences of order 6.
 
-        ``apart`` is the displacement of the differences.
+        It is relative to the largest entry of the tangent map. Numbers of a state are measured in ``units``, and
+        displaced by ``apart``.
         """
 
         def step(y: Floats) -> Floats:
@@ -421,8 +439,10 @@ class _SmallLattice:
 
 
 def _with_finite_brackets(cell: Cell, small_lattice: _SmallLattice) -> tuple[_SmallLattice, str]:
-    """Return the lattice with nonzero values for parameters whose value 0 makes π infinite, and a note on these
-    values."""
+    """Return the lattice, in which values 0 of parameters that make π infinite are replaced; and a note on them.
+
+    The note, such as ", m = 0.1 for 0", is added to the name of a check; it is "" if nothing was replaced.
+    """
     with np.errstate(all="ignore"):
         if np.isfinite(_poisson(small_lattice.whole, small_lattice.x, small_lattice.parameters)).all():
             return small_lattice, ""
@@ -441,7 +461,9 @@ def _units(sizes: Floats) -> Floats:
 
 
 def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Floats:
-    """Return the derivative by differences of order 6."""
+    """Return the derivative of a function at y as a matrix, by central differences of order 6 at the distance
+    ``apart``.
+    """
     weights = {1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
     columns = []
     for k in range(len(y)):
@@ -453,10 +475,10 @@ def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Fl
 
 
 def _picked(cell: Cell, start: Start, sizes: Sequence[int]) -> Any:
-    """Return random site numbers of the run for the sites of a small lattice.
+    """Return the numbers of random sites of the run, from which the sites of a small lattice are taken.
 
-    Of pairs these are the first site and different others, in their order: relative coordinates depend on the order of
-    the bodies, and the first body must have a mass.
+    If all sites interact in pairs, they are the first site and other sites, without repetition and in their order:
+    relative coordinates of bodies depend on the order, and the first body must have a mass.
     """
     sites, count = int(np.prod(start.sizes)), int(np.prod(sizes))
     if cell.relation == PAIRS:
@@ -467,7 +489,7 @@ def _picked(cell: Cell, start: Start, sizes: Sequence[int]) -> Any:
 def _on_few(
     cell: Cell, start: Start, sizes: Sequence[int], bonds: Sequence[tuple[int, int]]
 ) -> tuple[Floats, dict[str, Any]]:
-    """Return the state and the parameters of a small lattice, taken from random sites of the run."""
+    """Return the state (fields, …) and the parameters of a small lattice, taken from random sites of the run."""
     picked, arguments = _picked(cell, start, sizes), dict[str, Any]()
     for p in cell.parameters:
         value = np.asarray(start.parameters[p.name])

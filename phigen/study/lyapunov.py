@@ -1,9 +1,9 @@
 """Lyapunov exponents of a trajectory, through the exact tangent map of each step.
 
-A frame of tangent vectors is propagated by the tangent maps of the steps and made orthonormal by QR after each step.
-The logarithms of the diagonal of R add up to the growth of lengths, areas, … (G. Benettin et al., Meccanica 15 (1980);
-K. Geist, U. Parlitz, W. Lauterborn, Prog. Theor. Phys. 83 (1990)). The exponents are those of the step as a map, per
-unit of time.
+A frame of tangent vectors is propagated by the tangent maps of the steps, and made orthonormal by a QR decomposition
+after each step. The sums of the logarithms of the diagonal of R are the growth of the tangent vectors; divided by the
+time, they are the exponents (G. Benettin et al., Meccanica 15 (1980); K. Geist, U. Parlitz, W. Lauterborn, Prog. Theor.
+Phys. 83 (1990)). The exponents are those of the map of a step, not of the exact flow.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 
-#: Factor between successive step numbers at which the exponents are recorded.
+#: The exponents so far are recorded at step numbers that grow by this factor, eight times per doubling.
 _SPACING = 2 ** (1 / 8)
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Exponents of a trajectory over the time ``t``, in descending order, with the history of their convergence.
+    """Lyapunov exponents of a trajectory, in descending order, with the history of their convergence.
 
-    ``history`` (rows, DIM) has the exponents at the times ``times`` (rows,), which grow geometrically. The ``clock`` is
-    the variable in which steps are uniform: τ for monitored systems.
+    ``history`` (rows, exponents) has the exponents after the times ``times`` (rows,), which grow geometrically. They
+    are per unit of ``clock``, the variable in which steps have equal size: the time t, or τ for systems with a monitor.
     """
 
     exponents: Floats
@@ -50,28 +50,32 @@ class Spectrum:
 
     @property
     def total(self) -> float:
-        """The sum of all exponents: the growth of volume. It is 0 if π is constant or the structure unimodular."""
+        """Sum of all exponents, the growth rate of the volume of phase space.
+
+        It is 0 if π is constant, or if the Poisson structure is unimodular (has an invariant volume).
+        """
         return float(np.sum(self.exponents))
 
     @property
     def pairing(self) -> float:
-        """The largest |λ_i + λ_{n+1−i}|.
+        """Largest |λ_i + λ_{n+1−i}| of the exponents λ_1 ≥ … ≥ λ_n.
 
-        It is 0 for symplectic maps, also on symplectic leaves, where Casimirs contribute zeros.
+        It is 0 for a symplectic map, and for a Poisson map too, since Casimirs contribute zeros to the exponents.
         """
         return float(np.max(np.abs(self.exponents + self.exponents[::-1])))
 
     @property
     def uncertainty(self) -> float:
-        """The largest change of an exponent in the second half of the time; exponents converge like 1/t at best."""
+        """Largest change of an exponent during the second half of the time; exponents converge like 1/t at best."""
         late_values = self.history[self.times >= self.t / 2]
         return float(np.max(np.ptp(late_values, axis=0)))
 
 
 class FrameGrowth:
-    """Growth of a frame of tangent vectors, step by step. ``state`` is the complete state, as arrays.
+    """Growth of a frame of tangent vectors, step by step; ``state`` has all intermediate results, as arrays to be
+    saved.
 
-    The initial frame consists of all unit vectors, or of the columns of ``frame``.
+    The initial frame consists of all unit vectors, or of the orthonormal columns of ``frame``.
     """
 
     def __init__(self, dimension: int, h: float, frame: Floats | None = None) -> None:
@@ -87,16 +91,16 @@ class FrameGrowth:
 
     @property
     def frame(self) -> Floats:
-        """The tangent vectors, as orthonormal columns."""
+        """The tangent vectors after the last step, as orthonormal columns."""
         frame: Floats = self.state["frame"]
         return frame
 
     def see(self, tangent: Floats) -> None:
-        """Propagate the frame through one step with this tangent map."""
+        """Propagate the frame through one step, whose tangent map is the matrix ``tangent``."""
         self.take(tangent @ self.frame)
 
     def take(self, propagated: Floats, steps: int = 1) -> None:
-        """Replace the frame by its columns ``propagated`` through some steps, and make them orthonormal."""
+        """Receive the columns of the frame after ``steps`` steps; add up their growth, and make them orthonormal."""
         state = self.state
         state["frame"], r = np.linalg.qr(propagated)
         state["logs"] = state["logs"] + np.log(np.abs(np.diagonal(r)))
@@ -113,7 +117,7 @@ class FrameGrowth:
         return Spectrum(history[-1][order], times, history[:, order])
 
     def _noted(self) -> tuple[Floats, Floats]:
-        """Return the times and the history with the current exponents appended."""
+        """Return the times and the history of the exponents, with the current time and exponents appended."""
         t, times, history = abs(float(self.state["steps"]) * self._h), self.state["times"], self.state["history"]
         if len(times) and times[-1] == t:
             return times, history
@@ -131,8 +135,8 @@ def spectrum(
 ) -> Spectrum:
     """Return the Lyapunov exponents along ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
-    ``solver`` must be compiled with ``tangent=True``, else `TypeError`. Raises `StepError`, and `ValueError` for wrong
-    arguments. ``draws`` are those of noise: seed, member, step0.
+    Raises `TypeError` if ``solver`` was not compiled with ``tangent=True``, `StepError` if a step fails, and
+    `ValueError` for wrong arguments. ``draws`` are the arguments for noise: seed, member, step0.
     """
     growth = FrameGrowth(len(solver.coordinates), h)
     for _, tangent in solver.tangents(x0, h, steps, t0=t0, parameters=parameters, **draws):
@@ -154,14 +158,14 @@ def lattice_spectrum(
 ) -> Spectrum:
     """Return the ``count`` largest Lyapunov exponents of a lattice along a run from ``x0`` (coordinates, *sizes).
 
-    The initial tangent vectors are random; they are made orthonormal after each ``interval`` steps. ``solver`` must be
-    compiled with ``tangent=True``, else `TypeError`. Raises `StepError`, and `ValueError` for wrong arguments.
-    ``draws`` are those of noise: seed, step0.
+    The initial tangent vectors are random; they are made orthonormal after every ``interval`` steps. Raises `TypeError`
+    if ``solver`` was not compiled with ``tangent=True``, `StepError` if a step fails, and `ValueError` for wrong
+    arguments. ``draws`` are the arguments for noise: seed, step0.
     """
     x = np.asarray(x0, dtype=float)
     if not 1 <= count <= x.size:
         raise ValueError(f"a lattice of these sizes has 1 to {x.size} exponents, not {count}")
-    # There are the vectors drawn, their copy in qr, and the result of qr.
+    # Three arrays of 8-byte numbers exist at once: the random vectors, the copy that qr makes, and the result of qr.
     expect_room(f"the arrays of {count} tangent vectors", 3 * 8 * count * x.size)
     frame = np.linalg.qr(np.random.default_rng(0).normal(size=(x.size, count)))[0]
     growth = FrameGrowth(x.size, h, frame)

@@ -7,14 +7,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Meaning:
-    """Description of the checks whose names begin with ``row``; ``failure`` is empty for rows that are not judged."""
+    """Explanation of the checks whose names begin with ``row``, for the table of results.
+
+    ``measures`` is the measured quantity, ``failure`` the cause if a check fails; "" if it has no limit.
+    """
 
     row: str
     measures: str
     failure: str = ""
 
 
-#: Cause of a failure in all rows that judge the drift of the energy.
+#: Cause of a failure for all checks that judge the drift of the energy.
 _DRIFT = "the solver does not follow the flow of a Hamiltonian near H, or the step is too large for one to exist"
 
 MEANINGS = (
@@ -26,14 +29,14 @@ MEANINGS = (
     ),
     Meaning(
         "strong order",
-        "the power of h with which the error along one path of the noise shrinks, as a mean over 48 paths. The "
+        "the power of h with which the error along one path of the noise shrinks, as a mean over many paths. The "
         "increments of a coarse step are sums of those of finer steps. The reference is the solution along the "
         "path with straight lines between its points",
         "the noise is not that of the spec, or not in the sense of Stratonovich, or a source is counted twice",
     ),
     Meaning(
         "steps that fail",
-        "the number of failed steps from four states, with the largest increments of the noise",
+        "the number of failed steps from states of the run, with the largest increments of the noise",
         "a rare increment can make a step of the run fail: use a smaller step",
     ),
     Meaning(
@@ -85,17 +88,17 @@ MEANINGS = (
     ),
     Meaning(
         "energy balance: last quarter/before",
-        "the same quotient for H minus the work done on a driven lattice",
+        "the same quotient for H minus the work done, if H of a lattice depends on the time or forces act",
     ),
     Meaning(
         "Poisson identity",
-        "the largest entry of DΦ π DΦᵀ − π∘Φ, divided by that of π, on a lattice of a few sites like those of the "
-        "run. DΦ is computed by differences of order six",
+        "the largest entry of DΦ π DΦᵀ − π∘Φ, relative to its terms, on a lattice of a few sites with states of "
+        "the run. DΦ is the derivative of a step Φ as the code computes it",
         "the step is not a Poisson map",
     ),
     Meaning(
         "energy balance: last/first window",
-        "the same quotient for H minus the work done",
+        "the same quotient for H minus the work done, if H depends on the time or forces act",
         _DRIFT,
     ),
     Meaning(
@@ -113,19 +116,19 @@ MEANINGS = (
     ),
     Meaning(
         "gradient against tangent maps",
-        "the difference between ⟨bar, DΦ v⟩ and ⟨DΦᵀ bar, v⟩ over eleven steps with cotangents at every fourth, "
-        "relative to its terms, for code with gradients",
+        "for code with gradients: the difference between ⟨w, DΦ v⟩ and ⟨DΦᵀ w, v⟩ over eleven steps, with a tangent "
+        "vector v at the start and cotangents w after every fourth step and at the end, relative to the terms",
         "the reverse pass is not the transpose of the steps",
     ),
     Meaning(
         "gradient against differences",
-        "the difference between derivatives of such a run by its start and each parameter, and differences of "
-        "order six",
+        "the difference between the gradient of a run of eleven steps, by its start and each parameter, and "
+        "finite differences of order six",
         "the gradients are wrong, and so are fits and optimisations that use them",
     ),
     Meaning(
         "gradients of members",
-        "the difference between gradients of an ensemble and those of its members one by one",
+        "the difference between gradients of an ensemble and gradients of its members one by one",
         "gradients of ensembles are wrong",
     ),
     Meaning(
@@ -135,7 +138,7 @@ MEANINGS = (
     ),
     Meaning(
         "agreement",
-        "the difference between single steps of C and NumPy from the same states",
+        "the difference between single steps of the targets, such as C and NumPy, from the same states",
         "one of the targets is wrong: an error of phigen, or of the compiler's flags",
     ),
     Meaning(
@@ -152,16 +155,16 @@ MEANINGS = (
     ),
     Meaning(
         "modified H",
-        "the power of h with which changes of the modified Hamiltonian shrink, with one and two corrections. Steps "
-        "are doubled from that of the run until the changes exceed rounding; ∞: they never do. For series up to "
-        "order 6 without composition",
+        "the power of h with which changes of the modified Hamiltonian shrink, with one and two corrections. The "
+        "step of the run is doubled until the changes exceed rounding; ∞ means that they never do. The row exists "
+        "for series up to order 6 without composition",
         "the step is not the flow of the stated Hamiltonian: a sign, or a term from S_{k+1} on, is wrong",
     ),
 )
 
 
 def meaning_of(check: str) -> Meaning:
-    """Return the meaning of the check with this name."""
+    """Return the explanation of the check with this name, such as ``Casimir C: largest error``."""
     kind, colon, suffix = check.partition(": ")
     noun = kind.partition(" ")[0]
     name = f"{noun}: {suffix}" if colon and noun in ("Casimir", "invariant") else check

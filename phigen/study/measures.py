@@ -13,27 +13,28 @@ from phigen.geometry.system import System
 from phigen.study.methods import Method, by_differences
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Error, relative to the size of a quantity, below which errors are rounding errors and not those of the method.
+#: Relative error of the size of a rounding error; errors of a few times this size are not those of the method.
 ROUNDING = 4e-16
 
-#: Factors by which the displacements of finite differences are reduced.
+#: Finite differences are computed with the usual displacements, and with displacements divided by the second factor.
 DISTANCES = (1.0, 256.0)
-#: Error, relative to the largest derivative, above which displacements in proportion to each coordinate are also tried.
+#: If finite differences deviate by more than this fraction of the largest derivative, they are also computed with
+#: displacements in proportion to each coordinate.
 ROUGH = 1e-8
 
-#: Relative displacement of a coordinate for estimating the effect of its rounding on π.
+#: Relative displacement of a coordinate, from which the effect of rounding errors of the state on π is estimated.
 _SHARE = 1e-6
 
-#: Factors by which the step is refined; pairs two apart halve the step.
+#: Numbers of steps, 4, 6, 8, 12, 16, 24, …, for measurements of the order; the number after the next is the double.
 _REFINEMENTS = tuple(f * 2**k for k in range(9) for f in (4, 6))
 
 
 @dataclass(frozen=True)
 class Observed:
-    """Observed order: the slope between the two finest steps in the asymptotic range; NaN if there are none.
+    """Observed order: the median slope of the last three halvings of the step in the asymptotic range, else NaN.
 
-    ``pairs`` lists step sizes and errors relative to the solution, ``floor`` is the error of the reference.
-    ``exact`` is true if all errors are at the floor.
+    ``pairs`` lists step sizes with errors relative to the solution, ``floor`` is the error of the reference solution.
+    ``exact`` says that no error is larger than the floor.
     """
 
     order: float
@@ -43,8 +44,10 @@ class Observed:
 
 
 def observed_order(method: Method, reference: Callable[[float], tuple[Floats, float]], x: Floats, t: float) -> Observed:
-    """Return the order observed from errors at time t with steps t/4, t/6, …; ``reference(t)`` returns a state and
-    its error."""
+    """Return the order that is observed from the errors at the time ``t`` with steps of t/4, t/6, t/8, …
+
+    ``reference(t)`` returns the solution at the time t, and its relative error.
+    """
     solution, uncertainty = reference(t)
     size = float(np.max(np.abs(solution)))
     floor = max(uncertainty, 4 * ROUNDING)
@@ -57,7 +60,7 @@ def observed_order(method: Method, reference: Callable[[float], tuple[Floats, fl
         errors[n] = float(np.max(np.abs(state - solution))) / size
         if errors[n] < 10 * floor and len(errors) > 4:
             break
-    # Only small steps show the order; at large steps the error may have any size.
+    # Errors near rounding, and errors of steps that are too large, do not follow the power law.
     usable = {n: e for n, e in errors.items() if 30 * floor < e < 0.02}
     slopes = [math.log2(e / usable[2 * n]) for n, e in usable.items() if 2 * n in usable]
     pairs = tuple((t / n, e) for n, e in errors.items())
@@ -66,7 +69,7 @@ def observed_order(method: Method, reference: Callable[[float], tuple[Floats, fl
 
 
 def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -> Floats:
-    """Return π(x), (DIM, DIM)."""
+    """Return the matrix π(x) at a state, (DIM, DIM)."""
     values = {**parameters, **dict(zip(system.coordinates, x, strict=True))}
     return np.array([float(e) for e in evaluate([e for row in system.poisson for e in row], values)]).reshape(
         (len(x),) * 2
@@ -74,10 +77,10 @@ def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -
 
 
 def poisson_defect(system: System, parameters: Mapping[str, float], method: Method, x: Floats, h: float) -> float:
-    """Return max |DΦ π DΦᵀ − π∘Φ| relative to |DΦ| |π| |DΦ|ᵀ.
+    """Return the largest entry of DΦ π DΦᵀ − π∘Φ for a step Φ, relative to the largest entry of |DΦ| |π| |DΦ|ᵀ.
 
-    DΦ is computed by finite differences if the code has no tangent map. If terms of π nearly cancel, rounding of the
-    state limits the accuracy of π; then the defect is relative to Σ |x_i ∂_i π|.
+    DΦ is computed by finite differences if the method has no tangent map. If terms of π nearly cancel, rounding errors
+    of the state limit the accuracy of π; then the defect is relative to Σ |x_i ∂_i π|.
     """
     tangent, image = method.tangent(x, h) if method.tangent else by_differences(method, x, h), method.step(x, h)
     start_tensor, end_tensor = (poisson_matrix(system, parameters, state) for state in (x, image))
@@ -93,10 +96,10 @@ def poisson_defect(system: System, parameters: Mapping[str, float], method: Meth
 
 
 def tangent_error(method: Method, x: Floats, h: float) -> float:
-    """Return the difference between the tangent map and finite differences of the step, relative to the largest entry.
+    """Return the difference between the tangent map and finite differences of a step, relative to the largest entry.
 
-    The smallest difference for several displacements is returned: near a singularity a large displacement leads beyond
-    it, and coordinates may differ widely in size.
+    Several displacements are tried, and the smallest difference is returned, since no displacement suits all cases:
+    near a singularity it must be small, and coordinates may differ widely in size.
     """
     if method.tangent is None:
         return 0.0
@@ -113,8 +116,10 @@ def reversal(method: Method, x: Floats, h: float) -> float:
 
 
 def largest_step(method: Method, states: Sequence[Floats], h: float, max_factor: float = 256.0) -> float:
-    """Return the largest factor f, to 5 %, for which a step of size f·h succeeds from all states; 0 if a step h/64
-    fails."""
+    """Return the largest factor f ≤ ``max_factor``, to 5 %, for which a step of size f·h succeeds from all states.
+
+    The result is 0 if a step of size h/64 fails.
+    """
 
     def works(factor: float) -> bool:
         try:

@@ -12,18 +12,19 @@ from phigen.runtime.solver import Solver
 from phigen.study import classical
 from phigen.symbolic.arrays import Floats
 
-#: Displacement of finite differences in units of the state; with formulas of order 6 their error is about 1e-12.
+#: Displacement for finite differences, relative to the state. With formulas of order 6 their error is about 1e-12.
 _WIDTH = 2e-3
 _WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
 
 
 @dataclass(frozen=True)
 class Method:
-    """One-step method: ``step(x, h)`` maps states (DIM,), ``rows(x, h, steps, stride)`` returns (rows, DIM).
+    """One-step method: ``step(x, h)`` returns the state (DIM,) after a step.
 
-    Both raise `StepError`. ``tangent(x, h)`` is the tangent map (DIM, DIM) that the code provides, None if there is
-    none. All steps begin at the same time; ``later(h)`` is the method whose steps begin at a time later by h.
-    ``together`` makes one step of many members.
+    ``rows(x, h, steps, stride)`` returns the states (rows, DIM) of a run. Both raise `StepError`. ``tangent(x, h)``
+    returns the tangent map (DIM, DIM) of a step, if the code has one. ``step`` and ``rows`` begin at a fixed time;
+    ``later(h)`` returns the method that begins later by h, if the equations depend on the time. ``together(states, h)``
+    makes one step from many states (members, DIM) at once, if possible.
     """
 
     name: str
@@ -34,16 +35,20 @@ class Method:
     together: Callable[[Floats, float], Floats] | None = None
 
     def steps(self, states: Floats, h: float) -> Floats:
-        """Return the ends of a step from each of the states (members, DIM)."""
+        """Return the states (members, DIM) after one step from each of the ``states`` (members, DIM)."""
         return self.together(states, h) if self.together else np.array([self.step(x, h) for x in states])
 
     def after(self, h: float) -> Method:
-        """Return the method that begins later by h."""
+        """Return the method whose steps begin at a time later by h; this method if nothing depends on the time."""
         return self.later(h) if self.later else self
 
 
 def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | None = None, t0: float = 0.0) -> Method:
-    """Return the method of a generated solver; a ``gauge`` makes all steps the same map, for any initial state."""
+    """Return the method of a generated solver with its parameters, for steps that begin at the time ``t0``.
+
+    Solvers with a gauge choose multiples of Casimirs, or e, at the initial state. If they are given by ``gauge``, all
+    steps are the same map, whatever the initial state.
+    """
     fixed_gauge = solver if gauge is None else Solver(solver.backend.with_gauge(gauge), solver.interface)
     begin = t0 if solver.interface.time else None
 
@@ -56,13 +61,13 @@ def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | N
         lambda x, h, steps, stride: fixed_gauge.integrate(x, h, steps, stride, t0=begin, parameters=parameters).x,
         lambda x, h: fixed_gauge.step_tangent(x, h, t0=begin, parameters=parameters)[1],
         (lambda h: of_solver(solver, parameters, gauge, t0 + h)) if solver.interface.time else None,
-        # the members of an ensemble have different noise
+        # With noise, members of an ensemble have different increments, so that they cannot replace single steps.
         together if solver.target == "numpy" and not solver.interface.noise else None,
     )
 
 
 def without_noise(solver: Solver, parameters: Mapping[str, float], t0: float = 0.0) -> Method:
-    """Return the method of a generated solver with all noise increments 0."""
+    """Return the method of a generated solver for a system with noise, in which all increments of the noise are 0."""
     begin, draws = t0 if solver.interface.time else None, solver.interface.draws
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
@@ -73,9 +78,9 @@ def without_noise(solver: Solver, parameters: Mapping[str, float], t0: float = 0
 
 
 def field_of(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
-    """Return the vector field of a solver at one state (DIM,), without the argument checks of the public method.
+    """Return the vector field of a solver as a function of one state (DIM,), without checks of the argument.
 
-    If the vector field depends on the time, the time is an additional last coordinate: see `extended`.
+    If the vector field depends on the time, the time is the last coordinate of the state, (DIM + 1,); see `extended`.
     """
     if solver.interface.time:
         return lambda x: np.append(solver.backend.vector_field(x[None, :-1], parameters, x[-1:])[0], 1.0)
@@ -88,7 +93,7 @@ def field_of(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Float
 
 
 def extended(solver: Solver, x: Floats, t0: float) -> Floats:
-    """Return the initial state for the field of `field_of`, with the time appended if there is one."""
+    """Return the state ``x``, with the time ``t0`` appended if the equations depend on the time, for `field_of`."""
     return np.append(x, t0) if solver.interface.time else x
 
 
@@ -99,7 +104,7 @@ def of_classical(
     t0: float = 0.0,
     vector_field: Callable[[Floats], Floats] | None = None,
 ) -> Method:
-    """Return a classical method for the vector field of a solver, or for ``vector_field`` instead."""
+    """Return the classical method ``name`` for the vector field of a solver, or for ``vector_field`` if it is given."""
     field = vector_field or field_of(solver, parameters)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
@@ -117,11 +122,10 @@ def of_classical(
 
 
 def by_differences(method: Method, x: Floats, h: float, finer: float = 1.0, *, by_coordinate: bool = False) -> Floats:
-    """Return the derivative (DIM, DIM) of a step by central differences of order 6; ``finer`` divides the
-    displacements.
+    """Return the derivative (DIM, DIM) of a step by central differences of order 6.
 
-    Displacements are in proportion to the state or, ``by_coordinate``, to each coordinate, for example for momenta of
-    small masses.
+    A coordinate is displaced in proportion to its size, but at least to a tenth of the largest coordinate; with
+    ``by_coordinate`` this bound is dropped, for example for momenta of small masses. ``finer`` divides displacements.
     """
     size = float(np.max(np.abs(x))) or 1.0
     widths = _WIDTH / finer * np.where(x == 0, 0.1 * size, np.maximum(np.abs(x), 0.0 if by_coordinate else 0.1 * size))

@@ -1,4 +1,4 @@
-"""Motion of a monitored system in τ: the reference for its steps."""
+"""Motion of a system with a monitor in its time τ, with dt = g dτ: the reference for steps of equal size in τ."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from phigen.symbolic.arrays import Floats
 
 
 def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[Floats], Floats]:
-    """Return the field g π∇H, the motion in τ for K = 0; dt/dτ is appended for states with the time as last
-    coordinate."""
+    """Return the vector field g π∇H, the motion in τ, as a function of a state (DIM,).
+
+    For a state (DIM + 1,) whose last coordinate is the time t, dt/dτ = g is appended.
+    """
     n, backend = solver.interface.dimension, solver.backend
 
     def field(x: Floats) -> Floats:
@@ -26,7 +28,10 @@ def field_in_tau(solver: Solver, parameters: Mapping[str, float]) -> Callable[[F
 
 
 def with_time(solver: Solver, parameters: Mapping[str, float], gauge: Floats) -> Method:
-    """Return the method of a solver with fixed e and with the time as last coordinate of its rows."""
+    """Return the method of a solver whose states have the time t as last coordinate.
+
+    ``gauge`` fixes the energy level e, so that all steps are the same map.
+    """
     fixed_gauge = Solver(solver.backend.with_gauge(gauge), solver.interface)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:

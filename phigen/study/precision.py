@@ -14,23 +14,26 @@ from phigen.study import classical
 from phigen.study.race import OWN, Race, Runner
 from phigen.symbolic.arrays import Floats
 
-#: Numbers of doublings and of halvings of the run's step.
+#: Largest numbers of doublings and of halvings of the step of the run, by which step sizes are chosen.
 COARSER, FINER = 6, 7
-#: Number of repetitions of a measurement, of which the fastest counts; least duration of each and longest duration of
-#: one run, in seconds.
+#: ROUNDS: number of repetitions of a measurement of time, of which the fastest counts. LEAST_SECONDS: least duration of
+#: a repetition, which may contain several runs. MOST_SECONDS: a run that takes longer is the last one of its method.
 ROUNDS, LEAST_SECONDS, MOST_SECONDS = 5, 2e-3, 0.05
-#: Numbers of steps of the studied part of the run, tried in this order. In long parts the errors may grow so fast that
-#: the order is not visible.
+#: Numbers of steps of the part of the run that is studied. They are tried in this order until the order of the solver
+#: is visible, since in long parts the errors may grow too fast.
 SPANS = (4096, 256, 16)
-#: Range of errors from which the order is determined: from the floor times ABOVE_FLOOR to ASYMPTOTIC.
+#: The order is determined from errors between ABOVE_FLOOR times the error of the reference, and ASYMPTOTIC.
 ABOVE_FLOOR, ASYMPTOTIC = 30.0, 0.02
-#: Smallest measurable error relative to the solution, and the error below which rounding may dominate.
+#: Smallest measurable error, and the error below which rounding may dominate, relative to the solution.
 ROUNDING, SMALL = 2.0**-52, 1e-6
 
 
 @dataclass(frozen=True)
 class PrecisionPoint:
-    """Relative errors of solution and Casimirs at the end of a run, and the seconds of the fastest repetition."""
+    """Result with one step size: relative errors of solution and Casimirs at the end of the run, and its time.
+
+    ``seconds`` is the time of the fastest repetition; ``casimirs`` is the largest error of a Casimir.
+    """
 
     step: float
     steps: int
@@ -41,7 +44,10 @@ class PrecisionPoint:
 
 @dataclass(frozen=True)
 class PrecisionCurve:
-    """All points of one method, from the largest step; ``slope`` is the observed order, NaN if undetermined."""
+    """Results of one method with all step sizes, the largest first.
+
+    ``order`` is the stated order, ``slope`` the observed one, NaN if it cannot be determined.
+    """
 
     label: str
     order: int
@@ -49,17 +55,17 @@ class PrecisionCurve:
     slope: float
 
     def seconds_for(self, tolerance: float) -> float:
-        """Return the least time of a point whose error is at most the given one; NaN if there is none."""
+        """Return the shortest time, in seconds, of a point with an error up to ``tolerance``; NaN if there is none."""
         return min((p.seconds for p in self.points if p.error <= tolerance), default=math.nan)
 
 
 @dataclass(frozen=True)
 class Study:
-    """Measurements from 0 to ``time`` of the ``clock``, t or τ.
+    """Results of all methods, one curve each, for the part of a run from 0 to ``time`` with ``steps`` steps.
 
-    Errors below ``floor`` are errors of the ``reference``. ``set_up`` is the time in seconds that the solver needs once
-    for each trajectory; it is not included in the times of the points. All methods are implemented in ``language``;
-    ``rounds`` is the number of repetitions.
+    ``clock`` is the variable of this time, t or τ. Errors below ``floor`` are errors of the ``reference`` solution.
+    ``set_up`` is the time in seconds that the solver needs once for each trajectory, which the times of the points do
+    not contain. All methods are written in ``language``; ``rounds`` is the number of repetitions.
     """
 
     time: float
@@ -87,10 +93,11 @@ def study(
     casimirs: Callable[[Floats], float] | None = None,
     rounds: int = ROUNDS,
 ) -> Study:
-    """Run all methods with steps of size ``h``, larger and smaller ones, over the first of ``steps`` steps of the run.
+    """Run all methods of ``race`` with steps of size ``h``, with larger and with smaller steps, and measure the times.
 
-    ``solution`` is the closed form, if there is one; otherwise DOP853 provides the reference, with a step so small that
-    halving it no longer changes the result. ``casimirs`` returns the largest error of a Casimir at a state. Raises
+    The runs cover the beginning of a run of ``steps`` steps of size h. ``order`` is that of the solver. ``solution(t)``
+    is the closed form, if there is one; otherwise DOP853 provides the reference, with steps so small that halving them
+    no longer changes the result. ``casimirs(x)`` returns the largest error of a Casimir at a state. Raises
     `ArithmeticError` if DOP853 cannot follow the solution.
     """
     for span in sorted({min(steps, s) for s in SPANS}, reverse=True):
@@ -122,8 +129,11 @@ def error_of(state: Floats, target: Floats) -> float:
 
 
 def slope(errors: Mapping[int, float], floor: float) -> float:
-    """Return the median slope of the last three halvings of the step in the asymptotic range; NaN if there are none."""
-    # If a smaller step has a larger error, rounding dominates.
+    """Return the observed order from ``errors`` by the number of steps; NaN if no errors are in the asymptotic range.
+
+    It is the median of log₂ of the quotients of errors for the last three halvings of the step in that range.
+    """
+    # If the error grows from one number of steps to the next, it is rounding error.
     floor = max([floor, *(b for a, b in pairwise(errors.values()) if a < b and a < SMALL)])
     usable = {n: e for n, e in errors.items() if ABOVE_FLOOR * floor < e < ASYMPTOTIC}
     slopes = [math.log2(e / usable[2 * n]) for n, e in usable.items() if 2 * n in usable]
@@ -131,16 +141,17 @@ def slope(errors: Mapping[int, float], floor: float) -> float:
 
 
 def _states(run: Runner, end: float, span: int, target: Floats, floor: float) -> dict[int, Floats]:
-    """Return the final state for increasing numbers of steps.
+    """Return the final states of runs up to the time ``end``, by their numbers of steps, in increasing order.
 
-    The numbers end when rounding dominates the error or a run takes too long.
+    Larger numbers are left out when rounding dominates the error, or when a run takes longer than `MOST_SECONDS`. Runs
+    that fail, or whose error is as large as the solution, are left out too.
     """
     states: dict[int, Floats] = {}
     least, count = math.inf, 0
     for n in sorted({round(span * f * 2.0**k) for k in range(-COARSER, FINER + 1) for f in (1.0, 1.5)} - {0}):
         start = time.perf_counter()
         state = run(end / n, n, 1)
-        # This form of the comparison is also true for NaN, from a missing solution.
+        # "not error < 1" is also true if the error is NaN, because the reference solution failed.
         if state is None or not (error := error_of(state, target)) < 1:
             continue
         states[n] = state
@@ -152,9 +163,10 @@ def _states(run: Runner, end: float, span: int, target: Floats, floor: float) ->
 
 
 def _times(race: Race, counts: Mapping[str, Sequence[int]], end: float, rounds: int) -> dict[tuple[str, int], float]:
-    """Return the seconds of one run for each method and number of steps: the minimum of interleaved repetitions.
+    """Return the time of one run in seconds, for each method and number of steps (``counts``).
 
-    The set-up time has the key ("", 0).
+    It is the minimum over the repetitions, in each of which all methods take turns. The key ("", 0) has the set-up
+    time.
     """
     works: dict[tuple[str, int], Callable[[int], object]] = {("", 0): race.set_up}
     for label, run in race.runners.items():
@@ -173,7 +185,11 @@ def _times(race: Race, counts: Mapping[str, Sequence[int]], end: float, rounds: 
 
 
 def _by_dop853(race: Race, end: float, span: int) -> tuple[Floats, float]:
-    """Return the final solution and the least difference of results with steps h and h/2; infinity if all runs fail."""
+    """Return the solution at the time ``end`` by DOP853, and its estimated relative error.
+
+    The step is halved repeatedly; the estimate is the least difference between results with a step and half that step.
+    It is infinite if all runs fail.
+    """
     best, last = (np.full(1, np.nan), math.inf), None
     for k in range(-2, FINER):
         n = max(1, math.ceil(span * 2.0**k))

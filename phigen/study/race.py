@@ -1,7 +1,8 @@
-"""The solver and classical methods in one compiled C file, for a fair comparison of times.
+"""Runs of the solver and of classical methods, for a fair comparison of their times.
 
-In Python a classical method would spend its time in the interpreter. Here all methods are in one C file, compiled with
-the same flags, in which the vector field can be inlined.
+In Python a classical method would spend its time in the interpreter. So all methods are written in one C file, which is
+compiled with the same flags, and in which the vector field can be inlined. Without a compiler all methods run in
+Python.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ from phigen.study.methods import extended, field_of
 from phigen.study.monitored import field_in_tau
 from phigen.symbolic.arrays import Floats
 
-#: The label of the solver among the methods.
+#: Label of the phigen solver among the methods.
 OWN = "phigen"
 
-#: Explicit methods: the rows of the tableau below the first, and the weights.
+#: Butcher tableaux of the explicit methods: the rows of the matrix after the first, which is 0, and the weights. Each
+#: maps the index of a stage to its coefficient.
 TABLEAUX: Mapping[str, tuple[Sequence[Mapping[int, float]], Mapping[int, float]]] = {
     "euler": ((), {0: 1.0}),
     "rk2": (({0: 0.5},), {1: 1.0}),
@@ -33,16 +35,16 @@ TABLEAUX: Mapping[str, tuple[Sequence[Mapping[int, float]], Mapping[int, float]]
     "dop853": (dop853.A[1:], dop853.B),
 }
 
-#: Function (h, steps, repetitions) that makes a run several times; it returns the final state, None if a step fails.
+#: Function of (h, steps, repetitions) that repeats a run, and returns its final state, or None if a step fails.
 Runner = Callable[[float, int, int], Floats | None]
 
 
 @dataclass(frozen=True)
 class Race:
-    """Runners by label, and ``set_up``, which repeats the work that the solver does once for each trajectory.
+    """Methods to compare: the functions that run them, by label, all written in ``language``, ``C`` or ``Python``.
 
-    All of them are written in ``language``, ``C`` or ``Python``. The ``clock`` is the variable in which steps are
-    uniform.
+    ``set_up(n)`` repeats n times the work that the solver does once for each trajectory. ``clock`` is the variable in
+    which steps have equal size, t or τ.
     """
 
     runners: Mapping[str, Runner]
@@ -54,9 +56,9 @@ class Race:
 def compiled(
     compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """Return the runners of the solver and of explicit methods, compiled C in double precision.
+    """Return the race of the solver and those ``methods`` that are explicit, in compiled C and double precision.
 
-    For monitored systems all methods step in τ. Raises `ToolchainError`.
+    With a monitor, all methods make steps of equal size in τ. Raises `ToolchainError` if the C cannot be compiled.
     """
     from phigen.targets.rendering import render
 
@@ -102,7 +104,7 @@ def compiled(
 def interpreted(
     solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """Return the runners of the solver and of the methods in Python; for monitored systems all methods step in τ."""
+    """Return the race of the solver and the ``methods``, all in Python. With a monitor, steps have equal size in τ."""
 
     begin = t0 if solver.interface.time else None
 

@@ -1,4 +1,4 @@
-"""Errors of single precision, by comparison with a solver in double precision."""
+"""Measurement of errors of a solver in single precision, by comparison with the solver in double precision."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from phigen.study.methods import Method
 from phigen.study.summary import summarise
 from phigen.symbolic.arrays import Floats
 
-#: Rounding unit of single precision (24 binary digits) in rounding units of double precision (53 binary digits).
+#: Ratio of the rounding units of single precision (24 binary digits) and double precision (53 binary digits).
 COARSER = 2.0**29
-#: Limit for the difference between steps in single and in double precision, relative to the state.
+#: Largest accepted difference between a step in single and in double precision, relative to the state: 32 rounding
+#: units of single precision.
 ONE_STEP = 2.0**-19
 
-#: Name, value and limit.
+#: Result of a check: its name, the measured value and the limit.
 Measured = tuple[str, float, float]
-#: Function that makes a step of size h from a state.
+#: Function of a state and a step size that returns the state after a step.
 Step = Callable[[Floats, float], Floats]
 
 
@@ -34,9 +35,13 @@ def measured(
     parameters: Mapping[str, float],
     t0: float,
 ) -> Iterator[Measured]:
-    """Yield the differences of steps in single from steps in double precision, and the Casimir errors of a run."""
+    """Yield the results of checks of single precision: of single steps, and of the Casimirs along a run.
+
+    Steps of size h from ``states`` are compared with those in double precision. The run has ``steps`` steps from
+    ``start`` at the time ``t0``.
+    """
     apart = farthest(single.step, double.step, states, h)
-    yield "single precision: a step, beside double", apart, ONE_STEP
+    yield "single precision: a step against double precision", apart, ONE_STEP
     rows, times = single.rows(start, h, steps, 1), t0 + h * np.arange(steps + 1.0)
     columns = dict(zip(system.coordinates, rows.T, strict=True))
     summary = summarise(single.name, system, None, parameters, times, rows)
@@ -48,8 +53,10 @@ def measured(
 
 
 def farthest(single: Step, double: Step, states: Sequence[Floats], h: float) -> float:
-    """Return the largest relative difference of steps in single precision from the same states, rounded to single
-    precision."""
+    """Return the largest difference between steps in single and in double precision, relative to the state.
+
+    Both steps begin at the same state, which is one of ``states``, rounded to single precision.
+    """
     worst = 0.0
     for x in states:
         rounded = x.astype(np.float32).astype(np.float64)

@@ -1,4 +1,4 @@
-"""Reduction of runs of any length to the number of rows that a figure can show."""
+"""Selection of rows of a run for figures, so that the memory does not depend on the length of the run."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ from phigen.symbolic.arrays import Floats
 
 Numbers = NDArray[np.int64]
 
-#: Largest number of stored rows of a run, and number of windows of which the row with the largest error is also stored.
+#: ROWS: largest number of rows at equal intervals that are stored. WINDOWS: number of equal parts of the run; in each
+#: of them, the rows with the largest errors are stored too.
 ROWS, WINDOWS = 8000, 400
-#: Largest number of stored points of a section.
+#: Largest number of points of a section (crossings) that are stored for a figure.
 POINTS = 20_000
 
 
 class Thinned:
-    """Subset of at most ``max_rows`` of successive rows: every row, every second, every fourth, …
+    """Selection of at most ``max_rows`` rows from a sequence of rows: all, or every second, every fourth, …
 
-    The choice depends only on the number of rows. ``state`` is the complete state, as arrays.
+    Whenever there are too many rows, every second one is dropped. So the selection depends only on the number of rows,
+    not on the portions in which they arrive. ``state`` has the rows and counts, as arrays that can be saved.
     """
 
     def __init__(self, width: int, max_rows: int) -> None:
@@ -35,13 +37,13 @@ class Thinned:
 
     @property
     def rows(self) -> Floats:
-        """The stored rows (rows, width)."""
+        """The selected rows (rows, width)."""
         rows: Floats = self.state["rows"]
         return rows
 
     @property
     def seen(self) -> int:
-        """The number of rows received."""
+        """The number of rows received so far."""
         return int(self.state["seen"])
 
     def see(self, rows: Floats) -> None:
@@ -54,11 +56,11 @@ class Thinned:
 
 
 class Sketch:
-    """Rows of a run for its figures: rows at equal intervals, and the row with the largest error in each of `WINDOWS`
-    windows.
+    """Selection of the rows of a run for its figures.
 
-    Each row contains its number, t, x, energy, Casimirs and observables. ``rows`` is the total number of rows of the
-    run. Errors of observables are not considered.
+    The rows are at equal intervals; in addition, for the energy and each Casimir, the row with the largest error in
+    each of `WINDOWS` equal parts of the run is stored. A stored row contains its number, t, x, energy, Casimirs and
+    observables. ``rows`` is the number of all rows of the run.
     """
 
     def __init__(self, dimension: int, casimirs: int, rows: int, observables: int = 0) -> None:
@@ -75,7 +77,7 @@ class Sketch:
 
     @property
     def state(self) -> dict[str, Any]:
-        """The complete state, as arrays."""
+        """The stored rows and counts, as arrays that can be saved and restored."""
         return {**self._thinned.state, **self._peaks}
 
     @state.setter
@@ -95,7 +97,7 @@ class Sketch:
         first = self._peaks["first"]
         windows = (numbered[:, 0] * WINDOWS // max(self._of, 1)).astype(np.int64).clip(0, WINDOWS - 1)
         for k, values in enumerate(numbered[:, self._quantities].T):
-            with np.errstate(invalid="ignore"):  # ∞ − ∞ is NaN
+            with np.errstate(invalid="ignore"):  # an infinite value gives ∞ − ∞ = NaN, without a warning
                 errors = np.abs(values - first[self._quantities][k])
             for window in np.unique(windows):
                 part = np.flatnonzero(windows == window)
@@ -114,7 +116,8 @@ class Sketch:
         broken: bool = False,
         observables: tuple[str, ...] = (),
     ) -> Trajectory:
-        """Return the stored rows in order. If the run was ``broken`` off, a row of NaN follows."""
+        """Return the stored rows, in their order, as a trajectory. If the run was ``broken`` off, a row of NaN
+        follows."""
         peaks = self._peaks["peaks"].reshape(-1, self._peaks["peaks"].shape[-1])
         stored_rows = np.concatenate(
             [self._thinned.rows, peaks[self._peaks["errors"].ravel() >= 0], self._peaks["last"][None]]

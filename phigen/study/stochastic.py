@@ -1,4 +1,4 @@
-"""Steps with noise: strong orders along common paths, and steps with the largest increments."""
+"""Measurements of steps with noise: their strong order, and failures with the largest increments."""
 
 from __future__ import annotations
 
@@ -12,20 +12,22 @@ from phigen.runtime.solver import Solver
 from phigen.scheme.program import MAX_NORMAL_VARIATE
 from phigen.symbolic.arrays import Floats
 
-#: Number of Wiener paths; number of halvings of the step; additional halvings of the reference; seed of all paths.
+#: PATHS: number of Wiener paths. LEVELS: number of step sizes h, h/2, h/4, …. BEYOND: number of further halvings for
+#: the reference solution. SEED: seed of the paths.
 PATHS, LEVELS, BEYOND, SEED = 48, 5, 2, 1
-#: Number of random sign choices for the largest increments at one state.
+#: Number of steps from one state with the largest increments; their signs are random.
 SIGNS = 8
 
 
 def strong_order(
     solver: Solver, x0: Floats, parameters: Mapping[str, float], t0: float, h: float, steps: int, paths: int = PATHS
 ) -> float:
-    """Return the strong order: the slope of the errors of steps of h, h/2, h/4, … along the same Wiener paths.
+    """Return the strong order of a solver.
 
-    An increment of a coarse step is the sum of the increments of the fine steps inside it. Reference solutions follow
-    the piecewise linear interpolation of the same path and use only the vector fields; they converge to the
-    Stratonovich solution.
+    It is the power of the step size with which the error at the end of the same Wiener paths decreases, for the steps
+    h, h/2, h/4, … An increment of a coarse step is the sum of the increments of the fine steps inside it. Reference
+    solutions follow the piecewise linear interpolation of a path, use only the vector fields, and converge to the
+    Stratonovich solution. ``steps`` is the number of steps of size h along a path.
     """
     draws, finest = solver.interface.draws, steps << (LEVELS + BEYOND)
     begin = t0 if solver.interface.time else None
@@ -48,7 +50,10 @@ def strong_order(
 def _along_lines(
     solver: Solver, x: Floats, parameters: Mapping[str, float], t0: float, h: float, increments: Floats
 ) -> Floats:
-    """Return the ends of paths (paths, steps, sources) from x (paths, DIM), by one RK4 step for each increment."""
+    """Return the states (paths, DIM) at the ends of piecewise linear paths that begin at ``x`` (paths, DIM).
+
+    One RK4 step of size h is made for each piece. ``increments`` (paths, steps, draws) are those of the paths.
+    """
     backend, timed = solver.backend, bool(solver.interface.time)
     sources = len(solver.interface.noise)
 
@@ -68,7 +73,10 @@ def _along_lines(
 
 
 def failures(solver: Solver, states: Sequence[Floats], parameters: Mapping[str, float], t0: float, h: float) -> int:
-    """Return the number of steps from these states that fail with the largest possible increments."""
+    """Return the number of steps that fail, among `SIGNS` steps from each state with the largest possible increments.
+
+    The signs of the increments are random.
+    """
     draws, begin = solver.interface.draws, t0 if solver.interface.time else None
     random, failed = np.random.default_rng(SEED), 0
     for x in states:

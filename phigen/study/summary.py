@@ -1,4 +1,4 @@
-"""Conservation in a run: errors of one method, computed from its states."""
+"""Summary of a run of one method: errors of energy, Casimirs, invariants and solution, computed from its states."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from phigen.study.balance import powers, works
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.symbols import ELAPSED, initial
 
-#: Number of windows of equal length. Drift is distinguished from oscillation by the largest energy errors in the
-#: windows.
+#: Number of parts of equal length (windows) of a run. The largest errors in the windows show whether an error drifts or
+#: oscillates.
 WINDOWS = 10
 
-#: Value that marks a window without rows.
+#: Entry for the largest error in a window without rows.
 _NOTHING = -1.0
-#: Least number of turning points in the first window, for each coordinate with turning points in the run: one
-#: oscillation. Otherwise windows are not compared.
+#: Windows are compared only if each coordinate that has turning points in the run has at least this number of them, one
+#: oscillation, in the first window.
 _TURNS = 2
 
 
@@ -32,9 +32,9 @@ _TURNS = 2
 class Drift:
     """Largest error of a conserved quantity, in the unit of the quantity.
 
-    ``growth`` is the largest error in the last tenth of the run, divided by that in the first tenth; it is about 1
-    without drift. It is NaN if it would be meaningless: if the errors are rounding errors, or if the first tenth of the
-    run contains no full oscillation.
+    ``growth`` is the largest error in the last tenth of the run, divided by the largest error in the first tenth. It is
+    about 1 without drift, and NaN where the quotient has no meaning: if the errors are rounding errors, or if the first
+    tenth of the run contains no full oscillation.
     """
 
     error: float
@@ -44,11 +44,12 @@ class Drift:
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors of one method; ``exact`` is the largest error against the closed form, None if there is none.
+    """Errors of one method in a run, which has ``rows`` rows; the first ``good`` rows are finite, and are evaluated.
 
-    The first ``good`` rows of the states are finite, and the numbers are about these rows. If a method fails at once,
-    its errors are infinite. If H is not an invariant, ``energy`` is about H − ``work``, where ``work`` is an integral
-    with an error of about ``off`` in the same unit, and ``change`` is the largest change of H itself.
+    ``exact`` is the largest error against the closed form, None if there is none. If the method fails in its first
+    step, all errors are infinite. If H is not constant along the motion, ``energy`` is the error of H − work; ``work``
+    is the work at the end, with an error of about ``off`` in the unit of the energy, and ``change`` is the largest
+    change of H.
     """
 
     method: str
@@ -70,24 +71,27 @@ class Summary:
 
     @property
     def units(self) -> dict[str, Unit]:
-        """The units of the errors, by the names of the quantities."""
+        """Units in which the errors are measured, by the name of the quantity."""
         return {ENERGY: self.energy.unit, **{n: d.unit for n, d in {**self.casimirs, **self.invariants}.items()}}
 
 
 def summarise(
     method: str, system: System, run: Run | None, parameters: Mapping[str, float], t: Floats, x: Floats
 ) -> Summary:
-    """Return the summary of states ``x`` (rows, DIM) at times ``t``. All quantities are evaluated from formulas."""
+    """Return the summary of the states ``x`` (rows, DIM) at the times ``t`` (rows,) of a run of ``method``.
+
+    Energy, Casimirs and invariants are evaluated from the formulas of the system.
+    """
     watch = Watch(method, system, run, parameters, len(x))
     watch.see(t, x)
     return watch.summary()
 
 
 class Watch:
-    """Running summary of the states of one method, with memory that does not grow with the number of states.
+    """Running summary of the states of one method, whose memory does not grow with the number of states.
 
-    ``rows`` is the expected number of rows; it determines the windows by which drift is distinguished from oscillation.
-    ``state`` is the complete state of the summary, as arrays.
+    ``rows`` is the number of rows that the run will have, from which the windows follow. ``state`` has all intermediate
+    results, as arrays that can be saved.
     """
 
     def __init__(
@@ -115,7 +119,9 @@ class Watch:
             "broken": np.zeros((), dtype=bool),
         }
         self._powers = powers(system)
-        if self._powers:  # last time and power with its derivatives; work since the start and its estimated error
+        # instant: the last time, and the power with its derivatives there; work: the work so far, and its estimated
+        # error
+        if self._powers:
             self.state |= {"instant": np.full(1 + len(self._powers), np.nan), "work": np.zeros(2)}
             self.state |= {"change": np.zeros(())}
         if system.driven:
@@ -128,11 +134,11 @@ class Watch:
 
     @property
     def good(self) -> int:
-        """The number of rows received, all finite."""
+        """The number of finite rows that have been received."""
         return int(self.state["good"])
 
     def break_down(self) -> None:
-        """Record that the method failed: no further rows follow."""
+        """Record that the method failed, so that no further rows follow."""
         self.state["broken"] = np.asarray(True)
 
     def see(self, t: Floats, x: Floats) -> None:
@@ -160,9 +166,9 @@ class Watch:
         state["good"] = np.asarray(good_rows + count)
         windows = _windows(np.arange(good_rows, good_rows + count), self._about[1])
         for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
-            with np.errstate(invalid="ignore"):  # errors are undefined if the initial value is
+            with np.errstate(invalid="ignore"):  # no warning if the initial value is not finite: then errors are NaN
                 np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
-        if self._powers:  # the balance starts at the initial energy
+        if self._powers:  # work is 0 at the start, so that "start" is the initial energy for the change of H too
             changes = self._units()[0].errors(energies, float(state["start"][0]))
             state["change"] = np.maximum(state["change"], np.max(changes))
         self._see_turns(x, windows)
@@ -172,9 +178,9 @@ class Watch:
         state["final"] = x[-1].copy()
 
     def _work(self, t: Floats, slopes: Sequence[Floats]) -> Floats:
-        """Return the work done up to each of the times, from the power and its derivatives at these times.
+        """Return the work done from the start to each of the times ``t``, and add it to the state.
 
-        The times follow those received before.
+        ``slopes`` are the power and its derivatives at these times, which follow the times of earlier calls.
         """
         state = self.state
         if not self.begun:
@@ -187,11 +193,11 @@ class Watch:
         return sums
 
     def summary(self) -> Summary:
-        """Return the summary of the rows so far."""
+        """Return the summary of the rows received so far."""
         (method, rows), state = self._about, self.state
         steps = self._run.steps if self._run else rows
         telling = rows >= 2 * WINDOWS and _is_telling(state["turns"])
-        failed = bool(state["broken"]) and self.good <= 1  # the method failed in the first row after the start
+        failed = bool(state["broken"]) and self.good <= 1  # no finite row follows the initial state
         maxima = np.full_like(state["maxima"], math.inf) if failed else state["maxima"]
         drifts = [_drift(m, unit, steps, telling) for m, unit in zip(maxima, self._units(), strict=True)]
         drift_of = iter(drifts)
@@ -235,13 +241,19 @@ class Watch:
 
 
 def _is_telling(turns: NDArray[np.int64]) -> bool:
-    """Whether the first window contains an oscillation, from the turning points in it and in the whole run."""
+    """Whether the first window contains an oscillation of every coordinate that oscillates, so that windows compare.
+
+    ``turns`` (2, DIM) are the numbers of turning points in the first window and in the whole run.
+    """
     turning = turns[1] > 0
     return bool(turning.any() and (turns[0, turning] >= _TURNS).all())
 
 
 def _windows(rows: NDArray[np.int64], row_count: int) -> NDArray[np.int64]:
-    """Return the window of each row of a run: one of `WINDOWS` windows, or an additional window for the first row."""
+    """Return the number of the window, from 0, of each row number in ``rows``; `WINDOWS` for the initial row 0.
+
+    ``row_count`` is the number of all rows of the run.
+    """
     share, remainder = divmod(row_count - 1, WINDOWS)
     window_ends = np.cumsum([share + (k < remainder) for k in range(WINDOWS)])
     return np.where(rows == 0, WINDOWS, np.searchsorted(window_ends, rows - 1, side="right"))
@@ -257,7 +269,7 @@ def _drift(maxima: Floats, unit: Unit, steps: int, telling: bool) -> Drift:
 def exact_solution(
     system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats
 ) -> dict[str, Floats]:
-    """Return the closed form of a run at the times ``t``, for the coordinates with a closed form in the run."""
+    """Return the values at the times ``t`` of the coordinates for which the run states a closed form, by coordinate."""
     values: dict[str, Any] = {ELAPSED: t, **parameters}
     values |= {initial(c): float(v) for c, v in zip(system.coordinates, x0, strict=True)}
     arrays = evaluate(list(run.exact.values()), values)
@@ -267,7 +279,10 @@ def exact_solution(
 def _against_exact(
     system: System, run: Run, parameters: Mapping[str, float], x0: Floats, t: Floats, x: Floats
 ) -> float:
-    """Return the largest difference, relative to the largest coordinate of the closed form at the same time."""
+    """Return the largest error of the states ``x`` (rows, DIM) against the closed form of the run.
+
+    An error is relative to the largest coordinate of the closed form at the same time.
+    """
     solution = exact_solution(system, run, parameters, x0, t)
     columns = [system.coordinates.index(c) for c in solution]
     expected = np.column_stack(list(solution.values()))

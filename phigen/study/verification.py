@@ -1,8 +1,8 @@
 """Verification: properties of a generated solver, measured on a run and judged by limits.
 
-Exact properties must hold to round-off: Casimirs, the Poisson identity, reversibility, agreement of the targets. The
-order must be the stated one, and the energy must not drift. Steps of solvers from approximate bi-realisations are
-Poisson maps only up to a stated power of h, and that power is checked.
+Exact properties must hold to round-off: constant Casimirs, the identity of Poisson maps, reversibility, agreement of
+the targets. The order must be the stated one, and the energy must not drift. With an approximate bi-realisation, a step
+is a Poisson map only up to a stated power of h, and that power is checked.
 """
 
 from __future__ import annotations
@@ -28,22 +28,23 @@ from phigen.study.summary import Drift, Summary, summarise
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
 
-#: Largest accepted shortfall of an observed order below the stated one.
+#: An observed order may be smaller than the stated one by at most this.
 ORDER_SLACK = 0.3
-#: Largest accepted shortfall of a strong order, which is measured on few paths.
+#: An observed strong order may be smaller than the stated one by at most this. It is measured on few paths.
 STRONG_SLACK = 0.2
-#: Largest accepted shortfall of the power of the modified Hamiltonian, as a fraction of the gain by the last
-#: correction.
+#: The observed power of h for the modified Hamiltonian may be too small by at most this fraction of the increase that
+#: its last correction should bring.
 MODIFIED_SLACK = 0.6
-#: Limit for one-step identities relative to their terms: Poisson defect, reversibility, agreement of targets.
+#: Largest accepted error of exact properties of a step, relative to their terms: Poisson defect, reversibility,
+#: agreement of targets.
 ONE_STEP = 1e-13
-#: Limit for the tangent map against finite differences of the step: the error of the latter.
+#: Largest accepted difference between the tangent map and finite differences of a step, whose error is of this size.
 DIFFERENCES = 1e-7
-#: Limit for the ratio of the largest energy error in the last tenth of the run to that in the first tenth.
+#: Largest accepted quotient of the largest energy errors in the last and in the first tenth of a run.
 GROWTH = 4.0
 #: Largest number of steps of a run, without and with --quick.
 MOST_STEPS, FEW_STEPS = 20_000, 2_000
-#: Number of states along the run from which single steps are examined.
+#: Number of states of the run from which single steps are checked.
 STATES = 4
 
 
@@ -54,10 +55,10 @@ def order_limit(stated: float, slack: float = ORDER_SLACK) -> str:
 
 @dataclass(frozen=True)
 class Check:
-    """One property: the measured ``value``, whether it ``passed``, and the ``limit`` as text; "" if the value is not
-    judged.
+    """Result of the check of one property: the measured ``value``, and whether the check ``passed``.
 
-    ``reason`` says why it failed. ``others`` has the values of the methods for comparison.
+    ``limit`` is the limit of the value as text, "" if there is none. ``reason`` is the text for a failure. ``others``
+    has the values of the same property for the methods with which the solver is compared.
     """
 
     name: str
@@ -70,9 +71,10 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of one spec on one run. ``label`` states the claim of the solver, ``units`` the units of errors.
+    """Results of all checks of one spec on one run.
 
-    For lattices the text ``said`` states the units. ``clock`` is the variable in which steps are uniform, t or τ.
+    ``label`` describes the method with its order. ``units`` are the units of errors by quantity; for lattices, the text
+    ``said`` states them. ``clock`` is the variable in which steps have equal size, t or τ.
     """
 
     name: str
@@ -89,18 +91,18 @@ class Verification:
 
     @property
     def made(self) -> str:
-        """The number and the size of the steps, as text."""
+        """Number and size of the steps as text, such as ``2000 steps of 0.1``."""
         return f"{self.steps} steps of {self.step:.9g}" + " in τ" * (self.clock == "τ")
 
     @property
     def failures(self) -> list[str]:
-        """The reason of each check that failed."""
+        """The name of each check that failed, with the reason."""
         return [f"{c.name}: {c.reason}" for c in self.checks if not c.passed]
 
 
 @dataclass(frozen=True)
 class Subject:
-    """Subject of a verification: methods of all targets (``own``), methods for comparison, and the settings of the
+    """Subject of a verification: the methods of all targets (``own``), methods for comparison (``others``), and a
     run."""
 
     compilation: Compilation
@@ -112,16 +114,16 @@ class Subject:
     h: float
     steps: int
     t0: float
-    field: Callable[[Floats], Floats]  # vector field in the variable in which steps are uniform, t or τ
+    field: Callable[[Floats], Floats]  # vector field of the motion in t or, with a monitor, in τ
 
     @property
     def solver(self) -> Solver:
-        """The solver of the `main` target."""
+        """The solver of the first target, C if available."""
         return next(iter(self.solvers.values()))
 
     @property
     def main(self) -> Method:
-        """The method for measurements that need only one target: C if available."""
+        """The method of the first target, C if available, for measurements that need only one target."""
         return next(iter(self.own.values()))
 
     @property
@@ -144,10 +146,11 @@ def verify(
     quick: bool = False,
     single: Solver | None = None,
 ) -> Verification:
-    """Measure and judge the solvers of a compilation (by target, with their tangent maps) on the settings of a run.
+    """Measure properties of the solvers of a compilation on a run, and judge them.
 
-    All steps begin at the time ``t0``, also those from states along the run. ``single`` is the same solver in single
-    precision, if there is one: it is compared with the others. Raises `StepError` if a step of the run fails.
+    ``solvers`` maps targets to solvers with tangent maps; ``compare`` names classical methods. Single steps are made
+    from states along the run, but all of them begin at the time ``t0``. ``single`` is the solver in single precision,
+    if there is one; it is compared with the others. Raises `StepError` if a step of the run fails.
     """
     x = np.array(start, dtype=np.float64)
     gauge = gauge_at(compilation, x, parameters)
@@ -159,7 +162,8 @@ def verify(
     step_count = min(steps, FEW_STEPS if quick else MOST_STEPS)
     subject = Subject(compilation, solvers, methods, classical, parameters, x, h, step_count, t0, field)
     rows = subject.main.rows(x, h, step_count, 1)
-    # With noise, trajectories may start at rest or at the origin, where relative errors of single steps have no scale.
+    # With noise, runs may start at rest in the origin, where errors of single steps cannot be relative to the state. So
+    # the initial state is not used.
     first = step_count // STATES if noisy else 0
     states = [rows[i] for i in np.linspace(first, step_count, STATES, dtype=int)] if step_count >= STATES else [x]
     symmetry = "symmetric" if compilation.symmetric else "not symmetric"
@@ -192,7 +196,7 @@ def verify(
 
 
 def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) -> tuple[Check, ...]:
-    """Return the checks of all groups; each group is a stage of the progress display."""
+    """Return the checks of all groups, by title; each group is shown as a stage of the progress display."""
     results: list[Check] = []
     with progress.stage(f"{name}: measurements", len(groups)) as running:
         for title, checks in groups.items():
@@ -203,7 +207,10 @@ def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) ->
 
 
 def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float]) -> Floats | None:
-    """Return the gauge that a solver chooses for the trajectory from x; None for solvers without a gauge."""
+    """Return the constants that a solver chooses for the trajectory from x: multiples of Casimirs, or e = −H(x).
+
+    None if the solver has no such constants.
+    """
     if not compilation.program.held:
         return None
     from phigen.api import solver_of
@@ -213,8 +220,10 @@ def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float
 
 
 def order_check(subject: Subject, state: Floats, *, quick: bool = False) -> Check:
-    """Return the check of the observed order. For systems with noise, the order without noise is measured, from a
-    state of the run."""
+    """Return the check of the observed order.
+
+    For a system with noise, the order is measured with the noise set to 0, from the state ``state`` of the run.
+    """
     if not subject.compilation.system.noise:
         return _order_check("observed order", subject, quick=quick)
     noiseless = without_noise(subject.solver, subject.parameters, subject.t0)
@@ -223,7 +232,7 @@ def order_check(subject: Subject, state: Floats, *, quick: bool = False) -> Chec
 
 
 def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
-    """Yield the checks of the strong order, and that steps with the largest increments of all sources succeed."""
+    """Yield two checks of systems with noise: of the strong order, and of steps with the largest increments."""
     system = subject.compilation.system
     if not system.noise:
         return
@@ -238,12 +247,12 @@ def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
         "strong order, along common paths", observed_order, limit, observed_order >= stated - STRONG_SLACK, reason
     )
     failed = failures(subject.solver, states, subject.parameters, subject.t0, subject.h)
-    name, reason = "steps that fail, of increments as large as can be", f"{failed} fail; a smaller step helps"
+    name, reason = "steps that fail with the largest increments", f"{failed} fail; a smaller step helps"
     yield Check(name, failed, "none", failed == 0, reason)
 
 
 def time_checks(subject: Subject, gauge: Floats | None, *, quick: bool = False) -> Iterator[Check]:
-    """Yield the check of the observed order of state and time, for steps uniform in τ."""
+    """Yield, for systems with a monitor, the check of the observed order of the state together with the time."""
     if subject.compilation.program.monitor is None or gauge is None:
         return
     main = with_time(subject.solver, subject.parameters, gauge)
@@ -277,9 +286,9 @@ def _order_check(title: str, subject: Subject, *, quick: bool) -> Check:
 
 
 def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
-    """Return a function from a time to the solution and its uncertainty.
+    """Return a function of a time that returns the solution at this time, and its estimated relative error.
 
-    The solution is computed by DOP853, with steps halved until two results agree.
+    The solution is computed by DOP853, with steps that are halved until two results agree.
     """
     solver = of_classical("dop853", subject.solver, subject.parameters, subject.t0, subject.field)
     solutions: dict[float, tuple[Floats, float]] = {}
@@ -308,11 +317,15 @@ def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
 
 
 def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
-    """Yield the checks that Casimirs are constant to round-off and that the energy does not drift."""
+    """Yield the checks that Casimirs are constant to round-off, and that the energy does not drift, along a run.
+
+    ``rows`` (rows, DIM) are the states of the run.
+    """
     system, steps = subject.compilation.system, subject.steps
     compared = subject.others
     times: Floats = subject.t0 + subject.h * np.arange(len(rows), dtype=np.float64)
-    if system.forces and subject.compilation.monitor:  # the work needs the physical time, which the other methods lack
+    # With forces the work is integrated over the physical time t, which classical methods in τ do not compute.
+    if system.forces and subject.compilation.monitor:
         trajectory = subject.solver.integrate(subject.start, subject.h, len(rows) - 1, 1, parameters=subject.parameters)
         times, compared = trajectory.t, {}
     summary = _summary(subject, subject.main.name, rows, times)
@@ -357,7 +370,7 @@ def _summary(subject: Subject, name: str, rows: Floats, times: Floats) -> Summar
 
 
 def _summary_of(subject: Subject, method: Method, times: Floats) -> Summary | None:
-    """Return the errors of another method; None if one of its steps fails."""
+    """Return the errors of a method on the run; None if one of its steps fails."""
     try:
         return _summary(subject, method.name, method.rows(subject.start, subject.h, subject.steps, 1), times)
     except StepError:
@@ -365,8 +378,10 @@ def _summary_of(subject: Subject, method: Method, times: Floats) -> Summary | No
 
 
 def _recurrent(rows: Floats) -> bool:
-    """Whether the second half of the states stays within the range of the first half, plus 20 %. Then windows can be
-    compared."""
+    """Whether each coordinate stays, in the second half of a run, in its range of the first half, plus a margin.
+
+    The margin is 20 % of the largest range. Only then can errors in the first and the last tenth be compared.
+    """
     half_count = len(rows) // 2
     low, high = rows[:half_count].min(axis=0), rows[:half_count].max(axis=0)
     margin = 0.2 * np.max(high - low)
@@ -374,7 +389,7 @@ def _recurrent(rows: Floats) -> bool:
 
 
 def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
-    """Yield the checks of tangent map, Poisson identity and reversibility of single steps."""
+    """Yield the checks of single steps from ``states``: of Poisson identity, tangent map and reversibility."""
     system, parameters = subject.compilation.system, subject.parameters
     settings = [(x, f * subject.h) for x in states for f in (1.0, 0.5, -1.0)]
 
@@ -409,11 +424,10 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
 
 
 def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Floats]) -> Iterator[Check]:
-    """Yield the checks of gradients of short runs: against tangent maps and differences, and of batched against single
-    runs.
+    """Yield the checks of gradients of short runs: against tangent maps, against finite differences, and in batches.
 
-    The multiples of a gauge are held fixed, since gradients treat them as constants. In monitored systems e = −H(x₀)
-    depends on the initial state, except in tangent maps, which treat e as a constant.
+    Multiples of Casimirs are held fixed, since gradients treat them as constants. In systems with a monitor, gradients
+    include the dependence of e = −H(x₀) on the initial state, but tangent maps treat e as a constant.
     """
     program = subject.compilation.program
     if not program.extras.adjoint:
@@ -437,7 +451,10 @@ def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Flo
 def _approximate(
     subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], largest: float
 ) -> tuple[str, bool, str]:
-    """Return limit, verdict and reason for a truncation of degree d, whose defect must be O(h^(d+1))."""
+    """Return limit, verdict and reason of failure of the Poisson defect for a bi-realisation truncated in degree d.
+
+    The defect must decrease like h^(d+1); ``largest`` is the largest measured one.
+    """
     degree = subject.compilation.degree
     if degree is None:
         return "", True, ""
@@ -457,7 +474,7 @@ def _or_infinite(measure: Callable[[Method, Floats, float], float], method: Meth
 
 
 def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
-    """Return the check that single steps of all targets from the same states agree."""
+    """Return the check that single steps of all targets from the same states agree to round-off."""
     name, difference = "agreement of " + " and ".join(subject.own), 0.0
     if len(subject.own) < 2:
         return Check(f"agreement: only one target, {subject.main.name}", math.nan)
@@ -474,7 +491,7 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
 def single_checks(
     subject: Subject, solver: Solver | None, gauge: Floats | None, states: Sequence[Floats]
 ) -> Iterator[Check]:
-    """Yield the checks of single precision, if the spec requests it."""
+    """Yield the checks of the solver in single precision; none if the spec does not request single precision."""
     if solver is None:
         return
     method = of_solver(solver, subject.parameters, gauge, subject.t0)
@@ -486,14 +503,17 @@ def single_checks(
 
 
 def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
-    """Yield the checks that H̃ with m corrections is constant to order p + m, or p + 2m for a symmetric method."""
+    """Yield the checks that changes of H̃ with m corrections decrease like h^(p+m), or h^(p+2m) if symmetric.
+
+    H̃ is the modified Hamiltonian of the method, p its order. There are no checks if H̃ is not available.
+    """
     try:
         series = backward.modified(subject.compilation, subject.parameters, gauge)
     except backward.NotOfferedError:
         return
     observed = backward.observed_powers(series, subject.main, subject.start, subject.h)
     for m, (power, observed_power) in enumerate(zip(series.powers[1:], observed[1:], strict=True), 1):
-        # With a wrong last correction, the observed power is that without this correction.
+        # If the last correction were wrong, the observed power would be the one without this correction.
         limit = power - MODIFIED_SLACK * (power - series.powers[m - 1])
         reason = f"shrinks like h^{observed_power:.2f} instead of h^{power}"
         name = f"modified H, {m} correction{'s' * (m > 1)}: order"
@@ -501,8 +521,8 @@ def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
 
 
 def step_check(subject: Subject, states: Sequence[Floats]) -> Check:
-    """Return the largest step that succeeds, in units of the run's step."""
+    """Return the check of the largest step that succeeds from all ``states``, in units of the step of the run."""
     largest = measures.largest_step(subject.main, states, subject.h)
     return Check(
-        "largest step that converges, of the run's", largest, "at least 1", largest >= 1, "the run's step fails"
+        "largest step that converges, in steps of the run", largest, "at least 1", largest >= 1, "the run's step fails"
     )

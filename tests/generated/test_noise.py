@@ -440,7 +440,7 @@ def test_verification_asks_for_what_is_promised(kind):
     assert {
         "reversibility",
         "tangent map against differences",
-        "steps that fail, of increments as large as can be",
+        "steps that fail with the largest increments",
     } <= required
     assert ("Poisson defect, exact tangent" in required) == (kind != "thermal")  # there forces act
 

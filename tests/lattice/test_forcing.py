@@ -362,7 +362,7 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
     names = {c.name for c in verification.checks}
     assert {"observed order, without the noise", "energy: largest change", "reversibility"} <= names
     assert any("tangent map against differences" in name for name in names)
-    assert {"strong order, along common paths", "steps that fail, of increments as large as can be"} <= names
+    assert {"strong order, along common paths", "steps that fail with the largest increments"} <= names
     assert not any("Poisson identity" in c.name for c in verification.checks)
 
 
