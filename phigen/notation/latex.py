@@ -186,6 +186,6 @@ def _indexed(letter: str, index: int | str) -> str:
 
 
 def _scaled(letter: str, i: int) -> str:
-    """Return ``h^i S_i`` in MathML, with another letter for S if ``letter`` is one."""
+    """Return the product of h^i and a letter with index i, such as h² S_2, in MathML."""
     power = "<mi>h</mi>" if i == 1 else f"<msup><mi>h</mi><mn>{i}</mn></msup>"
     return f"{power}{_TIMES}{_indexed(letter, i)}"

@@ -90,7 +90,7 @@ class _ModifiedRecursion:
         self.fraction = self.tower.names.index(FRACTION)
 
     def advance(self, r: int, *, vanishing: bool) -> None:
-        """Compute H_{r−1} of the modified Hamiltonian and s_r of its generating function.
+        """Compute H_{r−1} in the modified Hamiltonian Σ h^j H_j, and s_r in its generating function Σ h^r s_r(σ).
 
         ``vanishing`` says that H_{r−1} is 0 by symmetry.
         """
@@ -130,7 +130,10 @@ class _ModifiedRecursion:
         return taylor.coefficients(target)[level]
 
     def _beginning(self, k: int) -> dict[str, Poly]:
-        """Return the coefficient of h^k in τ − σh/2 as {symbol of τ: value}; {} if H does not depend on the time."""
+        """Return the coefficient of h^k in τ − σh/2, the time at the beginning, as {symbol of τ: coefficient}.
+
+        The dictionary is empty if H does not depend on the time.
+        """
         shift = self.tower.variable(FRACTION) * self.tower.constant(Fraction(-1, 2))
         return {t: self.tower.variable(t) if k == 0 else shift if k == 1 else self.tower.zero for t in self.times}
 

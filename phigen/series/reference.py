@@ -79,7 +79,7 @@ def taylor(f: Any, variables: Sequence[Any], degree: int) -> dict[Index, Any]:
         raised = {}
         for index, g in level.items():
             last = max((k for k in range(n) if index[k]), default=0)
-            for k in range(last, n):  # only variables from the last one on: so each multi-index occurs once
+            for k in range(last, n):  # only the last variable of the index, or later ones: so each index occurs once
                 slope = derivative(g, variables[k]) / (index[k] + 1)
                 if slope != 0:
                     raised[_raised(index, k, 1)] = slope

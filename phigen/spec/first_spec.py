@@ -98,7 +98,7 @@ runs:
 
 
 def starter(name: str, *, lattice: bool = False) -> str:
-    """Return the starter spec with this name, for one system or for a lattice.
+    """Return the YAML text of a commented example spec with this name, of a system or of a lattice.
 
     Raises `SpecError` if the name is not allowed for a spec.
     """

@@ -15,7 +15,7 @@ from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.runs import whole, without_repetition
 from phigen.spec.yaml_source import Scalar
 
-#: Keys under ``over`` that are settings of the sweep, not the name of a quantity with its range.
+#: Keys under ``over`` that are settings of the sweep, not names of varied quantities, with the kinds of their values.
 _WORDS: Mapping[str, Kind] = {
     "random": Integer(1, limits.SWEPT, limit=True),
     "seed": Integer(0, limits.SWEEP_SEED, limit=True),

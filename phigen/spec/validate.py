@@ -1,4 +1,4 @@
-"""From the text of a spec file to `Spec`, or to all of its errors."""
+"""Reader of whole spec files: a text becomes a `Spec`, or all of its errors are raised."""
 
 from __future__ import annotations
 

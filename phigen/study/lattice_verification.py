@@ -290,7 +290,7 @@ def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
     """Yield two checks on a lattice of a few sites: of the strong order, and of steps with the largest increments."""
     interface, start = subject.solver.interface, subject.start
     few_sizes = [SOME[len(start.sizes) - 1]] * len(start.sizes)
-    if cell.relation == PAIRS:  # there each site of the run is taken once at most
+    if cell.relation == PAIRS:  # if all sites interact, each site of the run is taken at most once
         few_sizes = [min(few_sizes[0], *start.sizes)]
     sizes = [
         -(-max(size, least) // p) * p
@@ -370,7 +370,7 @@ def _few_sizes(subject: _Subject) -> list[int]:
     """Return sizes of a small lattice that the solver accepts, and on which its boundary seams are those of the run."""
     interface = subject.solver.interface
     least = 3 if len(interface.axes) < 3 else 2
-    if subject.compilation.cell.relation == PAIRS:  # there each site of the run is taken once at most
+    if subject.compilation.cell.relation == PAIRS:  # if all sites interact, each site of the run is taken at most once
         least = min(least, *subject.start.sizes)
     sizes = [-(-max(size, least) // p) * p for size, p in zip(interface.least, interface.periods, strict=True)]
     return _with_seams(subject, sizes)

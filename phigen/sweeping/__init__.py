@@ -1,1 +1,1 @@
-"""Sweeps: ensembles of any size, computed in chunks by processes on one or several machines."""
+"""Sweeps: runs for many parameters and initial values, computed in chunks by processes on one or several machines."""

@@ -1,4 +1,4 @@
-"""``phigen.sweep``: a sweep from Python, as an xarray Dataset."""
+"""The function ``phigen.sweep``, which computes a sweep and returns the results as an xarray Dataset."""
 
 from __future__ import annotations
 
@@ -49,18 +49,19 @@ def sweep(
     profile: str | None = None,
     progress: Callable[[int, int], Any] | None = None,
 ) -> xr.Dataset:
-    """Make a run for many parameters, initial values or steps, and return results with the dimensions of ``over``.
+    """Repeat a run for many parameters, initial values or steps, and return results with the dimensions of ``over``.
 
-    The sweep is the one called ``name`` in the spec, the first by default; other arguments replace its settings. A spec
-    without sweeps needs ``over``, and one without runs needs ``initial``, ``h`` and ``steps``. ``over`` maps names of
-    parameters, coordinates, ``step`` or ``start`` to arrays, or to ``{"from": a, "to": b, "count": n, "scale":
-    "log"}``. Without a count the values are random, and ``over`` must also contain ``random: n`` and ``seed: k``.
+    Each repetition is a *member* of the sweep. The sweep is the one called ``name`` in the spec, the first by default;
+    other arguments replace its settings. If the spec has no sweep, ``over`` is required; if it has no run, ``initial``,
+    ``h`` and ``steps`` are required. ``over`` maps names of parameters, coordinates, ``step`` or ``start`` to arrays,
+    or to ``{"from": a, "to": b, "count": n, "scale": "log"}``. Without a count the values are random, and ``over`` must
+    also contain ``random: n`` and ``seed: k``.
 
-    The result is in the Zarr store ``output``, from which data are loaded on demand; an existing store of the same
-    sweep is continued. Without ``output`` the result is in memory. ``scheduler`` is the address of a Dask cluster.
+    With ``output``, the results are stored in the Zarr store of this name, and loaded on demand; an existing store of
+    the same sweep is continued. Without it, the results are in memory. ``scheduler`` is the address of a Dask cluster.
     Without it, ``workers`` processes of this machine are used, by default one for each core, or for each device of the
-    target. ``target``, ``order``, ``scheme`` and ``profile`` are those of `phigen.compile`. ``progress`` receives the
-    numbers of computed and of failed members after each chunk.
+    target. ``target``, ``order``, ``scheme`` and ``profile`` have the meaning that they have in `phigen.compile`.
+    ``progress`` receives the numbers of computed and of failed members after each chunk.
 
     The function starts processes, so scripts that call it need the guard ``if __name__ == "__main__":``. Raises
     `SpecError`, `MissingPackageError` without dask, distributed, xarray or zarr, ``phigen.errors.FileError`` and
@@ -105,7 +106,10 @@ def _run_of(
     steps: int | None,
     parameters: Mapping[str, float] | None,
 ) -> Run:
-    """Return the run to repeat: that of the spec, with its settings replaced by arguments of the call."""
+    """Return the run to repeat: the run of the spec, in which arguments of the call have replaced settings.
+
+    ``name`` is the name of the sweep, ``run`` that of the run; by default the run is the one of the sweep.
+    """
     sweep = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()), None)
     run = run or (sweep.run if sweep else next(iter(spec.runs), None))
     if run is not None and run not in spec.runs:
@@ -129,7 +133,10 @@ def _run_of(
 
 
 def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fraction]:
-    """Return the values of the parameters that are the same for all members."""
+    """Return the values of ``parameters``, the argument for parameters with one value for all members, as fractions.
+
+    Raises the errors of wrong arguments, and `ValueError` for values that violate the bound of a parameter.
+    """
     arguments.expect_known(parameters, {p.name: 0.0 for p in spec.parameters})
     values = {name: arguments.number(value, f"parameter {name!r}") for name, value in parameters.items()}
     for p in spec.parameters:
@@ -139,7 +146,7 @@ def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fracti
 
 
 def _numbers(sequence: Any, what: str) -> list[float]:
-    """Return a list of finite numbers."""
+    """Return a number or an array as a list of finite numbers; errors call the argument ``what``."""
     return arguments.array(sequence, what, (len(sequence),) if np.ndim(sequence) else (1,)).tolist()  # type: ignore[no-any-return]
 
 
@@ -195,9 +202,9 @@ def _sweep_of(
 
 
 def _plain_entries(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
-    """Return the entries of ``over`` that are not ranges.
+    """Return the entries ``random``, ``seed`` and ``file`` of ``over``, which are settings, not ranges of quantities.
 
-    A range under such a name belongs to a parameter of that name.
+    If the spec has a parameter with one of these names, the entry is the range of the parameter, and is left out here.
     """
     if not isinstance(over, Mapping):
         raise TypeError(f"over must map names to ranges or lists, not {over!r}")
@@ -227,14 +234,16 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
 
 
 def _draws(value: Mapping[str, Any]) -> Axis:
-    """Return the axis of the random draws, a dimension of the sweep."""
+    """Return the axis of the sweep along which random values are drawn anew, from ``seed: {count: n}``."""
     if set(value) != {"count"}:
         raise ValueError(f"over: seed has a count, and no other key, not {dict(value)!r}")
     return Axis("seed", count=arguments.count(value["count"], "over: seed: count", 1, limits.SWEPT))
 
 
 def _range(name: str, value: Mapping[str, Any]) -> Axis:
-    """Return the axis that a mapping or an array describes."""
+    """Return the axis that a mapping {from: …, to: …, count: …, scale: …} describes. Raises `ValueError` if it is
+    wrong.
+    """
     for word in (*value, "from", "to"):
         if word not in ("from", "to", "count", "scale") or word not in value:
             raise ValueError(f"over: {name} needs from and to, and may have count and scale, not {dict(value)!r}")

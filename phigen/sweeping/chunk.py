@@ -1,6 +1,6 @@
-"""Work of a sweep worker on one chunk: integrate its members, measure, and store the results.
+"""Work of a process of a sweep on one chunk of members: integrate them, evaluate the results, and store these.
 
-A worker receives the path of the store and the number of a chunk. The store contains the solver and the plan.
+The process receives the path of the store and the number of the chunk. The store contains the solver and the plan.
 """
 
 from __future__ import annotations
@@ -25,12 +25,16 @@ from phigen.sweeping.devices import own_device
 from phigen.sweeping.statistics import MOST_BYTES, statistics_of
 from phigen.sweeping.store import Job, open_job
 
-#: Status of members that were not integrated because their parameters or initial values are refused.
+#: Status of members that are not integrated because a parameter or an initial value is not allowed.
 _REFUSED = STATUSES.index("BAD_ARGUMENT")
 
 
 def make(store: str, digest: str, number: int) -> tuple[int, int]:
-    """Compute a chunk. Return the number of its members and the number of those that failed."""
+    """Compute the members of a chunk, store their results, and return the numbers of members and of failed members.
+
+    ``digest`` identifies the content of the store, so that a process that knows an older store of this path reads it
+    anew.
+    """
     job, solver = _ready(store, digest)
     plan = job.plan
     region = plan.region(number)
@@ -43,16 +47,16 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
     for name, values in results.items():
         if name != "status":
             job.root[name][region] = values.reshape(sizes + values.shape[1:])
-    # The status is written last: members that have a status are complete.
+    # The status is written last, so that a member with a status has all of its results.
     job.root["status"][region] = results["status"].reshape(sizes)
     return count, int(np.count_nonzero(results["status"]))
 
 
 @lru_cache(maxsize=4)
 def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
-    """Return the job and its solver, which are loaded once per process.
+    """Return the opened store and its solver, which each process loads once.
 
-    One process of a machine compiles the solver; the others wait.
+    One process of a machine compiles the solver, while the other processes wait.
     """
     job = open_job(store)
     device = own_device(job.plan.about["target"])
@@ -64,10 +68,10 @@ def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
 
 @contextlib.contextmanager
 def _exclusive_lock(name: str) -> Iterator[None]:
-    """Return a context that only one process of this machine at a time can enter."""
+    """Return a context that only one process of this machine at a time can enter; ``name`` is that of the lock."""
     try:
         import fcntl
-    except ImportError:  # Windows has no such lock; several processes may then compile
+    except ImportError:  # Windows has no fcntl: several processes may compile the solver at the same time
         yield
         return
     folder = cache.directory()
@@ -85,10 +89,13 @@ def _exclusive_lock(name: str) -> Iterator[None]:
 
 
 def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Floats]:
-    """Return the results and statuses of the members with these numbers. Each member has a different path of the
-    noise."""
+    """Return the results and the statuses of members, as arrays (members, …) by the name of the result.
+
+    ``varied`` has their values of the varied quantities. ``numbers`` are their numbers in the sweep, by which each has
+    its own path of the noise.
+    """
     plan, count = job.plan, len(numbers)
-    # Numbers common to all members have the shape (); solvers then share the coefficients of steps.
+    # A value that all members have in common gets the shape (), so that the solver computes coefficients of steps once.
     parameters = {name: varied.get(name, np.asarray(value)) for name, value in plan.parameters.items()}
     x0 = np.stack([varied.get(c, np.full(count, v)) for c, v in zip(plan.coordinates, plan.initial, strict=True)], 1)
     h, t0 = varied.get("step", np.asarray(plan.h)), varied.get("start", np.asarray(plan.t0))
@@ -131,14 +138,17 @@ def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: A
 
 
 def _spread(values: Floats, allowed: Any, count: int) -> Floats:
-    """Return an array for all members with the values of the ``allowed`` ones, and NaN for the others."""
+    """Return an array for ``count`` members, with ``values`` at the indices ``allowed``, and NaN at all others."""
     spread = np.full((count, *values.shape[1:]), np.nan)
     spread[allowed] = values
     return spread
 
 
 def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str]]:
-    """Return states (rows, members, DIM), whose last row is the final one, and the status of each failed member."""
+    """Integrate the members; return states (rows, members, DIM), and the statuses of failed members by index.
+
+    The rows are the frames of the plan and the final states, or only the final states.
+    """
     failures: dict[int, str] = {}
     try:
         states = solver.backend.ensemble(members, 1)
@@ -165,7 +175,7 @@ def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
 
 
 def _lyapunov(solver: Solver, members: Members, failures: Mapping[int, str]) -> Floats:
-    """Return the largest Lyapunov exponent of each member, from the tangent maps of its steps."""
+    """Return the largest Lyapunov exponent of each member, from the tangent maps of its steps; NaN if it failed."""
     from phigen.errors import StepError
     from phigen.study.lyapunov import spectrum
 

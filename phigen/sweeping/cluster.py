@@ -1,4 +1,4 @@
-"""Chunks computed by the workers of a Dask cluster: processes of this machine, or a cluster given by its address."""
+"""Computation of chunks by Dask: by processes of this machine, or by a cluster with a given address."""
 
 from __future__ import annotations
 
@@ -11,30 +11,31 @@ from phigen.errors import PhigenError
 from phigen.sweeping.chunk import make
 from phigen.sweeping.store import imported
 
-#: Number of attempts at a chunk during which workers died.
+#: Number of attempts to compute a chunk. If the worker process dies in each of them, the sweep stops.
 TRIES = 4
 
-#: Number of chunks submitted at a time, for each thread of the workers.
+#: Number of chunks that are submitted in advance for each thread of the workers.
 _AHEAD = 4
 
-#: Time limit for the answer of a scheduler.
+#: Time limit for the first answer of a scheduler, in the notation of Dask.
 PATIENCE = "10s"
 
-#: Callback that receives the number of computed members and the number of those that failed.
+#: Type of the function that receives, after each chunk, the numbers of its members and of its failed members.
 Tell = Callable[[int, int], None]
 
 
 class SweepError(PhigenError):
-    """A sweep stopped. Finished chunks are in its store; the same call continues the sweep."""
+    """A sweep stopped early. The finished chunks are in its store, and the same call continues the sweep."""
 
     exit_code = 2
 
 
 @contextlib.contextmanager
 def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
-    """Return a context with a client of the cluster at an address, or of local processes.
+    """Return a context that yields a Dask client, and the number of threads of its workers.
 
-    It yields the client and the number of chunks submitted at a time.
+    The client is one of the cluster at the address ``scheduler`` or, if it is None, of ``workers`` processes of this
+    machine, which end with the context. Raises `SweepError` if no scheduler answers.
     """
     distributed, dask = imported("distributed"), imported("dask")
     if scheduler is not None:
@@ -46,7 +47,7 @@ def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
             yield client, max(1, sum(client.nthreads().values()))
         return
     with (
-        # A dying worker may have had several chunks; a chunk counts as the cause only after TRIES attempts.
+        # A worker that dies may have held several chunks, so a chunk counts as the cause only after TRIES attempts.
         dask.config.set({"distributed.scheduler.allowed-failures": TRIES, "distributed.worker.profile.enabled": False}),
         distributed.LocalCluster(
             n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=logging.ERROR
@@ -57,7 +58,11 @@ def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
 
 
 def make_all(client: Any, slots: int, store: str, digest: str, chunks: Sequence[int], tell: Tell) -> None:
-    """Compute the chunks with these numbers. Raises `SweepError`, and the exceptions of chunks."""
+    """Compute the chunks with the numbers ``chunks`` of a store; ``slots`` is the number of threads of the workers.
+
+    Raises `SweepError` if workers die, the connection is lost, or a chunk cannot be stored; other exceptions in a
+    worker are raised again.
+    """
     distributed = imported("distributed")
     tries = dict.fromkeys(chunks, 0)
     left = iter(chunks)

@@ -1,4 +1,4 @@
-"""Assignment of the devices of a machine to the workers of a sweep."""
+"""Assignment of the devices (graphics cards) of a machine to the worker processes of a sweep."""
 
 from __future__ import annotations
 
@@ -12,21 +12,23 @@ from phigen.sweeping.store import imported
 
 
 def workers_of(target: str) -> int:
-    """Return the default number of workers on this machine: one for each device of a target, or for each core."""
+    """Return the default number of workers on this machine: one for each device if the target has devices, else one for
+    each core."""
     if target not in registry.DEVICES:
         return cores()
     return 1 if os.environ.get(CHOICE) else devices_of(target)
 
 
 def own_device(target: str) -> int | None:
-    """Return the device number of this worker; None for the default device or the one that `CHOICE` selects.
+    """Return the number of the device that this worker process uses; None for the default device.
 
-    Dask numbers the workers of a machine; consecutive workers use consecutive devices.
+    Dask numbers the workers of a machine, and consecutive workers use consecutive devices. The environment variable
+    `CHOICE` selects a device for all workers; then the result is None too.
     """
     if target not in registry.DEVICES or os.environ.get(CHOICE):
         return None
     try:
         name = imported("distributed").get_worker().name
-    except ValueError:  # this process is not a worker
+    except ValueError:  # this process is not a worker of Dask
         return None
     return name % devices_of(target) if isinstance(name, int) else None

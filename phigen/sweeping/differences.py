@@ -1,4 +1,4 @@
-"""Differences between the sweep in a store and a requested one, in the settings that determine the results."""
+"""Comparison of the sweep in a store with a requested sweep, in all settings that determine the results."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from phigen.sweeping import store
 from phigen.sweeping.plan import Plan
 from phigen.targets import header
 
-#: Names of the entries of a plan in messages. The names of sweeps and runs and the division into chunks are not among
-#: them, since results do not depend on them.
+#: Entries of a plan that determine the results, with their names in messages. Names of sweeps and runs, and the
+#: division into chunks, are left out, since results do not depend on them.
 _ENTRIES = {
     "coordinates": "coordinates",
     "sizes": "sizes of the lattice",
@@ -35,22 +35,23 @@ _ENTRIES = {
     "frames": "frames:",
 }
 
-#: Entries that affect only the statistics of observables over a run.
+#: Entries of a plan that determine only the statistics of observables over a run, with their names in messages.
 _AVERAGED = {"after": "average: after:", "blocks": "average: blocks:", "stride": "stride:"}
 
-#: Additional properties of a plan, with their names in messages.
+#: Entries of ``about`` of a plan that determine the results, with their names in messages.
 _FACTS = {"target": "target", "phigen": "version of phigen", "folder": "folder of the spec", "contents": "data files"}
 
-#: Largest number of characters of a value in a message.
+#: Largest number of characters of a value that is quoted in a message.
 _SHORT = 40
 
 
 def differences(
     job: store.Job, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> list[str]:
-    """Return the differences of the sweep in a store from a plan: one phrase for each entry that determines results.
+    """Return phrases for messages, one for each difference of the sweep in a store from the requested sweep.
 
-    ``solver`` describes the solver (see `store.solver_data`), ``listed`` the values from a file of members.
+    The requested sweep has the ``plan``, the ``solver`` (as `store.solver_data` describes it), the ``spec``, and the
+    values ``listed`` of a file of members.
     """
     ours, theirs = plan.as_json(), job.plan.as_json()
     entries = _ENTRIES | (_AVERAGED if any("(" in word for word in plan.keep) else {})
@@ -66,13 +67,15 @@ def differences(
 
 
 def _facts(about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the additional properties of a plan, with the folder of the spec in place of its file."""
+    """Return the entry ``about`` of a plan (target, version, data files) with the folder of the spec as ``folder``."""
     return {**about, "folder": str(Path(about["file"]).parent) if "file" in about else None}
 
 
 def _phrases(name: str, stored: Any, requested: Any) -> list[str]:
-    """Return phrases such as ``number of steps 60, not 61`` or ``other initial values``; for mappings, one for each
-    entry."""
+    """Return a phrase if two values of an entry differ: ``number of steps 60, not 61`` or ``other initial values``.
+
+    For mappings, there is a phrase for each key whose values differ.
+    """
     if stored == requested:
         return []
     if isinstance(stored, dict) and isinstance(requested, dict) and stored.keys() == requested.keys():
@@ -84,7 +87,7 @@ def _phrases(name: str, stored: Any, requested: Any) -> list[str]:
 
 
 def _differences_of_solver(job: store.Job, solver: Mapping[str, Any]) -> list[str]:
-    """Return differences of the solver; comments and the digest of the spec in its files are ignored."""
+    """Return a phrase if the code of the solver differs, apart from the headers of files and the digest of the spec."""
     stored = store.solver_data(job.interface, job.files, job.functions, job.spec)
     stored_texts, texts = ([*about["files"].values(), about["functions"]] for about in (stored, solver))
     same = stored["interface"] == solver["interface"] and [*map(_body, stored_texts)] == [*map(_body, texts)]
@@ -92,18 +95,20 @@ def _differences_of_solver(job: store.Job, solver: Mapping[str, Any]) -> list[st
 
 
 def _body(text: str) -> str:
-    """Return a generated file without its header and without the digest of its spec."""
+    """Return the text of a generated file without its header, and without the digest of the spec in it."""
     return re.sub(r'(SPEC_SHA256\W+)"[0-9a-f]{64}"', r"\1", header.split(text)[1])
 
 
 def _differences_of_run(job: store.Job, plan: Plan, spec: Spec) -> list[str]:
-    """Return differences in the settings of the run that workers read from the spec: sections, and initial states of
-    lattices."""
+    """Return phrases for differences in the settings of the run that a plan does not contain.
+
+    Workers read these settings from the spec: the section, and the initial state and arrays of a lattice.
+    """
     if "crossings" not in plan.keep and not plan.sizes:
         return []
     stored_spec = specs.loads(job.spec)
     stored, run = stored_spec.runs.get(job.plan.about["run"]), spec.runs.get(plan.about["run"])
-    if stored is None or run is None:  # the run was built in Python
+    if stored is None or run is None:  # a run that was made by arguments in Python is not in the spec
         return []
     phrases = []
     if "crossings" in plan.keep and (stored.section, stored.direction) != (run.section, run.direction):
@@ -114,7 +119,8 @@ def _differences_of_run(job: store.Job, plan: Plan, spec: Spec) -> list[str]:
 
 
 def _start(spec: Spec, run: Run) -> Iterator[Any]:
-    """Yield the settings that determine the initial state of a lattice and its arrays."""
+    """Yield the settings of a run and a spec that determine the initial state, bonds and parameter arrays of a
+    lattice."""
     if run.lattice is not None:
         yield from (run.lattice.state, run.lattice.bonds, run.lattice.arrays, run.initial)
     yield from ((p.name, p.values) for p in spec.parameters)

@@ -1,4 +1,4 @@
-"""Lattice members of sweeps: initial states and parameters, runs, and stored results."""
+"""Members of sweeps of lattices: their initial states and parameters, their runs, and the results to store."""
 
 from __future__ import annotations
 
@@ -20,17 +20,20 @@ from phigen.study.averages import Averages
 from phigen.sweeping.plan import Plan
 from phigen.sweeping.store import Job
 
-#: Duration of a trial in seconds.
+#: Processor time of a trial, in seconds, from which the time of a member is estimated.
 _TRIAL = 0.3
 
-#: Number of steps after which a tangent vector is normalised.
+#: Number of steps after which a tangent vector is normalised, so that it neither overflows nor underflows.
 _CARRIED = 50
 
 _REFUSED = STATUSES.index("BAD_ARGUMENT")
 
 
 def begun(spec: Spec, run: Run, draw: int) -> Start:
-    """Return the initial state of a member; its draw number is added to the seeds of the run's random values."""
+    """Return the initial state and parameters of a member; ``draw`` is its value along the axis ``seed``, or 0.
+
+    The number ``draw`` is added to the seeds of all random values of the run.
+    """
     if not draw or run.lattice is None:
         return start_of(spec, run)
 
@@ -59,8 +62,11 @@ def _start(job: Job, draw: int) -> Start:
 
 
 def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Any]:
-    """Return the results and statuses of the members with these numbers. Each member has a different path of the
-    noise."""
+    """Return the results and the statuses of members, as arrays (members, …) by the name of the result.
+
+    ``varied`` has their values of the varied quantities. ``numbers`` are their numbers in the sweep, by which each has
+    its own path of the noise.
+    """
     plan, count, shape = job.plan, len(numbers), (len(job.plan.coordinates), *job.plan.sizes)
     results: dict[str, Any] = {"status": np.full(count, _REFUSED, dtype=np.uint8)}
     results |= {name: np.full(count, np.nan) for name in plan.keep if name != "final"}
@@ -80,7 +86,8 @@ def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numb
 
 
 class _Member:
-    """One integrated lattice: its status, and its results if the status is 0 (success)."""
+    """One member, whose run is made by the constructor: its ``status``, and its results if the status is 0
+    (success)."""
 
     def __init__(
         self, plan: Plan, solver: LatticeSolver, start: Start, member_values: dict[str, float], number: int
@@ -100,7 +107,7 @@ class _Member:
                 results["lyapunov"] = exponent(again, h, plan.steps)
         except BackendError as error:
             self.status = STATUSES.index(error.status)
-        except ValueError:  # the parameters or initial values are refused
+        except ValueError:  # a parameter or an initial value is not allowed
             self.status = _REFUSED
         else:
             self.kept = results
@@ -130,7 +137,7 @@ class _Member:
         return results | ({"frames": frames} if plan.frames else {})
 
     def _statistics(self, statistics: Mapping[str, Statistic], averages: Averages) -> dict[str, float]:
-        """Return the statistics of observables by their keywords, at the end of the run."""
+        """Return the requested values of observables at the end of the run, by keyword, such as M or mean(M)."""
         if not statistics:
             return {}
         names = self.solver.interface.observables
@@ -145,7 +152,7 @@ class _Member:
         return {word: values[s.of][s.observable] for word, s in statistics.items()}
 
     def _conserved_values(self) -> tuple[float, list[Floats]]:
-        """Return the energy and the Casimirs."""
+        """Return the energy and the Casimirs of the current state; no Casimirs if their errors are not requested."""
         kinds: LatticeInterface = self.solver.interface
         if "casimir_error" not in self.plan.keep:
             return self.session.hamiltonian(), []
@@ -153,14 +160,14 @@ class _Member:
         return self.session.hamiltonian(), [np.asarray(reduced(kind, densities)) for kind, densities in pairs]
 
     def _changes(self, before: tuple[float, list[Floats]]) -> dict[str, float]:
-        """Return the largest changes of energy and Casimirs from their initial values."""
+        """Return the change of the energy, and the largest change of a Casimir, since the values ``before``."""
         energy, casimirs = self._conserved_values()
         changes = [float(np.abs(a - b).max()) for a, b in zip(casimirs, before[1], strict=True)]
         return {"energy_error": abs(energy - before[0]), "casimir_error": max(changes, default=0.0)}
 
 
 def _values(plan: Plan, solver: LatticeSolver, start: Start, member_values: Mapping[str, float]) -> dict[str, Any]:
-    """Return the parameters of a member. Raises `ValueError` for values that are refused."""
+    """Return the values of all parameters of a member. Raises `ValueError` for values that are not allowed."""
     numbers = {name: value for name, value in plan.parameters.items() if np.ndim(start.parameters[name]) == 0}
     return solver.values({**start.arguments, **numbers, **member_values}, {}, start.sizes)
 
@@ -168,23 +175,26 @@ def _values(plan: Plan, solver: LatticeSolver, start: Start, member_values: Mapp
 def energies_at_start(
     job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], count: int
 ) -> tuple[Floats, Floats]:
-    """Return the initial energies of members, and the sums of the magnitudes of the energies of their sites."""
+    """Return the initial energies of ``count`` members, and the sums of the absolute values of the energies of sites.
+
+    Both are arrays (members,), with NaN for members whose values are not allowed. ``varied`` has the varied values.
+    """
     energies = np.full((2, count), np.nan)
     for m in range(count):
         member_values = {name: float(values[m]) for name, values in varied.items() if name != "step"}
         start, t0 = _start(job, int(member_values.pop("seed", 0))), member_values.pop("start", job.plan.t0)
         try:
             session = solver.backend.start(start.state, _values(job.plan, solver, start, member_values), t0)
-        except (BackendError, ValueError):  # the parameters or initial values are refused
+        except (BackendError, ValueError):  # a parameter or an initial value is not allowed
             continue
         energies[:, m] = session.hamiltonian(), np.abs(session.density()).sum()
     return energies[0], energies[1]
 
 
 def exponent(session: LatticeSession, h: float, steps: int) -> float:
-    """Return the largest Lyapunov exponent, by propagating a tangent vector through all steps.
+    """Return the largest Lyapunov exponent of a run, from the growth of a tangent vector over all steps.
 
-    ``session`` must be at the start of the run. Raises `BackendError`.
+    ``session`` must be at the start of the run. Raises `BackendError` if a step fails.
     """
     vector, grown = np.random.default_rng(0).normal(size=(1, *session.state().shape)), 0.0
     vector = vector / np.linalg.norm(vector)
@@ -197,7 +207,7 @@ def exponent(session: LatticeSession, h: float, steps: int) -> float:
 
 
 def seconds_of_a_member(job: Job) -> float:
-    """Return the estimated seconds per member, from a trial of a part of a run."""
+    """Return the estimated processor time of a member in seconds, from a trial of a part of its run."""
     plan, solver = job.plan, LatticeSolver(job.backend(), job.interface)  # type: ignore[arg-type]
     start = _start(job, 0)
     began, done, ahead = time.process_time(), 0, 1
@@ -208,5 +218,5 @@ def seconds_of_a_member(job: Job) -> float:
             session.advance(plan.h, ahead)
             done, ahead = done + ahead, 2 * ahead
     except (BackendError, ValueError):
-        return 1.0  # default if the trial fails
+        return 1.0  # an assumed time of a member, since the trial failed
     return (time.process_time() - began) / max(done, 1) * plan.steps + 1e-4

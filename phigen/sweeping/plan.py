@@ -1,7 +1,7 @@
 """Plan of a sweep: dimensions, chunks, and the values of each member, computed on demand.
 
-A plan is plain data, stored with the result as JSON. It documents the result, and contains all settings that a worker
-needs. Members are numbered in the order of the dimensions, with the last dimension the fastest. A chunk is a box of
+A plan is stored with the results, as JSON. It documents them, and contains all settings that a worker process needs.
+Members are numbered from 0; if the sweep has several dimensions, the last one varies fastest. A chunk is a box of
 members with consecutive numbers.
 """
 
@@ -19,7 +19,7 @@ from phigen.spec.model import Axis, Statistic
 
 Floats = NDArray[np.float64]
 
-#: Largest size in bytes of the frames of a chunk in memory.
+#: Largest memory in bytes for the states of the members of a chunk, stored frames included.
 _MOST_BYTES = 256 * 2**20
 
 
@@ -28,10 +28,10 @@ class Plan:
     """Numerical description of a sweep.
 
     ``initial``, ``h``, ``t0`` and ``parameters`` are the values of quantities that are not varied. ``axes`` are the
-    varied quantities; values along axes without a size are drawn with ``seed``. ``noise`` is the seed of the noise;
-    each member number has a different path. ``members`` is the number of members in a file or of random members, whose
-    only dimension is ``member``; ``listed`` names the columns of the file. Lattices of ``sizes`` have no ``initial``:
-    workers compute the initial state from the spec.
+    ranges of the varied quantities; values along axes without a size are drawn at random with ``seed``. ``noise`` is
+    the seed of the noise, of which each member has another path. ``members`` is the number of random members or of the
+    rows of a file, 0 for a grid; then the only dimension is ``member``. ``listed`` names the columns of the file. For a
+    lattice, which has ``sizes``, workers compute the initial state from the spec, and ``initial`` is not used.
     """
 
     name: str
@@ -49,70 +49,73 @@ class Plan:
     keep: tuple[str, ...] = ("final",)
     frames: int = 0
     after: float | None = None  # start of the time averages of observables
-    blocks: int | None = None  # number of blocks of rows for the standard errors
-    stride: int = 1  # steps between averaged rows, for lattices without frames
+    blocks: int | None = None  # least number of blocks of rows from which standard errors follow
+    stride: int = 1  # steps between averaged rows, if no frames are stored
     chunk: tuple[int, ...] = ()
     sizes: tuple[int, ...] = ()
-    # additional properties that determine the result: target, version
+    # further data that determine the results: target, version of phigen, run, files that the spec names
     about: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def grid(self) -> tuple[Axis, ...]:
-        """The axes that are dimensions."""
+        """The axes that are dimensions of the results: those with a number of values."""
         return tuple(axis for axis in self.axes if axis.size)
 
     @property
     def drawn(self) -> tuple[Axis, ...]:
-        """The axes whose values are drawn at random."""
+        """The axes whose values are drawn at random for each member, and which are no dimensions."""
         return tuple(axis for axis in self.axes if not axis.size)
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """The names of the dimensions."""
+        """Names of the dimensions of the results."""
         return ("member",) if self.members else tuple(axis.name for axis in self.grid)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """The sizes of the dimensions."""
+        """Sizes of the dimensions of the results."""
         return (self.members,) if self.members else tuple(axis.size for axis in self.grid)
 
     @property
     def size(self) -> int:
-        """The number of members of the sweep."""
+        """Number of members of the sweep."""
         return prod(self.shape)
 
     @property
     def boxes(self) -> tuple[int, ...]:
-        """The number of chunks along each dimension."""
+        """Number of chunks along each dimension."""
         return tuple(ceil(size / of) for size, of in zip(self.shape, self.chunk, strict=True))
 
     @property
     def rows(self) -> tuple[int, ...]:
-        """The step numbers of the stored frames."""
+        """Numbers of the steps after which states are stored (frames); () if none are stored."""
         return tuple(range(0, self.steps + 1, self.frames)) if self.frames else ()
 
     def statistics(self, observables: Collection[str]) -> dict[str, Statistic]:
-        """Return the stored statistics of observables by their keywords."""
+        """Return the statistics of observables that are stored, by their keywords, such as M or mean(M)."""
         read = {word: Statistic.read(word, observables) for word in self.keep}
         return {word: statistic for word, statistic in read.items() if statistic is not None}
 
     @property
     def bytes_of_member(self) -> int:
-        """Lower bound of the memory of a member in bytes: its current states and all of its frames."""
+        """Lower bound, in bytes, of the memory that a member needs: for its frames and four further states."""
         return 8 * len(self.coordinates) * prod(self.sizes) * (len(self.rows) + 4)
 
     def region(self, number: int) -> tuple[slice, ...]:
-        """Return the box of members of a chunk."""
+        """Return the region of the chunk with this number, a slice of members along each dimension."""
         place = np.unravel_index(number, self.boxes)
         ends = zip(place, self.chunk, self.shape, strict=True)
         return tuple(slice(int(k) * of, min((int(k) + 1) * of, size)) for k, of, size in ends)
 
     def first(self, region: Sequence[slice]) -> int:
-        """Return the number of the first member of a region."""
+        """Return the number of the first member of a region, which consists of slices along the dimensions."""
         return int(np.ravel_multi_index([part.start for part in region], self.shape))
 
     def varied(self, region: Sequence[slice], listed: Mapping[str, Floats]) -> dict[str, Floats]:
-        """Return the varied values of the members of a region, (members,) each; ``listed`` are values from a file."""
+        """Return the values of the varied quantities for the members of a region, by name, (members,) each.
+
+        ``listed`` has the values that come from a file of members.
+        """
         sizes = tuple(part.stop - part.start for part in region)
         first = self.first(region)
         columns: dict[str, Floats] = dict(listed)
@@ -126,12 +129,12 @@ class Plan:
         return {name: values for name, values in columns.items() if name != "seed" or seeded}
 
     def as_json(self) -> dict[str, Any]:
-        """Return the plan as plain data."""
+        """Return the plan as data that JSON can represent."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Plan:
-        """Return the plan from the data of `as_json`."""
+        """Return the plan whose data `as_json` has returned, possibly after a conversion to JSON and back."""
         axes = tuple(
             Axis(**{**axis, "values": tuple(axis["values"]), "ends": tuple(axis["ends"])}) for axis in data["axes"]
         )
@@ -140,7 +143,7 @@ class Plan:
 
 
 def values_of(axis: Axis) -> Floats:
-    """Return the values along an axis; for the axis ``seed`` these are the numbers of draws."""
+    """Return the values along an axis. Along the axis ``seed`` they are the numbers 0, 1, … of the random draws."""
     if axis.values:
         return np.array(axis.values)
     if axis.name == "seed" and axis.ends == (0.0, 0.0):
@@ -152,7 +155,10 @@ def values_of(axis: Axis) -> Floats:
 
 
 def _spaced(axis: Axis, share: Floats) -> Floats:
-    """Return the values at fractions 0 to 1 of the way between the ends of an axis."""
+    """Return the values at the fractions ``share``, from 0 to 1, of the way between the ends of an axis.
+
+    The way is linear, or linear in the logarithm.
+    """
     first, last = axis.ends
     if axis.scale == "log":
         return np.asarray(first * (last / first) ** share)
@@ -160,17 +166,18 @@ def _spaced(axis: Axis, share: Floats) -> Floats:
 
 
 def _uniform(seed: int, column: int, first: int, count: int) -> Floats:
-    """Return random numbers of a column from position ``first`` on.
+    """Return ``count`` uniform random numbers for one quantity, ``column``, of the members from ``first`` on.
 
-    They do not depend on the division into chunks.
+    The number of a member depends on seed, column and member only, not on the division into chunks.
     """
     stream = np.random.Philox(key=[seed, column])
-    stream.advance(first // 4)  # one round of the generator yields four numbers
+    stream.advance(first // 4)  # the generator makes four numbers at a time
     return np.random.Generator(stream).random(first % 4 + count)[first % 4 :]
 
 
 def chunk_of(plan: Plan, members: int) -> tuple[int, ...]:
-    """Return the sizes of a chunk with at most ``members`` members that fit into the memory limit."""
+    """Return the sizes, along the dimensions, of chunks of at most ``members`` members that fit into the memory
+    limit."""
     left = max(1, min(members, _MOST_BYTES // plan.bytes_of_member))
     sides: list[int] = []
     for size in reversed(plan.shape):

@@ -1,4 +1,4 @@
-"""Detection of sweep members whose energy error is so large that their results are meaningless."""
+"""Detection of members of a sweep whose energy error is so large that their results mean nothing."""
 
 from __future__ import annotations
 
@@ -17,16 +17,18 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Number (``count``) of members with a relative energy error above a limit, and the ``largest`` error."""
+    """Number (``count``) of members of a sweep whose relative energy error exceeds a limit, and the ``largest``
+    error."""
 
     count: int = 0
     largest: float = 0.0
 
 
 def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
-    """Return the stored energy errors of a sweep of an ordinary system, in the units of `phigen.geometry.conservation`.
+    """Return the number of members of a sweep whose stored energy error exceeds ``limit``, and the largest error.
 
-    Failed and waiting members are not counted. If time, forces or noise change the energy, no member is counted.
+    Errors are relative to the initial energy, or to its terms if these nearly cancel. Members that failed or are not
+    computed yet are not counted. If time, forces or noise change the energy, no member is counted.
     """
 
     def at_start(varied: Mapping[str, Floats], count: int) -> tuple[Floats, Floats]:
@@ -38,8 +40,10 @@ def energy_errors(job: Job, system: System, limit: float) -> EnergyErrors:
 
 
 def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
-    """Return the stored energy errors of a sweep of a lattice; for the units, initial states of members are
-    recomputed."""
+    """Return the number of members of a sweep of a lattice whose energy error exceeds ``limit``, and the largest error.
+
+    Errors are relative to the initial energy, for which the initial states of all members are computed again.
+    """
     if cell.driven or "energy_error" not in job.plan.keep:
         return EnergyErrors()
     from phigen.runtime.lattice import LatticeSolver
@@ -52,8 +56,10 @@ def lattice_energy_errors(job: Job, cell: Cell, limit: float) -> EnergyErrors:
 def _count_large_errors(
     job: Job, at_start: Callable[[Mapping[str, Floats], int], tuple[Floats, Floats]], limit: float
 ) -> EnergyErrors:
-    """Return the number of large errors; ``at_start`` returns initial energies of members and the magnitudes of
-    their terms."""
+    """Return the number of members whose relative energy error exceeds ``limit``, and the largest error.
+
+    ``at_start(varied, count)`` returns the initial energies of members, and the sums of absolute values of their terms.
+    """
     if "energy_error" not in job.plan.keep:
         return EnergyErrors()
     count, largest = 0, 0.0

@@ -1,4 +1,4 @@
-"""Observables of the members of a sweep: final values, means, standard deviations and standard errors."""
+"""Values of observables that a sweep stores for its members: final values, means, standard deviations and errors."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from phigen.spec.names import STATISTICS
 from phigen.study.averages import Averages
 from phigen.sweeping.store import Job
 
-#: Largest size in bytes of states in memory at a time, if statistics include every step.
+#: Largest memory in bytes for the states of a run that statistics need; members are treated in groups of this size.
 MOST_BYTES = 64 * 2**20
 
 
 def statistics_of(
     job: Job, solver: Solver, members: Members, states: Floats, statistics: Mapping[str, Statistic]
 ) -> dict[str, Floats]:
-    """Return the statistics by their keywords, (members,) each.
+    """Return the requested values of observables for the members, by keyword such as mean(M), (members,) each.
 
-    ``states`` (rows, members, DIM) are the frames of the sweep, or only the final states. Statistics are over the
-    frames; without frames they are over every ``stride``-th step of the run, including start and end, as those of
-    ``phigen run``. Rows before ``plan.after`` are not counted.
+    ``states`` (rows, members, DIM) are the frames of the sweep, or only the final states. Statistics are over the rows
+    of the frames. Without frames the members are integrated again, and statistics are over every ``stride``-th step,
+    start and end included, as in ``phigen run``. Rows before ``plan.after`` are left out.
     """
     names = list(solver.interface.observables)
     values: dict[str, Floats] = {}
@@ -46,7 +46,7 @@ def statistics_of(
 
 
 def _values(job: Job, solver: Solver, members: Members, states: Floats, numbers: Floats) -> Floats:
-    """Return the observables (rows, members, observables) of states with the given step numbers."""
+    """Return the observables (rows, members, observables) of states after the given ``numbers`` of steps."""
     time_arguments: tuple[Any, ...] = ()
     if solver.interface.time:
         time_arguments = (members.t0 + numbers[:, np.newaxis] * members.h,)
@@ -54,7 +54,10 @@ def _values(job: Job, solver: Solver, members: Members, states: Floats, numbers:
 
 
 def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: Floats) -> tuple[Floats, Floats]:
-    """Return means and standard deviations (members, observables) over rows; NaN if no row is counted."""
+    """Return means and standard deviations of observables over the rows, each (members, observables).
+
+    ``numbers`` are the step numbers of the rows. If all rows are before ``plan.after``, the results are NaN.
+    """
     values = _values(job, solver, members, rows, numbers)
     after = job.plan.after
     if after is not None:
@@ -69,12 +72,15 @@ def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: 
 
 
 def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: Floats) -> Floats:
-    """Return the standard errors of means (members, observables) over rows, from means of blocks."""
+    """Return the standard errors of the means of observables over the rows, (members, observables).
+
+    They follow from the means of blocks of rows; ``numbers`` are the step numbers of the rows.
+    """
     values = _values(job, solver, members, rows, numbers)
     errors = np.empty(values.shape[1:])
     clock = np.stack(np.broadcast_arrays(members.t0, members.h, np.empty(len(members)))[:2], axis=1)
     clocks, which = np.unique(clock, axis=0, return_inverse=True)
-    for k, (t0, h) in enumerate(clocks.tolist()):  # members whose rows have the same times are averaged together
+    for k, (t0, h) in enumerate(clocks.tolist()):  # members with the same start and step share one accumulator
         alike = np.flatnonzero(which.reshape(-1) == k)
         columns = values[:, alike].reshape(len(values), -1)
         averages = Averages(columns.shape[1], after=job.plan.after, backwards=h < 0, blocks=job.plan.blocks)
@@ -86,7 +92,10 @@ def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: F
 def _member_groups(
     job: Job, solver: Solver, members: Members, states: Floats
 ) -> Iterator[tuple[slice, Members, Floats, Floats]]:
-    """Yield groups of members that fit into memory, with the states that are counted and their step numbers."""
+    """Yield groups of members whose states fit into memory: their slice, the members, their states, the step numbers.
+
+    The states (rows, members, DIM) are those over which statistics are taken.
+    """
     if job.plan.frames:
         numbers = np.array(job.plan.rows, dtype=np.float64)
         yield slice(None), members, states[: len(numbers)], numbers

@@ -1,8 +1,8 @@
-"""Store of a sweep: a Zarr group that xarray opens, with plan and solver in its attributes.
+"""Store of a sweep: a Zarr group, which xarray opens as a Dataset.
 
 The group contains an array for each result, in the chunks of the sweep, and the values along the dimensions. The array
-``status`` is written last: a chunk whose members have a status is complete. The subgroup ``made_by`` has the plan and
-the source of the solver in its attributes.
+``status`` is written last, so that a chunk whose members have a status is complete. The attributes of the subgroup
+``made_by`` are the plan and the source of the solver.
 """
 
 from __future__ import annotations
@@ -27,23 +27,27 @@ from phigen.runtime.crossings import SIGNS
 from phigen.runtime.interface import STATUSES, Floats, Interface, LatticeInterface
 from phigen.sweeping.plan import Plan, values_of
 
-#: Status of a member that is not computed yet.
+#: Status of a member that has not been computed yet.
 WAITING = 255
 
 _SOLVER_DATA = "made_by"
 
-#: Reserved names of a store, in addition to those of results and varied quantities.
+#: Names of arrays of a store that varied quantities must not have.
 OWN = ("status", "coordinate", "frame", "frames", _SOLVER_DATA)
 
 
 def imported(name: str) -> Any:
-    """Return a package that sweeps need. Raises `MissingPackageError`."""
+    """Return the module of a package that sweeps need. Raises `MissingPackageError` if it is not installed."""
     return packages.imported(name, "sweeps", "dask distributed xarray zarr")
 
 
 @dataclass(frozen=True)
 class Job:
-    """Opened store: the plan, the interface, the source of the solver, and the NumPy source of functions of states."""
+    """Opened store of a sweep, with all that a worker process needs to compute chunks.
+
+    ``root`` is the Zarr group, ``interface`` and ``files`` are those of the solver, ``functions`` is the source of a
+    NumPy module with energy, Casimirs and observables, ``spec`` the text of the spec.
+    """
 
     root: Any
     plan: Plan
@@ -53,22 +57,25 @@ class Job:
     spec: str
 
     def backend(self, device: int | None = None) -> Any:
-        """Return the loaded solver, on the device with this number. Raises `ToolchainError`."""
+        """Return the loaded solver, for a device target on the device with this number.
+
+        Raises `ToolchainError` if it cannot be compiled.
+        """
         from phigen import registry
 
         return registry.find(self.plan.about["target"]).load(self.files, self.interface, device)
 
     @cached_property
     def module(self) -> Any:
-        """Return the NumPy module with the functions of states."""
+        """The NumPy module with functions of states: energy, Casimirs and observables."""
         from phigen.runtime.modules import load_module
 
         return load_module(self.functions, self.interface.name)
 
     def section(self) -> tuple[Callable[[Floats, Mapping[str, Floats]], Floats], str, tuple[float, ...]]:
-        """Return the section of the run as a function of states, the name of the time and the signs of crossings.
+        """Return the section of the run: its function, the name of the time, and the directions (signs) of crossings.
 
-        The function takes states (…, DIM) and all other values by name.
+        The function takes states (…, DIM), and the values of parameters and time by name.
         """
         from phigen import spec as specs
         from phigen.symbolic.arrays import evaluate
@@ -86,21 +93,29 @@ class Job:
 
 
 def digest_of(plan: Plan, solver: Mapping[str, Any]) -> str:
-    """Return a hash of all data that determine the results, without the division into chunks."""
+    """Return a hash of the plan and the solver, by which stores with different results differ.
+
+    The division into chunks does not enter.
+    """
     facts = {**plan.as_json(), "chunk": None}
     return hashlib.sha256(json.dumps([facts, solver], sort_keys=True).encode()).hexdigest()[:16]
 
 
 def solver_data(interface: Interface, files: Mapping[str, str], functions: str, spec: str) -> dict[str, Any]:
-    """Return the description of a solver in a store: interface, generated files, NumPy functions and spec."""
+    """Return the description of a solver that a store contains, as data for JSON.
+
+    It consists of the interface, the generated files, the NumPy module of functions of states, and the text of the
+    spec.
+    """
     about = {key: sorted(v) if isinstance(v, frozenset) else v for key, v in asdict(interface).items()}
     return json.loads(json.dumps({"interface": about, "files": dict(files), "functions": functions, "spec": spec}))  # type: ignore[no-any-return]
 
 
 def create(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str, Floats]) -> bool:
-    """Create a store without results; return false if another process has created it meanwhile. Raises `OSError`.
+    """Create a store without results. Return False if another process has created it in the meantime.
 
-    The store is written to a temporary path and renamed, so an existing store is always complete.
+    The store is written under a temporary name and then renamed, so that an existing store is never incomplete. Raises
+    `OSError` if it cannot be written.
     """
     temporary = path.with_name(f".phigen-{uuid.uuid4().hex}.zarr")
     try:
@@ -116,7 +131,7 @@ def create(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[st
 
 
 def _fill(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str, Floats]) -> None:
-    """Write the arrays of a store and the data that workers need."""
+    """Write a new store: its arrays, still without results, and the data that workers need."""
     zarr = imported("zarr")
     root = zarr.open_group(str(path), mode="w-", zarr_format=2)
 
@@ -128,7 +143,7 @@ def _fill(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str
 
     def along(name: str, values: Any) -> None:
         about = {"_ARRAY_DIMENSIONS": [name]}
-        # Without a fill value, 0 is a valid value and not a mark of missing data.
+        # The array has no fill value: readers would take the default, 0, for missing data.
         root.create_array(name, data=np.asarray(values), fill_value=None, attributes=about)
 
     for axis in plan.grid if not plan.members else ():
@@ -158,7 +173,7 @@ def _fill(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str
 
 
 def open_job(path: str) -> Job:
-    """Return the job in a store. Raises `FileError` if there is none."""
+    """Open a store for reading and writing. Raises `FileError` if the path is no store of a sweep."""
     zarr = imported("zarr")
     try:
         root = zarr.open_group(path, mode="r+")
@@ -170,13 +185,13 @@ def open_job(path: str) -> Job:
 
 
 def interface_of(about: Mapping[str, Any]) -> Interface:
-    """Return an interface from plain data."""
+    """Return the interface of a solver or of a lattice solver from the data in a store."""
     interface: Interface = _restored(LatticeInterface if "axes" in about else Interface, about)
     return interface
 
 
 def _restored(kind: Any, value: Any) -> Any:
-    """Return a value of a type (record, tuple, set, mapping) from its data in JSON."""
+    """Return a value of the type ``kind`` (dataclass, tuple, set, mapping) from its data in JSON."""
     if is_dataclass(kind):
         hints = get_type_hints(kind)
         return kind(**{name: _restored(hints[name], each) for name, each in value.items()})  # type: ignore[operator]
@@ -194,7 +209,7 @@ def _restored(kind: Any, value: Any) -> Any:
 
 
 def waiting(job: Job) -> list[int]:
-    """Return the numbers of the chunks that are not complete."""
+    """Return the numbers of the chunks of a store that have not been computed yet."""
     status, plan = job.root["status"], job.plan
     numbers = []
     for number in range(int(np.prod(plan.boxes))):

@@ -1,4 +1,4 @@
-"""Computation of the missing members of a sweep into a store."""
+"""Computation of a sweep: the store is created or continued, and all missing chunks are computed."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ from phigen.sweeping.differences import differences
 from phigen.sweeping.plan import Plan, chunk_of
 from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_errors
 
-#: Intended duration of a chunk in seconds: long compared with scheduling and storing, short for a waiting user.
+#: Intended processor time of a chunk in seconds: long compared with scheduling and storing, short for a waiting user.
 _SECONDS = 4.0
 
-#: Seconds of a step with its tangent map, including the processing of the map in Python.
+#: Assumed time in seconds of a step with its tangent map, which Python processes, for Lyapunov exponents.
 _TANGENT = 40e-6
 
 #: Smallest and largest number of members of a chunk.
@@ -44,7 +44,10 @@ _LEAST, _MOST = 32, 1 << 17
 
 @dataclass(frozen=True)
 class SweepSetting:
-    """Setting of a computation: the store, the workers, the solver. ``target`` replaces that of the sweep."""
+    """Where and how a sweep is computed: the store ``output``, the workers, and options of the solver.
+
+    ``target`` replaces the target that the sweep states; None leaves it.
+    """
 
     output: Path
     scheduler: str | None = None
@@ -57,7 +60,11 @@ class SweepSetting:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Numbers of members computed and failed in this call, number of all members, and quality of their energies."""
+    """Result of a call: numbers of members that were computed and that failed in this call, and data of the sweep.
+
+    ``size`` is the number of all members, ``dims`` has the sizes of the dimensions, ``energy`` the members of the sweep
+    with large energy errors.
+    """
 
     members: int
     failed: int
@@ -75,14 +82,15 @@ def made(
     started: Callable[[int], None],
     tell: cluster.Tell,
 ) -> Outcome:
-    """Compute the missing members of a sweep; ``started`` receives their number.
+    """Compute the members of a sweep that its store does not contain yet; ``started`` receives their number.
 
-    Raises `SpecError`, `FileError` if the store contains another sweep, `LimitError` if the members computed at a time
-    do not fit into memory, and `SweepError`.
+    ``tell`` receives the numbers of computed and failed members after each chunk. Raises `SpecError`, `FileError` if
+    the store contains another sweep, `LimitError` if the members that are computed at a time do not fit into memory,
+    and `SweepError` if the computation stops.
     """
     store.imported("zarr")
     target = chosen_target(setting.target or sweep.target)
-    # On this machine a target without a device is refused first, even if the number of workers is given.
+    # If workers run on this machine, a target whose device is missing is refused here, before anything is compiled.
     default = 0 if setting.scheduler else _workers(target, spec, sweep, setting)
     workers = setting.workers or default
     compilation = compilation_of(
@@ -108,7 +116,7 @@ def made(
         with cluster.connected(setting.scheduler, workers) as (client, slots):
             job = job or _created(setting.output, plan, solver, spec, listed, slots)
             chunks = store.waiting(job)
-            if setting.scheduler is None:  # workers on another machine check the memory of that machine
+            if setting.scheduler is None:  # only for workers on this machine, whose memory is known
                 running, held = min(slots, len(chunks)), prod(job.plan.chunk) * job.plan.bytes_of_member
                 expect_room(f"{running} chunks of a sweep at a time", running * held)
             started(sum(_members_of(job.plan, number) for number in chunks))
@@ -124,7 +132,10 @@ def made(
 
 
 def _workers(target: str, spec: Spec, sweep: SweepSettings, setting: SweepSetting) -> int:
-    """Return the default number of workers. Raises `DeviceError` or `MissingPackageError` if there is no device."""
+    """Return the default number of workers on this machine.
+
+    Raises `DeviceError` or `MissingPackageError` if the target needs a device that this machine lacks.
+    """
     try:
         return workers_of(target)
     except (DeviceError, MissingPackageError) as error:
@@ -135,20 +146,20 @@ def _workers(target: str, spec: Spec, sweep: SweepSettings, setting: SweepSettin
 
 
 def _expect_names(varied: Iterable[str], spec: Spec, sweep: SweepSettings) -> None:
-    """Raise `SpecError` for a varied name that is reserved in the store."""
+    """Raise `SpecError` if a varied quantity has the name of another array of the store, such as ``status``."""
     for name in varied:
         if name in (*store.OWN, *KEPT, *sweep.stored):
-            message = f"{spec.file}: a sweep over {name!r}, under which its store has something else"
+            message = f"{spec.file}: a sweep over {name!r}, which is the name of another array in its store"
             raise SpecError([Diagnostic(message, hint="choose another name for it in the spec")])
 
 
 def _with_ensembles(spec: Spec) -> Spec:
-    """Return the spec with the ensemble code that sweeps need, even if the spec excludes ensembles."""
+    """Return the spec with the code for ensembles, which sweeps need, even if ``without:`` leaves it out."""
     return replace(spec, extras=replace(spec.extras, without=spec.extras.without - {"ensemble", "members"}))
 
 
 def _expect_room_for_axes(sweep: SweepSettings, spec: Spec) -> None:
-    """Raise `LimitError` if the values along a dimension, with one copy of them, do not fit into memory."""
+    """Raise `LimitError` if the values along a dimension, of which two arrays are needed, do not fit into memory."""
     for axis in sweep.over:
         place = spec.diagnostic(("sweeps", sweep.name, "over", axis.name), "").location
         expect_room(f"{axis.size} values of {axis.name}", 2 * 8 * axis.size, place, "random members have no axes")
@@ -159,7 +170,10 @@ def _members_of(plan: Plan, number: int) -> int:
 
 
 def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int], target: str) -> Plan:
-    """Return the plan of a sweep, without chunks."""
+    """Return the plan of a sweep, whose division into chunks is not chosen yet.
+
+    ``columns`` are the names of the columns of a file of members, with their lengths.
+    """
     return Plan(
         name=sweep.name,
         coordinates=spec.coordinates,
@@ -184,7 +198,7 @@ def _plan(spec: Spec, sweep: SweepSettings, run: Run, columns: Mapping[str, int]
 
 
 def _files(spec: Spec, run: Run) -> dict[str, Any]:
-    """Return the path of the spec and the digests of the files that a run of a lattice reads; no entries without
+    """Return the path of the spec, and the digests of the data files that a run of a lattice reads; {} without
     files."""
     if run.lattice is None:
         return {}
@@ -200,7 +214,7 @@ def _files(spec: Spec, run: Run) -> dict[str, Any]:
 
 
 def _solver_data(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:
-    """Return the source of the solver and the other data that workers need."""
+    """Return the data of the solver that workers need, as `store.solver_data` returns them."""
     program, command = compilation.program, f"phigen build {compilation.program.name}.yaml"
     (functions,) = emit(program, "numpy", command).values()
     return store.solver_data(interface_of(program), files_of(program, target, command), functions, spec.source)
@@ -209,7 +223,7 @@ def _solver_data(compilation: Compilation, target: str, spec: Spec) -> dict[str,
 def _gone_on_with(
     output: Path, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> store.Job:
-    """Return the store of an earlier call. Raises `FileError` if it contains another sweep."""
+    """Return the existing store ``output``, which is continued. Raises `FileError` if it contains another sweep."""
     job = store.open_job(str(output))
     if phrases := differences(job, plan, solver, spec, listed):
         message = f"{output} holds another sweep: {'; '.join(phrases)}"
@@ -220,9 +234,10 @@ def _gone_on_with(
 def _created(
     output: Path, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats], slots: int
 ) -> store.Job:
-    """Return a new store with chunks that keep all workers busy.
+    """Create the store ``output``, with chunks whose size keeps all ``slots`` threads of workers busy; return it
+    opened.
 
-    If another process has created the store meanwhile, return that one.
+    If another process has created this store in the meantime, that store is returned.
     """
     job = store.Job(
         None, plan, store.interface_of(solver["interface"]), solver["files"], solver["functions"], solver["spec"]
@@ -236,7 +251,10 @@ def _created(
 
 
 def _seconds_of_a_member(job: store.Job) -> float:
-    """Return the seconds per member, from a trial of a few members and steps; the first call compiles the solver."""
+    """Return the estimated processor time of a member in seconds, from a trial of a few members and steps.
+
+    The solver is compiled if it is not in the cache.
+    """
     if job.plan.sizes:
         return lattice_members.seconds_of_a_member(job)
     plan, steps = job.plan, min(job.plan.steps, 2000)
@@ -245,18 +263,21 @@ def _seconds_of_a_member(job: store.Job) -> float:
     h, t0 = np.asarray(plan.h), np.asarray(plan.t0)
     trial = Members(x0, h, steps, values, t0, draws=Draws(plan.noise), paths=np.arange(len(x0)))
     backend = job.backend()
-    began = time.process_time()  # processor time: other load on the machine must not lead to smaller chunks
+    began = time.process_time()  # processor time, so that other load on the machine does not lead to smaller chunks
     try:
         backend.ensemble(trial, 1)
     except BackendError:
-        return _SECONDS / 4096  # default if the trial fails
+        return _SECONDS / 4096  # an assumed time of a member, since the trial failed
     seconds = (time.process_time() - began) / len(x0) * (plan.steps / steps) + 1e-7
     counted = ("crossings" in plan.keep) + any("(" in word for word in plan.keep)
     return seconds * (1 + counted) + ("lyapunov" in plan.keep) * _TANGENT * plan.steps
 
 
 def _member_columns(sweep: SweepSettings, spec: Spec) -> dict[str, Floats]:
-    """Return the columns of a file of members by name. Raises `SpecError`, located at the file name in the spec."""
+    """Return the columns of the CSV file of members, by name, (members,) each.
+
+    Raises `SpecError`, located at the name of the file in the spec, if the file cannot be read or has wrong columns.
+    """
     path = Path(spec.file).parent / sweep.file
 
     def refused(why: str, hint: str = "") -> SpecError:

@@ -29,10 +29,11 @@ from fractions import Fraction
 from functools import cache
 from typing import Any
 
-#: Names, in expressions, of κ and of the integrals G and I; their arguments are t, P and R.
+#: Names, in expressions, of the functions κ, G and I of t, P and R that the text at the head of the module defines.
 AMPLITUDE, SQUARES, RATIOS = ELLIPTIC = ("amplitude", "amplitude1", "amplitude2")
 
-#: Name, in expressions, of the integral of the third kind; its arguments are t, P, R and n.
+#: Name, in expressions, of the elliptic integral of the third kind; its arguments are t, P, R and n. The text at the
+#: head of the module defines it.
 THIRD = "amplitude3"
 
 #: For Pt² ≤ 1: number of times that the argument of S is halved for the power series and doubled afterwards, and number
@@ -83,7 +84,7 @@ def _product(a: dict[tuple[int, int], Fraction], b: dict[tuple[int, int], Fracti
 
 
 def functions_of(kappa: Any, p: Any, r: Any) -> tuple[Any, Any, Any]:
-    """Return S, C and D² from κ, by the formulas of the module, for P = ``p`` and R = P − Q = ``r``."""
+    """Return S = sn/√P, C = cn and D² = dn² from κ, by the formulas at the head of the module; P = ``p``, R = ``r``."""
     z = p * kappa**2
     inverse = 1 / (1 + z) ** 2
     s, c = 4 * kappa * (1 - z) * inverse, (1 - 6 * z + z**2) * inverse
@@ -91,7 +92,10 @@ def functions_of(kappa: Any, p: Any, r: Any) -> tuple[Any, Any, Any]:
 
 
 def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tuple[Any, ...]:
-    """Return the partial derivatives of κ with respect to t, P and R; ``call`` applies a function by its name."""
+    """Return the partial derivatives with respect to t, P and R of κ, the function `value`.
+
+    ``call`` applies a function by its name.
+    """
     z = p * kappa**2
     *_, square = functions_of(kappa, p, r)
     along_t = (1 + z) * square ** Fraction(1, 2) / 4
@@ -101,27 +105,30 @@ def slopes(call: Callable[..., Any], kappa: Any, t: Any, p: Any, r: Any) -> tupl
 
 
 def value(library: Any, t: Any, p: Any, r: Any) -> Any:
-    """Return κ for t, P and R, in double precision if the library is `math`, else in that of an mpmath context."""
+    """Return κ = tan(φ/4)/√P, where φ is Jacobi's amplitude of √P t with the modulus √(1 − R/P).
+
+    The precision is double if the library is `math`, else that of an mpmath context.
+    """
     return _reduced(library, t, p, r)[0]
 
 
 def squares(library: Any, t: Any, p: Any, r: Any) -> Any:
-    """Return ∫ S² dt from 0 to t."""
+    """Return ∫ S² dt from 0 to t, where S = sn(√P t)/√P with the modulus √(1 − R/P)."""
     return _integral(library, t, p, r, lambda c, d, _: carlson(library, c, d, 1 + 0 * c))
 
 
 def ratios(library: Any, t: Any, p: Any, r: Any) -> Any:
-    """Return ∫ S²/D² dt from 0 to t."""
+    """Return ∫ S²/D² dt from 0 to t, where S = sn(√P t)/√P and D = dn(√P t) with the modulus √(1 − R/P)."""
     return _integral(library, t, p, r, lambda c, d, _: carlson(library, c, 1 + 0 * c, d))
 
 
 def third(library: Any, t: Any, p: Any, r: Any, n: Any) -> Any:
-    """Return ∫ S²/(1 − nS²) dt from 0 to t."""
+    """Return ∫ S²/(1 − nS²) dt from 0 to t, where S = sn(√P t)/√P with the modulus √(1 − R/P), and n ≤ 0."""
     return _integral(library, t, p, r, lambda c, d, e: carlson_third(library, c, d, 1 - n * e))
 
 
 def _reduced(library: Any, t: Any, p: Any, r: Any) -> tuple[Any, Any]:
-    """Return κ for the amplitude φ reduced to −π ≤ φ < π, and the number of full turns that the reduction removed."""
+    """Return κ = tan(φ/4)/√P (see `value`) for φ reduced to −π ≤ φ < π, and the number of turns that were removed."""
     if p <= 0:
         return t / 4, 0
     root = library.sqrt(p)

@@ -99,7 +99,7 @@ def _term(coefficient: Fraction, monomial: str) -> str:
 def of_polynomial(
     tower: Tower, element: Poly, max_terms: int | None = SHOWN, small_symbols: Collection[str] = ()
 ) -> Formula:
-    """Return the formula of an element of a tower; ``max_terms`` is the number of terms to display, None for all.
+    """Return the formula of a polynomial, an element of ``tower``; at most ``max_terms`` terms are displayed.
 
     If there are more terms, those of the lowest total degree in the ``small_symbols`` are displayed.
     """

@@ -33,7 +33,10 @@ LANE_DOUBLINGS = 2
 
 
 def slopes(k: int) -> Callable[..., tuple[Any, ...]]:
-    """Return the function ``slopes`` of the record of F_k: its partial derivatives with respect to t, a_0, …, a_3."""
+    """Return the function that computes the partial derivatives of F_k, the function `value`, by t, a_0, …, a_3.
+
+    Its first argument applies a function by its name.
+    """
 
     def rule(call: Callable[..., Any], f: Any, t: Any, *a: Any) -> tuple[Any, ...]:
         last = call(REMAINDERS[3], t, *a)
@@ -52,23 +55,32 @@ def slopes(k: int) -> Callable[..., tuple[Any, ...]]:
 
 
 def times_x(coefficients: Any, a: Any) -> list[Any]:
-    """Return the product of x and a polynomial of degree 3, modulo p; lists of coefficients begin with the constant."""
+    """Return the product of x and a polynomial of degree 3, modulo p = x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0.
+
+    Lists of coefficients begin with the constant.
+    """
     *lower, top = coefficients
     return [c * top + e for c, e in zip(a, [0, *lower], strict=True)]
 
 
 def value(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """Return F_k for t and a_0, …, a_3, in double precision if the library is `math`, else in that of mpmath."""
+    """Return F_k: 1 + Σ F_k x^k is the remainder of e^{tx} on division by x⁴ − a_3 x³ − a_2 x² − a_1 x − a_0.
+
+    The precision is double if the library is `math`, else that of an mpmath context.
+    """
     return _coefficients(library, t, a)[0][k]
 
 
 def quotient(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """Return G_k for t and a_0, …, a_3, in double precision if the library is `math`, else in that of mpmath."""
+    """Return G_k: Σ G_k x^k is the remainder of the quotient of the division in `value`, on division by its divisor.
+
+    The precision is double if the library is `math`, else that of an mpmath context.
+    """
     return _coefficients(library, t, a)[1][k]
 
 
 def _coefficients(library: Any, t: Any, a: Any) -> tuple[list[Any], list[Any]]:
-    """Return the lists of all F_k and of all G_k, in the precision of the library."""
+    """Return the lists of all F_k (see `value`) and of all G_k (see `quotient`), in the precision of the library."""
     root_bound = max(abs(c * t ** (4 - j)) ** (1 / (4 - j) + 0 * t) for j, c in enumerate(a))
     halvings = 0
     while root_bound > MAX_ROOT:

@@ -45,25 +45,31 @@ def order_of(name: str) -> int:
 
 
 def coefficient(order: int, n: int) -> Fraction:
-    """Return the coefficient of sⁿ in the Taylor series of the derivative φ^(order)(s), exactly."""
+    """Return the exact coefficient of sⁿ in the Taylor series of φ or its derivative of this ``order``.
+
+    Here and below, φ(s) = (1 − w cot w)/s with w = √s/2, the function of the exponential bi-realisation.
+    """
     return _series(n + order) * (math.factorial(n + order) // math.factorial(n))
 
 
 def near_coefficients(order: int) -> list[float]:
-    """Return Taylor coefficients of φ^(order), the constant first, in double precision for |s| < `NEAR`."""
+    """Return the Taylor coefficients of a derivative of φ (see `coefficient`) for |s| < `NEAR`, the constant first."""
     return [float(coefficient(order, n)) for n in range(NEAR_TERMS)]
 
 
 def lane_coefficients(order: int) -> list[float]:
-    """Return Taylor coefficients of φ^(order), the constant first, in double precision for |s| ≤ `LANE_REACH`."""
+    """Return the Taylor coefficients of a derivative of φ (see `coefficient`) for SIMD code, the constant first.
+
+    They suffice for |s| ≤ `LANE_REACH`.
+    """
     return [float(coefficient(order, n)) for n in range(LANE_TERMS)]
 
 
 @cache
 def rest_coefficients(order: int) -> list[float]:
-    """Return the Taylor coefficients of φ^(order) without its nearest pole, for |s| < `MIDDLE`, the constant first.
+    """Return the Taylor coefficients of a derivative of φ (see `coefficient`) without its nearest pole, constant first.
 
-    The function is φ^(order)(s) − 2·order!/(4π² − s)^{order+1}.
+    The function is φ^(order)(s) − 2·order!/(4π² − s)^{order+1}; the coefficients suffice for |s| < `MIDDLE`.
     """
     differences = []
     for n in range(MIDDLE_TERMS):
@@ -73,7 +79,7 @@ def rest_coefficients(order: int) -> list[float]:
 
 
 def in_double(order: int, s: float) -> float:
-    """Return φ^(order)(s) in double precision, as the generated code computes it."""
+    """Return the derivative of φ (see `coefficient`) of this order at s in double precision, as generated code does."""
     if abs(s) < NEAR:
         return _polynomial(near_coefficients(order), s)
     if abs(s) < MIDDLE:
@@ -84,7 +90,7 @@ def in_double(order: int, s: float) -> float:
 
 
 def precisely(context: Any, order: int, s: Any) -> Any:
-    """Return φ^(order)(s) in an mpmath context; the last two digits may be wrong."""
+    """Return the derivative of φ (see `coefficient`) of this order in an mpmath context; two digits may be wrong."""
     if abs(s) < 1:
         terms = int(context.dps / 1.5) + 6  # a_n decreases like (4π²)^{−n}
         value = context.zero
@@ -97,14 +103,17 @@ def precisely(context: Any, order: int, s: Any) -> Any:
 
 
 def value(library: Any, order: int, s: Any) -> Any:
-    """Return φ^(order)(s), in double precision if the library is `math`, else in that of an mpmath context."""
+    """Return the derivative of φ (see `coefficient`) of this order at s.
+
+    The precision is double if the library is `math`, else that of an mpmath context.
+    """
     return in_double(order, s) if library is math else precisely(library, order, s)
 
 
 def _closed(order: int, s: Any, c: Any) -> Any:
-    """Return φ^(order)(s) from c = w cot w with w = √s/2, or c = w coth w with w = √−s/2 for s < 0.
+    """Return φ(s) = (1 − c)/s or a derivative of φ, from c = w cot w, w = √s/2; for s < 0, c = w coth w, w = √−s/2.
 
-    φ is (1 − c)/s; its derivatives follow from the Riccati equation.
+    The derivatives follow from the Riccati equation sφ' = 1/8 − (3/2)φ + ½sφ².
     """
     phi0 = (1 - c) / s
     if order == 0:

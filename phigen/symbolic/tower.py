@@ -65,7 +65,7 @@ class Generator:
 
 
 class _MissingError(Exception):
-    """An expression needs this generator, which the ring lacks. The tower adds it, or refuses the expression."""
+    """Raised if an expression needs a generator that the ring lacks; it is then added, or the expression refused."""
 
     def __init__(self, kind: str, arguments: list[Poly], degree: int = 1, inverse: bool = False) -> None:
         self.kind, self.arguments, self.degree, self.inverse = kind, arguments, degree, inverse
@@ -438,7 +438,7 @@ class Tower(Arithmetic[Poly]):
         return bool(self.numerator(element) == 0)
 
     def _is_nonzero_at_a_point(self, element: Poly) -> bool:
-        """Whether an element with `MANY_GENERATORS` or more has a nonzero value at a point; False if it has fewer."""
+        """Whether an element has a nonzero value at a point; not tested for fewer generators than `MANY_GENERATORS`."""
         degrees = element.degrees()
         if sum(degrees[self._index[g.name]] > 0 for g in self.generators) < MANY_GENERATORS:
             return False

@@ -30,9 +30,10 @@ RADIAL = 1e-30
 def slopes(
     call: Callable[..., Any], s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any
 ) -> tuple[Any, ...]:
-    """Return the partial derivatives of s with respect to t, r, η, β, μ and |q × q̇|²; ``call`` applies a function.
+    """Return the partial derivatives of the universal anomaly s by t, r, η, β, μ and |q × q̇|².
 
-    The derivative with respect to |q × q̇|² is 0, since this argument only decides whether s has a value.
+    ``call`` applies a function by its name. The derivative by |q × q̇|² is 0, since this argument only decides whether
+    s has a value.
     """
     square = s**2
     z = beta * square
@@ -46,9 +47,10 @@ def slopes(
 
 
 def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any) -> Any:
-    """Return s, in double precision if the library is `math`, else in that of an mpmath context.
+    """Return the universal anomaly s of a Kepler motion after the time t, with the arguments of the module.
 
-    ``spin`` is |q × q̇|². Raises `ValueError` if there is no value: at r = 0, and after a collision of a radial motion.
+    The precision is double if the library is `math`, else that of an mpmath context. ``spin`` is |q × q̇|². Raises
+    `ValueError` if there is no value: at r = 0, and after a collision of a radial motion.
     """
     if not r > 0:
         raise ValueError("the distance of a Kepler motion is not positive")
@@ -62,7 +64,7 @@ def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any)
 
 
 def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
-    """Return the solution s of the equation for t > 0, to rounding error.
+    """Return the universal anomaly s for t > 0, the solution of the equation at the head of the module.
 
     The iteration is Laguerre's method. Steps that leave the known bounds of the solution are replaced by bisection.
     """
@@ -101,8 +103,10 @@ def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
 
 
 def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the residual of the equation for s, the sum of the absolute values of its terms, and the first two
-    derivatives of the residual by s."""
+    """Return the residual of the equation for the universal anomaly s, and its first two derivatives by s.
+
+    The second number of the result is the sum of the absolute values of the terms of the equation.
+    """
     from phigen.symbolic import entire
 
     z = beta * s**2

@@ -1,1 +1,1 @@
-"""Search for the cheapest setting of a spec for an accuracy: candidates are built, measured, compared and confirmed."""
+"""Search for the method and step that reach an accuracy at the least cost, by building and measuring candidates."""

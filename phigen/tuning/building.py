@@ -1,6 +1,7 @@
-"""Parallel builds of candidates, each in a separate process, so that builds that take too long can be ended.
+"""Parallel builds of candidate methods, each in a separate process, so that builds that take too long can be ended.
 
-A process generates the code and compiles it into the cache of solvers, from which the calling process loads it.
+A process generates the code and compiles it. The library goes into the cache of solvers, from which the calling process
+loads it.
 """
 
 from __future__ import annotations
@@ -28,20 +29,22 @@ from phigen.spec.model import Spec
 from phigen.targets.header import split
 from phigen.tuning.settings import Setting
 
-#: Reason for candidates that were not built before the deadline.
+#: Reason that is reported for candidates that were not built before the deadline.
 LATE = "there was no time to build it"
-#: Largest number of processes at a time.
+#: Largest number of builds at a time, each in a process.
 WORKERS = 4
-#: Number of seconds in which a process must end after it was asked to.
+#: Seconds after which a process that was asked to end is killed.
 _GRACE = 2.0
 
 
 @dataclass(frozen=True)
 class Built:
-    """A compiled candidate: its files, its resolved setting, and the seconds that the build took.
+    """A compiled candidate, with its generated files and the properties of its method.
 
-    ``order`` may exceed that of the setting, since symmetric methods have even order. ``fingerprint`` is the same for
-    two settings with the same code.
+    ``kind`` is the chosen kind of bi-realisation or scheme. ``order`` may exceed that of the setting, since symmetric
+    methods have even order. ``exact`` says that a step is a Poisson map to round-off, ``gauged`` that multiples of
+    Casimirs are chosen. ``stages`` is the number of maps of which a step is composed, ``seconds`` the time of the
+    build.
     """
 
     setting: Setting
@@ -58,12 +61,12 @@ class Built:
 
     @property
     def fingerprint(self) -> str:
-        """A hash of the code without its headers."""
+        """Hash of the code without the headers of files; two settings with the same code have the same fingerprint."""
         bodies = [split(text)[1] for _, text in sorted(self.files.items())]
         return hashlib.sha256("\0".join(bodies).encode()).hexdigest()
 
     def solver(self) -> Backend:
-        """Return the back end; if it is C, the library is in the cache."""
+        """Return the back end of the solver. For C it is loaded from the cache, where the build has put the library."""
         return backend_of(self.files, self.interface)
 
 
@@ -71,7 +74,8 @@ class Built:
 class Refusal:
     """The reason why a candidate cannot be built.
 
-    ``inapplicable`` says that the method does not apply to the system; otherwise the size or the time is the reason.
+    ``inapplicable`` says that the method does not apply to the system; otherwise the code would be too large, or the
+    build would take too long. ``seconds`` is the time that the attempt took.
     """
 
     reason: str
@@ -83,14 +87,16 @@ Outcome = Built | Refusal
 
 
 def build(spec: Spec, system: System | None, setting: Setting) -> Built:
-    """Generate and compile one candidate. Raises the errors of `compile_spec` and of the compiler."""
+    """Generate and compile the candidate with a setting. Raises the errors of `compile_spec` and of the C compiler."""
     start = time.perf_counter()
     return built(compile_spec(setting.applied(spec), system=system), setting, start)
 
 
 def built(compilation: Compilation, setting: Setting, start: float) -> Built:
-    """Return a compilation compiled as C if there is a compiler, else as NumPy; ``start`` is the time when the build
-    began."""
+    """Generate the code of a compilation, C if there is a compiler, else NumPy, and compile the C.
+
+    ``start`` is the time, as of `time.perf_counter`, at which the build began.
+    """
     program, target = compilation.program, chosen_target("auto")
     files = emit(program, target, f"phigen build {program.name}.yaml")
     step = program.step
@@ -108,9 +114,9 @@ def built(compilation: Compilation, setting: Setting, start: float) -> Built:
 def build_all(
     spec: Spec, system: System | None, settings: Sequence[Setting], deadline: float
 ) -> Iterator[tuple[Setting, Outcome]]:
-    """Yield the outcome of each setting in order of completion; builds that are unfinished at the deadline are ended.
+    """Build several settings, and yield each with its outcome as soon as it is known.
 
-    ``deadline`` is a time of `time.perf_counter`.
+    Builds that are not finished at the ``deadline``, a time as of `time.perf_counter`, are ended and refused.
     """
     waiting, running = list(settings), dict[Connection, tuple[Setting, Any, float]]()
     context: Any = multiprocessing.get_context("fork" if sys.platform != "win32" else "spawn")
@@ -150,9 +156,9 @@ def _received(pipe: Connection, seconds: float) -> Outcome:
 
 
 def _work(spec: Spec, system: System | None, setting: Setting, pipe: Connection) -> None:
-    """Build one candidate and send the outcome through the pipe; the main function of a process.
+    """Build one candidate, and send the outcome through the pipe: the main function of a process.
 
-    A process that is terminated also ends its C compiler.
+    If the process is terminated, it also ends its C compiler.
     """
 
     def leave(*_: Any) -> None:
@@ -160,7 +166,7 @@ def _work(spec: Spec, system: System | None, setting: Setting, pipe: Connection)
 
     for name in (signal.SIGTERM, signal.SIGINT):
         signal.signal(name, leave)
-    # Results are sent through the pipe; the output of a terminated interpreter on stderr is not useful.
+    # stderr is closed: the outcome goes through the pipe, and a terminated interpreter would print a traceback.
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     start, outcome = time.perf_counter(), Refusal("building it failed")
     try:

@@ -1,6 +1,7 @@
 """Comparison of realisations, schemes and classical methods on one run: cost, errors, and the Poisson defect.
 
-`tune` searches for the cheapest setting; a comparison measures all settings with one step size, or at one cost.
+While `phigen.tuning.study.tune` searches for the cheapest setting, a comparison measures all settings, with the same
+step size or at the same cost.
 """
 
 from __future__ import annotations
@@ -25,13 +26,13 @@ from phigen.tuning.settings import Setting, own_setting
 from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import MARKS, marks
 
-#: Number of states at which the Poisson defect is measured; the largest defect counts.
+#: Number of states at which the Poisson defect of a step is measured; the largest defect is reported.
 STATES = 5
-#: Largest number of rows at which errors are measured.
+#: Approximate number of states of a run at which errors are measured.
 ROWS = 2000
-#: Classical methods of the comparison, by their names in tables.
+#: Classical methods of the comparison, with their names in tables.
 PEERS = {"rk4": "RK4", "dop853": "DOP853"}
-#: Shares of the time budget: for building, and for the reference of one orbit.
+#: Shares of the time budget: for all builds, and for the reference solution with which one orbit is compared.
 BUILDING, REFERRING = 0.6, 0.05
 
 Notify = Callable[[str], object]
@@ -39,11 +40,12 @@ Notify = Callable[[str], object]
 
 @dataclass(frozen=True)
 class ComparedMethod:
-    """One method of a comparison; ``refusal`` is the reason why there are no numbers, "" if there are numbers.
+    """Results of one method of a comparison; ``refusal`` is the reason why there are none, "" if there are results.
 
-    ``error`` (of the energy) and ``casimirs`` are the largest errors along the trajectory. ``orbit`` is the distance
-    from the solution at the end, ``defect`` the residual of DΦ π DΦᵀ = π∘Φ. Unknown numbers are None. A step takes
-    ``nanoseconds``. ``poisson`` says whether a step is a Poisson map by construction.
+    ``error`` and ``casimirs`` are the largest errors of energy and Casimirs along the run, ``orbit`` is the largest
+    distance from the reference solution, ``defect`` the residual of DΦ π DΦᵀ = π∘Φ. Unknown results are None. A step
+    takes ``nanoseconds``. ``poisson`` says whether a step is a Poisson map by construction, ``own`` whether the method
+    is the setting of the spec.
     """
 
     title: str
@@ -61,13 +63,17 @@ class ComparedMethod:
 
     @property
     def seconds(self) -> float:
-        """CPU seconds of the run."""
+        """Processor time of the run in seconds."""
         return 1e-9 * self.nanoseconds * self.steps
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """All methods on one run; ``equal`` is ``step`` or ``work``, ``unit`` the unit of energy errors."""
+    """Results of all methods on one run over the time ``horizon``.
+
+    ``equal`` says what the methods have in common: ``step``, the step size, or ``work``, the processor time. ``unit``
+    is the kind of unit of energy errors, ``clock`` the variable in which steps have equal size, t or τ.
+    """
 
     entries: tuple[ComparedMethod, ...]
     horizon: float
@@ -78,7 +84,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A method that is not measured yet: its runner, and its one-step map if that can be differentiated."""
+    """A method to be measured: ``method`` makes runs; ``step`` is its one-step map, None if it has no derivative."""
 
     title: str
     order: int
@@ -97,11 +103,11 @@ def compare(
     budget: float = 60.0,
     note: Notify = lambda text: None,
 ) -> Comparison:
-    """Measure the setting of the spec and all others of these orders, RK4 and DOP853 on one run.
+    """Measure on one run the setting of the spec, all other settings of these ``orders``, RK4 and DOP853.
 
-    ``compilation`` and the candidates have tangent maps. If ``equal`` is ``work``, each method uses the step size at
-    which it costs as much as the setting of the spec at the step of the run. Raises `StepError` if that setting cannot
-    make the run.
+    ``compilation`` must have been made with tangent maps. If ``equal`` is ``work``, each method uses the step size with
+    which its run costs as much as that of the setting of the spec. The comparison takes about ``budget`` seconds.
+    Raises `StepError` if the setting of the spec cannot make the run.
     """
     start = time.perf_counter()
     current = own_setting(compilation)
@@ -148,7 +154,7 @@ def compare(
 
 
 def _settings(problem: Problem, current: Setting, orders: Sequence[int]) -> list[Setting]:
-    """Return the settings to compare: each bi-realisation, and the splitting, at each of the ``orders`` that it has."""
+    """Return the settings to compare: bi-realisations, splitting and Gauss, each at all ``orders`` that it offers."""
     families = dict.fromkeys([current.family, *(guess.family for guess in problem.guesses(current))])
     return [replace(family, order=order) for family in families for order in orders if order in family.orders]
 
@@ -163,7 +169,10 @@ def _of_build(build: Built, problem: Problem, *, is_current: bool = False) -> _C
 def _measured(
     candidate: _Candidate, problem: Problem, h: float, exact: CompiledMethod | None, seconds: float
 ) -> ComparedMethod:
-    """Measure a method with a step size over the whole run."""
+    """Measure a method with a step size of about ``h`` over the whole run.
+
+    ``exact`` computes the reference solution, within ``seconds``; None if there is no reference.
+    """
     unmeasured = ComparedMethod(candidate.title, candidate.order, poisson=candidate.poisson, own=candidate.own)
     if not math.isfinite(h):
         return replace(unmeasured, refusal="a step cannot be made")
@@ -191,7 +200,7 @@ def _measured(
 
 
 def _defect(step: Step | None, problem: Problem, states: Floats, h: float) -> float | None:
-    """Return the largest Poisson defect at some states of the run; None if the step cannot be differentiated."""
+    """Return the largest Poisson defect of steps from `STATES` states of the run; None if ``step`` is None."""
     if step is None:
         return None
     sampled_states = states[np.linspace(0, len(states) - 1, STATES, dtype=int)]

@@ -1,4 +1,4 @@
-"""RK4 at the cost of a solver: its largest energy error over the same run."""
+"""Comparison of a solver with RK4 at the same cost: the largest energy error of RK4 over the same run."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from phigen.runtime.backend import Backend
 from phigen.tuning.problem import Classical, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: Largest number of states at which the energy is evaluated.
+#: Approximate number of states of a run at which the energy is evaluated.
 ROWS = 2000
 
 
 def rk4_energy_error(compilation: Compilation, solver: Backend, problem: Problem) -> float:
-    """Return the energy error of an RK4 run, in double precision, that takes as much processor time as the solver's
-    run.
+    """Return the energy error of a run by RK4 that takes as much processor time as the run of the solver.
 
-    The result is infinity if RK4 breaks down, NaN if steps cannot be timed. Raises `ToolchainError` without a compiler.
+    RK4 works in double precision. The result is infinite if RK4 breaks down, and NaN if steps cannot be timed. Raises
+    `ToolchainError` if the C compiler fails.
     """
     state = problem.start.copy()
     rk4 = Classical(problem.classical(compilation, ["rk4"], state).runners["rk4"], state, problem)

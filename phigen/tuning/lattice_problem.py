@@ -1,4 +1,4 @@
-"""Tuning problems for lattices of one size: states are flat arrays, methods are those of lattice solvers."""
+"""Tuning problems of lattices. Their states are flattened to one dimension, as the search for settings needs them."""
 
 from __future__ import annotations
 
@@ -22,28 +22,32 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem
 from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, direct
 
-#: Number of sites above which a smaller grid of the same kind is measured.
+#: Number of sites of a grid above which methods are measured on a smaller grid instead.
 MOST_SITES = 10_000
-#: Largest numbers of values stored for one run, and for a run that is compared with a reference.
+#: Largest number of values (states times coordinates) that are stored for one run; and largest number of coordinates
+#: for runs whose orbits are compared with a reference solution.
 MOST_NUMBERS, MOST_COMPARED = 2**24, 2**13
-#: Largest number of states at which the energy of one run is evaluated: each takes a call of Python and a pass over all
-#: sites.
+#: Largest number of states at which the energy of one run is evaluated. Each evaluation is a call from Python, and goes
+#: over all sites.
 LATTICE_ROWS = 1024
 
 
 @dataclass
 class FlatSession:
-    """A run of a lattice in progress, with flat states. See `phigen.runtime.session.Course`."""
+    """Session of a lattice solver, which makes single steps, with states flattened to (DIM,).
+
+    Its methods are those of `phigen.runtime.session.Course`.
+    """
 
     session: LatticeSession
 
     @property
     def steps(self) -> int:
-        """The number of successful steps since the start."""
+        """Number of successful steps since the start."""
         return self.session.steps
 
     def state(self) -> Floats:
-        """Return a copy of the state (DIM,)."""
+        """Return a copy of the current state (DIM,)."""
         return self.session.state().reshape(-1)
 
     def advance(self, h: float, steps: int) -> None:
@@ -51,20 +55,23 @@ class FlatSession:
         self.session.advance(h, steps)
 
     def branch(self) -> FlatSession:
-        """Raise `NotImplementedError`: tunings do not copy sessions of lattices."""
+        """Raise `NotImplementedError`: copies of sessions of lattices are not needed here."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class FlatLattice:
-    """The solver of a lattice of one size, with flat states (DIM,). See `phigen.runtime.backend.Backend`."""
+    """Solver of a lattice of one size, with states flattened to (DIM,).
+
+    Its methods are those of `phigen.runtime.backend.Backend`.
+    """
 
     backend: LatticeBackend
     shape: tuple[int, ...]
     _seen: list[LatticeSession] = field(default_factory=list)
 
     def start(self, x0: Floats, parameters: Mapping[str, Any]) -> FlatSession:
-        """Return a session at x0 (DIM,)."""
+        """Return a session that starts from the state ``x0`` (DIM,)."""
         return FlatSession(self.backend.start(x0.reshape(self.shape), parameters))
 
     def vector_field(self, states: Floats, parameters: Mapping[str, Any]) -> Floats:
@@ -72,32 +79,32 @@ class FlatLattice:
         return np.array([self._evaluation_session(x, parameters).vector_field().reshape(-1) for x in states])
 
     def energies(self, states: Floats, parameters: Mapping[str, Any]) -> Floats:
-        """Return H of states (rows, DIM)."""
+        """Return the energies H (rows,) of states (rows, DIM)."""
         return np.array([self._evaluation_session(x, parameters).hamiltonian() for x in states])
 
     def terms(self, x: Floats, parameters: Mapping[str, Any]) -> float:
-        """Return the sum of the magnitudes of the energies of the sites."""
+        """Return the sum over the sites of the absolute values of their energies, at a state ``x`` (DIM,)."""
         return float(np.abs(self._evaluation_session(x, parameters).density()).sum())
 
     def _evaluation_session(self, x: Floats, parameters: Mapping[str, Any]) -> LatticeSession:
-        """Return the session in which functions of states are evaluated."""
+        """Return a session at the state ``x``, in which functions of states are evaluated; it is reused if possible."""
         state = x.reshape(self.shape)
         if not self._seen:
             self._seen.append(self.backend.start(state, parameters))
             return self._seen[0]
         try:
             self._seen[0].place(state)
-        except TypeError:  # code with profile small cannot replace the state of a session
+        except TypeError:  # code with the profile small cannot replace the state of a session, so a new one is made
             return self.backend.start(state, parameters)
         return self._seen[0]
 
 
 @dataclass(frozen=True)
 class LatticeProblem(Problem):
-    """The tuning problem of a lattice of given sizes and parameter arrays; ``seer`` is the solver that evaluates
-    energies.
+    """Tuning problem of a lattice with given sizes and parameter arrays.
 
-    ``whole`` are the sizes of the run if a smaller lattice is measured instead.
+    ``seer`` is the solver that evaluates energies. ``whole`` are the sizes of the lattice in the run, which is larger
+    if a smaller lattice is measured instead.
     """
 
     cell: Cell = field(kw_only=True)
@@ -106,39 +113,42 @@ class LatticeProblem(Problem):
 
     @property
     def name(self) -> str:
-        """The name of the lattice."""
+        """Name of the lattice."""
         return self.cell.name
 
     @property
     def unit(self) -> Unit:
-        """The unit of errors of the energy."""
+        """Unit in which energy errors are measured."""
         energy = float(self.seer.energies(self.start[None], self.parameters)[0])
         return unit_of(energy, self.seer.terms(self.start, self.parameters), SITES)
 
     @property
     def most_rows(self) -> int:
-        """Largest number of rows whose energies are evaluated, which is limited by memory."""
+        """Largest number of states at which the energy of one run is evaluated; fewer for large lattices."""
         return min(LATTICE_ROWS, max(64, MOST_NUMBERS // len(self.start)))
 
     @property
     def evens_out(self) -> bool:
-        """False: no monitors are searched for lattices."""
+        """Whether monitors may be tried: False, since lattices have none that could be tried."""
         return False
 
     def energies(self, states: Floats) -> Floats:
-        """Return H of states (rows, DIM); NaN for states that are not finite."""
+        """Return the energies H (rows,) of states (rows, DIM); NaN for states that are not finite."""
         finite = np.isfinite(states).all(axis=1)
         energies = np.full(len(states), np.nan)
         energies[finite] = self.seer.energies(states[finite], self.parameters)
         return energies
 
     def method(self, solver: Any) -> Candidate:
-        """Return a solver as a method."""
+        """Return the method of a lattice solver, which makes runs from the initial state of this problem."""
         flat: Any = FlatLattice(solver, self.seer.shape)
         return Candidate(flat, self)
 
     def guesses(self, current: Setting) -> list[Setting]:
-        """Return the first settings: splittings, and the series with each bi-realisation that might apply at a site."""
+        """Return the settings to measure first: that of the spec at orders 2 and 4, splittings, and the series.
+
+        The series is tried with each bi-realisation that might apply to the brackets of a site.
+        """
         local = self.cell.is_local
         kinds = [k for k in BIREALISATIONS if k not in (*FORMULAS, *CHOICES, "karasev")] if local else ["auto"]
         splittings = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
@@ -147,7 +157,7 @@ class LatticeProblem(Problem):
         return [s for s in (*first, *(s for s in all_settings if s.chart != current.chart)) if s != current]
 
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
-        """Return classical methods in NumPy, on the vector field of the solver."""
+        """Return classical methods in NumPy that start from ``state``; the solver evaluates the vector field."""
 
         def slope(x: Floats) -> Floats:
             velocity: Floats = self.seer.vector_field(x[None], self.parameters)[0]
@@ -167,9 +177,10 @@ class LatticeProblem(Problem):
 def lattice_problem(
     compilation: Compilation, run: Run, settings: Mapping[str, float], step: float, span: float, direction: float
 ) -> LatticeProblem:
-    """Return the problem of a run with other parameters.
+    """Return the tuning problem of a run of a lattice; ``settings`` are values of parameters that replace others.
 
-    A run with many sites is measured on a smaller grid if possible. Raises `SpecError` if the run cannot start.
+    ``step`` and ``span`` are the step size and the duration of the run, both positive; ``direction`` is 1 or −1. A run
+    on a large grid is measured on a smaller grid if possible. Raises `SpecError` if the run cannot start.
     """
     spec, cell = compilation.spec, compilation.by_sweeps().cell
     solver = lattice_solver_of(compilation)
@@ -186,7 +197,10 @@ def lattice_problem(
 
 
 def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -> tuple[int, ...]:
-    """Return sizes from those of the run, with the largest size halved until the number of sites is small enough."""
+    """Return sizes of a grid with at most about `MOST_SITES` sites, by halving the largest of ``sizes`` repeatedly.
+
+    A size remains a multiple of its entry in ``periods``, and at least as large as that in ``least``.
+    """
     reduced = list(sizes)
     while np.prod(reduced) > MOST_SITES:
         axis = int(np.argmax(reduced))
@@ -198,7 +212,7 @@ def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -
 
 
 def _start_with_sizes(spec: Spec, run: Run, sizes: tuple[int, ...]) -> Start | None:
-    """Return the initial state and parameters of the run with other sizes; None if its arrays have fixed sizes."""
+    """Return initial state and parameters of the run for a grid of other sizes; None if its arrays have fixed sizes."""
     assert run.lattice is not None
     try:
         return start_of(spec, replace(run, lattice=replace(run.lattice, sizes=sizes)))

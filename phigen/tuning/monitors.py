@@ -1,8 +1,9 @@
-"""Search for a monitor of a spec without one: candidates, and the number of steps of each for the same error.
+"""Search for a monitor for a spec without one: a function g, such that steps of equal size in τ, dt = g dτ, adapt.
 
 Candidates are powers of the distances in denominators, roots and logarithms of H, powers of the speed |π∇H|, and
-``log`` if H splits into two parts. The gain is the ratio of the numbers of steps over the same time, at the same order
-and energy error; a step in τ is found by halving, and by interpolation with the order between two halves.
+``log`` if H splits into two parts. The gain of a monitor is the ratio of the numbers of steps without and with it, over
+the same time, with the same order and energy error. The step for this error is found by halving, and then by
+interpolation between two of the steps.
 """
 
 from __future__ import annotations
@@ -39,25 +40,31 @@ from phigen.tuning.scales import MOST_TURN, fastest_rate, motion
 from phigen.tuning.settings import GAUSS, SPLITTING, Setting
 from phigen.tuning.trials import ROUNDING
 
-#: Ratio of the largest speed to the median above which monitors are tried.
+#: Monitors are tried if the largest speed of the motion exceeds this multiple of the median speed.
 UNEVEN = 3.0
-#: Largest number of distances; exponents of their squares, in quarters, the most promising first; exponents of 1 + the
-#: square of the speed.
+#: MOST_BASES: largest number of distances from which candidates are made. QUARTERS: exponents, in quarters, of the
+#: squares of distances, the most promising first. OF_SPEED: exponents, in quarters, of 1 + the scaled square of the
+#: speed.
 MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
-#: Largest number of characters of a monitor, which a user can still read and modify: two distances in space.
+#: Largest number of characters of a monitor, so that users can read and modify it. It suffices for two distances in
+#: space.
 MOST_LETTERS = 160
-#: Largest order at which monitors are compared; least number of steps of a run, and its largest duration in seconds.
+#: HIGHEST: largest order at which monitors are compared. FEWEST: number of steps that bounds the length of runs from
+#: below. SECONDS: largest duration of a run in seconds.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
-#: Share of the time that is reserved for runs after all builds.
+#: Share of the time until the deadline that is reserved for the runs, which follow all builds.
 MEASURING = 0.25
-#: Largest number of halvings of a step; largest number of steps, in multiples of that without a monitor.
+#: Largest number of halvings of a step; and largest number of steps of a run, as a multiple of the number of steps
+#: without a monitor.
 HALVINGS, MOST = 30, 64
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Number of steps in τ (in t without a monitor) with an energy ``error``; infinite if no number reaches the
-    accuracy."""
+    """Result for one monitor: the number of steps with which the energy error reaches the accuracy.
+
+    Steps have equal size in τ, or in t without a monitor. ``steps`` is infinite if no step size reaches the accuracy.
+    """
 
     setting: Setting
     label: str
@@ -70,10 +77,10 @@ class Trial:
 
 @dataclass(frozen=True)
 class Monitors:
-    """Gains of monitors over a ``span`` of time.
+    """Results of the search for a monitor, over a ``span`` of time.
 
-    They are the trial with steps equal in t, and those of all monitors, the fastest first. Steps of different schemes
-    differ in cost.
+    ``plain`` is the result without a monitor. ``found`` has the results with monitors, that with the shortest time
+    first; steps of different schemes differ in cost. ``refused`` has the reasons why others were not built.
     """
 
     span: float
@@ -82,23 +89,29 @@ class Monitors:
     refused: Mapping[str, str] = field(default_factory=dict)
 
     def gain(self, trial: Trial) -> float:
-        """Return the ratio of the numbers of steps without and with the monitor."""
+        """Return the gain of a monitor: the number of steps without a monitor, divided by that with it."""
         return self.plain.steps / trial.steps
 
 
 def is_uneven(rates: Callable[[Floats], Floats], states: Floats) -> bool:
-    """Whether the speed of the motion varies much. ``states`` (rows, DIM) are at equal distances in time."""
+    """Whether the speed of the motion varies so much that a monitor may help.
+
+    ``rates`` is the vector field; ``states`` (rows, DIM) are states of the motion at equal distances in time.
+    """
     speeds = np.linalg.norm(rates(states), axis=1)
     return bool(np.isfinite(speeds).all() and speeds.max() > UNEVEN * np.median(speeds))
 
 
 def candidates(system: System, parameters: Mapping[str, float], states: Floats) -> Iterator[Expression]:
-    """Yield candidate monitors: positive functions that are small in fast motion, not longer than `MOST_LETTERS`."""
+    """Yield candidate monitors: positive functions that are small where the motion is fast.
+
+    ``states`` (rows, DIM) are states of the motion. Functions longer than `MOST_LETTERS` are left out.
+    """
     return (g for g in _candidates(system, parameters, states) if _is_short(g))
 
 
 def _is_short(monitor: Expression) -> bool:
-    printed = str(monitor)  # very long expressions are cut in this text
+    printed = str(monitor)  # a very long expression is cut, with an ellipsis
     return len(printed) <= MOST_LETTERS and "…" not in printed
 
 
@@ -122,7 +135,10 @@ def _candidates(system: System, parameters: Mapping[str, float], states: Floats)
 
 
 def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expression]:
-    """Yield (1 + Σ 1/b)^exponent over as many of the first bases as fit in a line, unless fewer than two fit."""
+    """Yield (1 + Σ 1/b)^exponent, with a sum over as many of the first bases b as `MOST_LETTERS` allows.
+
+    Nothing is yielded if fewer than two bases fit.
+    """
     for count in range(len(bases), 1, -1):
         monitor = power(ONE + total(power(b, -1) for b in bases[:count]), number(exponent))
         if _is_short(monitor):
@@ -131,13 +147,16 @@ def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expre
 
 
 def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
-    """Return the smallest value divided by the median; it is smallest for the distances of close encounters."""
+    """Return the smallest value of ``b`` along the motion, divided by the median.
+
+    The quotient is small for a distance that becomes small in close encounters, so that these distances come first.
+    """
     (values,) = evaluate([b], columns)
     return float(np.min(values) / np.median(values))
 
 
 def _bases(system: System) -> list[Expression]:
-    """Return the coordinate-dependent expressions in denominators, under roots and in logarithms of H."""
+    """Return the expressions in denominators, under roots and in logarithms of H that depend on coordinates."""
     by_text: dict[str, Expression] = {}
     for node in topological([system.hamiltonian]):
         rooted = node.op == "pow" and (node.value < 0 or node.value != int(node.value))
@@ -150,7 +169,7 @@ def _bases(system: System) -> list[Expression]:
 
 
 def _is_square(b: Expression) -> bool:
-    """Whether the expression is a sum, and therefore the square of a distance rather than a distance."""
+    """Whether the expression is a sum, such as x² + y²: then it is taken for the square of a distance."""
     return b.op in ("add", "sub")
 
 
@@ -163,8 +182,11 @@ def _is_positive(b: Expression, columns: Mapping[str, Floats | float]) -> bool:
 
 
 def settings(current: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
-    """Return the settings to build, of the same order: without a monitor, and each monitor with the series and with
-    Gauss."""
+    """Return the settings to build, all of the same order.
+
+    The first has no monitor. Then come a splitting with the monitor ``log``, and each monitor with the series and with
+    Gauss collocation.
+    """
     order = min(order + order % 2, HIGHEST)
     series = (
         Setting("auto", order, "none") if current.scheme != "series" else replace(current, order=order, gauge="none")
@@ -186,9 +208,10 @@ def compare(
     accuracy: float,
     deadline: float,
 ) -> Monitors | None:
-    """Return the trials of settings at the step sizes that reach the accuracy.
+    """Build the ``requested`` settings, and find for each the number of steps that reaches the accuracy.
 
-    The first setting has no monitor; None if it cannot be built. ``states`` (rows, DIM) are samples of the motion.
+    The first setting has no monitor; None is returned if it cannot be built. ``states`` (rows, DIM) are samples of the
+    motion. ``span`` is the duration of the runs, ``deadline`` a time as of `time.perf_counter`.
     """
     building = deadline - MEASURING * max(deadline - time.perf_counter(), 0.0)
     outcomes = dict(build_all(spec, system, requested, building))
@@ -211,9 +234,10 @@ def compare(
 def _trial(
     candidate: Built, problem: Problem, states: Floats, span: float, accuracy: float, max_steps: float, deadline: float
 ) -> Trial:
-    """Return the trial with the fewest steps whose error is at most ``accuracy``.
+    """Return the result of a candidate: the fewest steps with an energy error of at most ``accuracy``.
 
-    The step is halved until the error is small enough; the final step is interpolated by the order of the method.
+    The step is halved until the error is small enough. Then a run is made with a step between the last two,
+    interpolated from their errors; it counts if its error is small enough.
     """
     solver = Solver(candidate.solver(), candidate.interface)
     h, previous = _largest(solver, problem, states), (math.nan, math.inf)
@@ -233,14 +257,14 @@ def _trial(
 
 
 def _largest(solver: Solver, problem: Problem, states: Floats) -> float:
-    """Return the largest step that resolves the fastest rotation of the motion."""
+    """Return the largest step that still resolves the fastest rotation at some states of the motion."""
     moving = motion(solver.backend, problem.parameters, monitored=solver.interface.monitored)
     return MOST_TURN / max(fastest_rate(moving, states[:: max(1, len(states) // 64)]), 1e-300)
 
 
 @dataclass(frozen=True)
 class _Run:
-    """A run with one step size: its largest energy error, inf if a step failed, and its CPU seconds."""
+    """Result of a run with one step size: largest energy error, infinite if a step failed, and processor time."""
 
     h: float
     steps: float
@@ -249,7 +273,10 @@ class _Run:
 
 
 def _run(solver: Solver, problem: Problem, span: float, h: float, max_steps: float) -> _Run:
-    """Make a run to the end of the span; None if it needs more than ``max_steps`` steps or too much time."""
+    """Make a run of duration ``span`` with steps of size ``h``, and return its result.
+
+    If the run needs more than ``max_steps`` steps or more than `SECONDS`, it is ended, and its error is infinite.
+    """
     started_at, states = time.thread_time(), [problem.start]
     session, steps_done, time_passed = solver.backend.start(problem.start, problem.parameters), 0, 0.0
     try:

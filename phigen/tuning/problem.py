@@ -1,4 +1,4 @@
-"""The problem of a tuning, and the methods that solve it from its initial state."""
+"""The initial value problem on which the search for settings measures methods, and the methods that solve it."""
 
 from __future__ import annotations
 
@@ -28,10 +28,11 @@ ROWS = 8_000
 
 @dataclass(frozen=True)
 class Problem(ABC):
-    """A tuning problem: the settings of a run, its time span, and its ``step``, with which searches start.
+    """A tuning problem, the run on which methods are measured: initial state, parameters, step and duration.
 
-    Steps and times are positive here; ``direction`` is −1 for a run backwards in time. ``sizes`` are the sizes of a
-    lattice. All times are in units of the ``clock``: τ if the spec has a monitor, which all methods then use, else t.
+    Searches begin with the size ``step``; ``horizon`` is the duration. Steps and times are positive here; ``direction``
+    is −1 for a run backwards in time. ``sizes`` are the sizes of a lattice, () for other systems. Times are values of
+    the ``clock``: τ if the spec has a monitor, with which all methods then work, else t.
     """
 
     start: Floats
@@ -45,12 +46,12 @@ class Problem(ABC):
     @property
     @abstractmethod
     def name(self) -> str:
-        """The name of the system."""
+        """Name of the system."""
 
     @property
     @abstractmethod
     def unit(self) -> Unit:
-        """The unit of errors of the energy."""
+        """Unit in which energy errors are measured."""
 
     @property
     def most_rows(self) -> int:
@@ -60,47 +61,47 @@ class Problem(ABC):
     @property
     @abstractmethod
     def evens_out(self) -> bool:
-        """Whether monitors may be tried; monitors make the speed of the motion more uniform."""
+        """Whether monitors may be tried, which choose a time τ in which the motion has a more uniform speed."""
 
     def method(self, solver: Backend) -> Candidate:
-        """Return a solver as a method."""
+        """Return the method of a solver, which makes runs from the initial state of this problem."""
         return Candidate(solver, self)
 
     @abstractmethod
     def guesses(self, current: Setting) -> list[Setting]:
-        """Return the settings that the search measures first."""
+        """Return the settings that the search measures first; ``current`` is the setting of the spec."""
 
     @abstractmethod
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
-        """Return classical methods that start from a ``state``, which may be changed later."""
+        """Return the classical methods ``names``; their runs start from the content of the array ``state``."""
 
     @abstractmethod
     def energies(self, states: Floats) -> Floats:
-        """Return H of states (rows, DIM)."""
+        """Return the energies H (rows,) of states (rows, DIM)."""
 
     def casimir_error(self, states: Floats) -> float | None:
-        """Return the largest error of any Casimir along states (rows, DIM); None if it is not measured."""
+        """Return the largest error of a Casimir along a run with states (rows, DIM); None if it is not measured."""
         return None
 
     def defect(self, step: Step, states: Floats, h: float) -> float | None:
-        """Return the largest Poisson defect at states (rows, DIM); None if the step cannot be differentiated."""
+        """Return the largest Poisson defect of steps of size h from states (rows, DIM); None if it is not measured."""
         return None
 
 
 @dataclass(frozen=True)
 class SystemProblem(Problem):
-    """The tuning problem of a ``system`` of few coordinates."""
+    """Tuning problem of a ``system`` without lattice."""
 
     system: System = field(kw_only=True)
 
     @property
     def name(self) -> str:
-        """The name of the system."""
+        """Name of the system."""
         return self.system.name
 
     @property
     def unit(self) -> Unit:
-        """The unit of errors of the energy."""
+        """Unit in which energy errors are measured."""
         (unit,) = units([self.system.hamiltonian], self.system.coordinates, self.parameters, self.start)
         return unit
 
@@ -110,25 +111,30 @@ class SystemProblem(Problem):
         return not self.system.driven
 
     def guesses(self, current: Setting) -> list[Setting]:
-        """Return the first settings: one for each bi-realisation that might apply."""
+        """Return the settings to measure first: splittings, Gauss methods, and each bi-realisation that might apply."""
         return charts(self.system, current)
 
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
-        """Return classical methods that start from a ``state``, which may be changed later; in C if there is a
-        compiler."""
+        """Return the classical methods ``names``, in C if there is a compiler, else in Python.
+
+        They start from the content of the array ``state``, which may change between runs.
+        """
         target = chosen_target("auto")
         if target == "c":
             return race.compiled(compilation, names, state, self.parameters)
         return race.interpreted(solver_of(compilation, target), names, state, self.parameters)
 
     def energies(self, states: Floats) -> Floats:
-        """Return H of states (rows, DIM)."""
+        """Return the energies H (rows,) of states (rows, DIM)."""
         values = {**self.parameters, **{c: states[:, i] for i, c in enumerate(self.system.coordinates)}}
         (energies,) = evaluate([self.system.hamiltonian], values)
         return np.broadcast_to(energies, (len(states),))
 
     def casimir_error(self, states: Floats) -> float | None:
-        """Return the largest error of any Casimir, relative to the magnitudes of its terms; None without Casimirs."""
+        """Return the largest error of a Casimir along a run with states (rows, DIM); None if there are no Casimirs.
+
+        The error is relative to the initial value, or to its terms if these nearly cancel.
+        """
         system, casimirs = self.system, self.system.casimirs
         if not casimirs:
             return None
@@ -142,7 +148,7 @@ class SystemProblem(Problem):
         return float(max(errors))
 
     def defect(self, step: Step, states: Floats, h: float) -> float | None:
-        """Return the largest Poisson defect at states (rows, DIM); None if the step cannot be differentiated."""
+        """Return the largest Poisson defect of steps of size h from states (rows, DIM); None if a step fails."""
         signed = self.direction * h
         try:
             return max(measures.poisson_defect(self.system, self.parameters, step, x, signed) for x in states)
@@ -151,20 +157,24 @@ class SystemProblem(Problem):
 
 
 class CompiledMethod(Protocol):
-    """A compiled method, which starts from the problem's initial state."""
+    """A method that makes runs from the initial state of a problem, usually in compiled code."""
 
     def rows(self, h: float, steps: int, stride: int) -> Floats | None:
-        """Return the states (rows, DIM) after 0, stride, 2·stride, … and all steps; None if a step fails."""
+        """Return the states (rows, DIM) after 0, stride, 2·stride, … steps and after all steps; None if a step
+        fails."""
         ...
 
     def walk(self, h: float) -> Callable[[int], object]:
-        """Return a function for timing: each call makes ``steps`` more steps, the first call from the initial state."""
+        """Return a function of a number of steps, for timing. Each call makes so many further steps of size ``h``.
+
+        The first call starts from the initial state.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A solver of phigen as a method."""
+    """The method of a phigen solver, which makes runs from the initial state of ``problem``."""
 
     solver: Backend
     problem: Problem
@@ -179,7 +189,10 @@ class Candidate:
         return rows if np.isfinite(rows).all() else None
 
     def reach(self, h: float, steps: int) -> tuple[float, str]:
-        """Return the time of the last successful step of ``steps``, and the status of the step after it."""
+        """Make a run of ``steps`` steps; return the time that it reached, and the status of the step that failed.
+
+        The status is ``OK`` if no step failed.
+        """
         try:
             session = self.solver.start(self.problem.start, self.problem.parameters)
             session.advance(self.problem.direction * h, steps)
@@ -194,7 +207,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Classical:
-    """A classical method in compiled C; ``state`` is the array from which its runner starts."""
+    """A classical method; ``runner`` makes its runs from the content of the array ``state``."""
 
     runner: race.Runner
     state: Floats
@@ -213,11 +226,11 @@ class Classical:
         return states
 
     def walk(self, h: float) -> Callable[[int], object]:
-        # Its steps take the same time everywhere, so all calls may start at the initial state of the problem.
+        # A step takes the same time at all states, so each call may start from the initial state of the problem.
         self.state[:] = self.problem.start
         return lambda steps: self.runner(self.problem.direction * h, steps, 1)
 
 
 def steps_in(span: float, h: float) -> int:
-    """Return the number of steps of size ``h`` in a span of time, at least one."""
+    """Return the number of steps of about the size ``h`` for a span of time, at least 1."""
     return max(1, round(span / h))

@@ -1,4 +1,4 @@
-"""Reference solutions of orbits, by two methods of different kinds; their difference is the uncertainty."""
+"""Reference solutions for errors of orbits, by two methods whose difference is the uncertainty."""
 
 from __future__ import annotations
 
@@ -13,20 +13,21 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import CompiledMethod
 from phigen.tuning.trials import MARKS
 
-#: Fraction of the accuracy below which a change of the solution ends the halving of steps.
+#: The step of a reference solution is halved until the solution changes by less than this fraction of the accuracy.
 CONVERGED = 0.02
-#: Largest difference of the two methods, as a fraction of the accuracy.
+#: Largest accepted difference between the solutions by two methods, as a fraction of the accuracy.
 AGREED = 0.2
 _HALVINGS = 16
-#: Error that is small enough for orbits without a requested accuracy.
+#: Accuracy of reference solutions if no accuracy is requested, relative to the largest coordinate.
 KNOWN = 1e-12
 
 
 @dataclass
 class Reference:
-    """The solution by one method with steps of at most ``step``: states (count + 1, DIM) at multiples of any spacing.
+    """A reference solution: a call with a spacing and a count returns the states (count + 1, DIM) at its multiples.
 
-    ``uncertainty`` is the distance from the solution by the second method, relative to the largest coordinate.
+    They are computed by ``method`` with steps of at most ``step``. ``uncertainty`` is the distance from the solution by
+    a second method, relative to the largest coordinate.
     """
 
     method: CompiledMethod
@@ -55,10 +56,10 @@ def agreed(
     seconds: float,
     clock: str = "t",
 ) -> Reference:
-    """Return the reference over a time span by the first method, confirmed by the second.
+    """Return the reference solution over a time span by the method ``first``, confirmed by the method ``second``.
 
-    ``accuracy`` is the error that is to be measured, relative to the largest coordinate; ``seconds`` is the time limit
-    of each method. Raises `CheckError` if the methods do not agree well enough to measure this error.
+    ``accuracy`` is the smallest error, relative to the largest coordinate, that is to be measured with the reference;
+    ``seconds`` is the time limit of each method. Raises `CheckError` if the methods do not agree well enough for that.
     """
     spacing = span / MARKS
     orbits = []
@@ -84,10 +85,10 @@ def agreed(
 def orbit_error(
     states: Floats, spacing: float, reference_method: CompiledMethod, step: float, seconds: float
 ) -> float | None:
-    """Return the distance of states (rows, DIM), at multiples of a spacing, from those of another method with small
-    steps.
+    """Return the largest distance of ``states`` (rows, DIM) at multiples of a spacing from a reference solution.
 
-    The distance is relative to the largest coordinate; None if the other method does not converge in ``seconds``.
+    The reference is computed by another method, with steps of at most ``step``. The distance is relative to the largest
+    coordinate. It is None if the reference does not become accurate enough within ``seconds``.
     """
     count, until = len(states) - 1, time.perf_counter() + seconds
     orbit = _converged(reference_method, min(step, spacing), spacing, count, KNOWN, until)
@@ -98,16 +99,17 @@ def orbit_error(
 
 
 def distance(states: Floats, reference_states: Floats) -> float:
-    """Return the largest difference of states (rows, DIM), relative to the largest coordinate."""
+    """Return the largest difference between two runs (rows, DIM), relative to the largest coordinate of the second."""
     return float(np.max(np.abs(states - reference_states))) / (float(np.max(np.abs(reference_states))) or 1.0)
 
 
 def _converged(
     method: CompiledMethod, step: float, spacing: float, count: int, accuracy: float, until: float
 ) -> tuple[Floats, float, float] | None:
-    """Return states, step and last change, for steps halved until the change is small or no longer decreases.
+    """Return the states at ``count`` multiples of a spacing, the last step size, and the last change of the states.
 
-    None if a step fails or the time is up.
+    The step is halved until a halving changes the states little, or more than the halving before, or until the time
+    ``until``. The result is None if steps of all sizes fail.
     """
     last: Floats | None = None
     best: tuple[Floats, float, float] | None = None

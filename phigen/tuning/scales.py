@@ -1,4 +1,4 @@
-"""The scales of a search: the time span over which methods are measured, and the largest useful step."""
+"""Scales of the search for settings: the time span over which methods are measured, and the largest useful step."""
 
 from __future__ import annotations
 
@@ -13,18 +13,23 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: Limits of a scan: number of steps of the run's size, and seconds of processor time.
+#: Limits of the time span over which methods are measured with several steps: number of steps of the size in the run,
+#: and their processor time in seconds.
 PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
-#: Largest angle by which a step may rotate the fastest motion: fewer than three steps a turn do not resolve it. Least
-#: number of steps.
+#: MOST_TURN: largest angle by which a step may rotate the fastest oscillation, since fewer than about three steps per
+#: period do not resolve it. LEAST_STEPS: least number of steps of a run.
 MOST_TURN, LEAST_STEPS = 2.0, 24
-#: Largest dimension at which all eigenvalues are computed. Above it, the growth of one vector is measured between
-#: SETTLING and FOLLOWED applications of the derivative; the result is somewhat below the largest eigenvalue.
+#: DENSE: largest dimension for which all eigenvalues of the derivative are computed. In higher dimensions the
+#: derivative is applied FOLLOWED times to a vector, whose growth after the first SETTLING times gives slightly less
+#: than the largest eigenvalue.
 DENSE, SETTLING, FOLLOWED = 256, 8, 16
 
 
 def scales(problem: Problem, method: Candidate) -> tuple[float, float]:
-    """Return the time span over which candidates are scanned, and the largest step that resolves the motion."""
+    """Return the time span over which candidates are measured, and the largest step that resolves the motion.
+
+    ``method`` is that of the setting of the spec, whose speed determines the time span.
+    """
     h = problem.step
     scan_steps = steps_in(min(problem.horizon, 500 * h), h)
     states = method.rows(h, scan_steps, max(1, scan_steps // 16))
@@ -37,7 +42,10 @@ def scales(problem: Problem, method: Candidate) -> tuple[float, float]:
 
 
 def motion(solver: Backend, parameters: Mapping[str, Any], *, monitored: bool) -> Callable[[Floats], Floats]:
-    """Return the vector field at states (rows, DIM), per unit of the variable in which steps are equal: τ or t."""
+    """Return the vector field of a solver as a function of states (rows, DIM).
+
+    With a monitor, the vector field is that of the motion in τ, for steps of equal size in τ.
+    """
 
     def slope(x: Floats) -> Floats:
         velocity: Floats = solver.vector_field(x, parameters)
@@ -47,7 +55,11 @@ def motion(solver: Backend, parameters: Mapping[str, Any], *, monitored: bool) -
 
 
 def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:
-    """Return the largest absolute eigenvalue of the derivative of the vector field at some states (rows, DIM)."""
+    """Return the largest absolute value of an eigenvalue of the derivative of the vector field at ``states`` (rows,
+    DIM).
+
+    In high dimensions it is an estimate.
+    """
     size = float(np.max(np.abs(states))) or 1.0
     width, rate = 1e-6 * size, 0.0
     for x in states:
@@ -62,7 +74,10 @@ def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:
 
 
 def _growth(field: Callable[[Floats], Floats], x: Floats, width: float) -> float:
-    """Return an estimate of the largest absolute eigenvalue at a state (DIM,), by powers of the derivative."""
+    """Return an estimate of the largest absolute value of an eigenvalue of the derivative at a state (DIM,).
+
+    The derivative is applied repeatedly to a vector, by finite differences of size ``width``.
+    """
     v, log = np.random.default_rng(0).normal(size=len(x)), 0.0
     for k in range(FOLLOWED):
         displacement = width * v / np.max(np.abs(v))

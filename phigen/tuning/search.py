@@ -1,4 +1,4 @@
-"""Choice of steps and candidates from measured points: the step for an accuracy, the next candidates, the cheapest."""
+"""Decisions of the search for settings, from measured errors: the step for an accuracy, and the next candidates."""
 
 from __future__ import annotations
 
@@ -10,28 +10,29 @@ from itertools import pairwise
 from phigen.tuning.settings import Setting, direct, variants
 from phigen.tuning.trials import ROUNDING, Point
 
-#: Factor between the step sizes of a scan, and largest number of step sizes.
+#: A scan measures a method with step sizes that decrease by the factor FINER, at most MOST_POINTS of them.
 FINER, MOST_POINTS = math.sqrt(2.0), 48
-#: Number of steps below the first guess that may fail.
+#: Number of times that a scan reduces its first step size if runs with it fail.
 FAILURES = 16
-#: Fraction of the accuracy down to which a scan continues, for the figure.
+#: A scan continues until the error is below this fraction of the accuracy, so that figures show the curve beyond it.
 BEYOND = 1 / 30
-#: Fraction of the accuracy for which the step is chosen, since the largest error of a longer run is slightly larger.
+#: Steps are chosen for this fraction of the accuracy, since the error of a longer run is slightly larger.
 AIM = 0.8
-#: Cost, relative to the cheapest step, at which the search for cheaper smaller steps ends. Smaller steps may need fewer
-#: iterations.
+#: Smaller steps may cost less, because they need fewer iterations. The search for a cheaper step ends when the cost
+#: exceeds the least cost by this factor.
 DEARER = 1.25
-#: Cost, relative to the best, above which a bi-realisation is not tried at other orders.
+#: A bi-realisation is not tried at other orders if its cost exceeds the least cost by more than this factor.
 KEEP = 3.0
-#: Least factor by which errors decrease when the step is halved twice, unless they are rounding errors.
+#: If halving the step divides the error by less than this, the error is rounding error.
 GAIN = 1.5
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Measurements of one method: points from coarse to fine. ``setting`` is None for a classical method.
+    """Results of one method with several step sizes; ``points`` are sorted from the largest step to the smallest.
 
-    ``bounded`` says whether its energy error is bounded, which is true only of Poisson maps.
+    ``setting`` is None for a classical method. ``bounded`` says whether the energy error is bounded in time, as it is
+    for Poisson maps. ``seconds`` is the time of the build.
     """
 
     label: str
@@ -47,30 +48,30 @@ class Curve:
 
     @property
     def key(self) -> Setting | str:
-        """The key of the method: its setting, or its label if it is classical."""
+        """Key of the method in tables: its setting, or the label of a classical method."""
         return self.setting or self.label
 
     @property
     def title(self) -> str:
-        """The title of the method in tables."""
+        """Name of the method in tables for users."""
         return self.setting.described(self.label) if self.setting else self.label
 
     @property
     def largest(self) -> float:
-        """The largest step with which the whole time span was integrated; 0 if there is none."""
+        """Largest step with which a run over the whole time span succeeded; 0 if there is none."""
         return max((p.step for p in self.points), default=0.0)
 
     def cost(self, accuracy: float) -> float:
-        """Return nanoseconds per unit of time at an accuracy: measured, or extrapolated by the order from the finest
-        step.
+        """Return the cost of the method for an accuracy, in nanoseconds per unit of simulated time.
 
-        Infinity if neither is possible.
+        If no measured step reaches the accuracy, the cost is extrapolated from the smallest step by the order. It is
+        infinite if rounding errors make the accuracy impossible.
         """
         return cheapest_step(self.points, accuracy, self.order)[1]
 
 
 def _index_of_least_error(points: Sequence[Point]) -> int:
-    """Return the index of the first point whose error consists of rounding: finer steps have more of it.
+    """Return the index of the first point whose error is rounding error; at smaller steps, rounding errors grow.
 
     If there is no such point, return the index of the last point.
     """
@@ -81,7 +82,7 @@ def _index_of_least_error(points: Sequence[Point]) -> int:
 
 
 def at_floor(points: Sequence[Point]) -> bool:
-    """Whether the last points show rounding errors only: errors are small, and halving the step hardly reduced them."""
+    """Whether the last point shows rounding error only: its error is small, and halving the step hardly reduced it."""
     if points and points[-1].rounding > points[-1].error / 2:
         return True
     if len(points) < 3:
@@ -91,10 +92,9 @@ def at_floor(points: Sequence[Point]) -> bool:
 
 
 def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """Return the largest step that meets the accuracy.
+    """Return the largest step whose error is at most ``accuracy``; None if the measurements show no such step.
 
-    It is interpolated or, below the finest measured step, extrapolated by the order. None if the measured points show
-    no such step.
+    It is interpolated between measured steps or, below the smallest one, extrapolated by the order of the method.
     """
     points = points[: _index_of_least_error(points) + 1]
     if not points:
@@ -105,7 +105,7 @@ def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | No
     first = len(points)
     while first > 0 and points[first - 1].error <= accuracy:
         first -= 1
-    if first == len(points):  # a coarse step meets the accuracy by chance, but the finest does not
+    if first == len(points):  # a large step reaches the accuracy by chance, but the smallest step does not
         return _extrapolated_step(points, accuracy, order)
     if first == 0:
         return points[0].step
@@ -113,7 +113,7 @@ def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | No
 
 
 def _extrapolated_step(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """Return a step below the finest, extrapolated to the accuracy; None if rounding errors exceed the accuracy."""
+    """Return the step for the accuracy by extrapolation from the smallest step; None if rounding errors exceed it."""
     last = points[-1]
     if at_floor(points) or accuracy < max(ROUNDING, last.rounding):
         return None
@@ -121,10 +121,10 @@ def _extrapolated_step(points: Sequence[Point], accuracy: float, order: int) -> 
 
 
 def cheapest_step(points: Sequence[Point], accuracy: float, order: int) -> tuple[float, float]:
-    """Return the step that meets the accuracy at the least cost, and its nanoseconds per unit of time.
+    """Return the step that reaches the accuracy at the least cost, and this cost in nanoseconds per unit of time.
 
-    The result is 0 and infinity if there is no such step. The cheapest step need not be the largest: smaller steps have
-    better predictors, and may save an iteration.
+    If there is no such step, the result is 0 and infinity. The cheapest step need not be the largest: with smaller
+    steps the predictor is better, which may save an iteration.
     """
     largest = step_for(points, accuracy, order)
     if largest is None:
@@ -136,7 +136,7 @@ def cheapest_step(points: Sequence[Point], accuracy: float, order: int) -> tuple
 
 
 def _interpolated_step(coarse: Point, fine: Point, accuracy: float) -> float:
-    """Return the step that meets the accuracy on a straight line through two points in log–log scale."""
+    """Return the step for the accuracy, by linear interpolation of log(error) in log(step) between two points."""
     if coarse.error <= fine.error:
         return fine.step
     share = math.log(accuracy / fine.error) / math.log(coarse.error / fine.error)
@@ -144,8 +144,10 @@ def _interpolated_step(coarse: Point, fine: Point, accuracy: float) -> float:
 
 
 def nanoseconds_at(points: Sequence[Point], step: float) -> float:
-    """Return the time of one step, interpolated between measured steps; outside their range, that of the nearest
-    step."""
+    """Return the time of one step in nanoseconds, interpolated between measured step sizes.
+
+    Outside the range of measured sizes it is the time of the nearest one.
+    """
     by_step = sorted(points, key=lambda p: p.step)
     for low, high in pairwise(by_step):
         if low.step <= step <= high.step:
@@ -163,10 +165,11 @@ def scan(
     worth: float = math.inf,
     patience: Callable[[], bool] = lambda: True,
 ) -> tuple[Point, ...]:
-    """Return points measured from the largest possible step down to the accuracy and to the cheapest step.
+    """Measure a method with decreasing step sizes, until the accuracy is reached and the cheapest step is known.
 
-    The first step is at most ``largest_step``. The scan ends early if the accuracy would cost more than ``worth``
-    nanoseconds per unit of time, if only rounding errors are left, or if ``patience`` returns False.
+    ``measure(h)`` returns the point for a step size, None if a step fails. The scan begins at the largest possible
+    step, which is at most ``largest_step`` and is searched from ``first`` on. It ends early if the accuracy would cost
+    more than ``worth`` nanoseconds per unit of time, if only rounding errors are left, or if ``patience()`` is False.
     """
     points = _points_at_largest_step(measure, min(first, largest_step), largest_step, patience)
     while points and len(points) < MOST_POINTS and patience():
@@ -185,9 +188,9 @@ def scan(
 
 
 def _is_complete(points: Sequence[Point], accuracy: float) -> bool:
-    """Whether the scan is complete.
+    """Whether a scan with these points is complete, so that smaller steps need not be measured.
 
-    It is, if the accuracy is reached and finer steps cost more, or if only rounding errors are left.
+    It is complete if the accuracy is reached and smaller steps cost more, or if only rounding errors are left.
     """
     last = points[-1]
     costs = [p.cost for p in points if p.error <= accuracy]
@@ -200,7 +203,7 @@ def _is_complete(points: Sequence[Point], accuracy: float) -> bool:
 def _refined(
     points: list[Point], measure: Callable[[float], Point | None], step: float | None, patience: Callable[[], bool]
 ) -> list[Point]:
-    """Return the points with one more measured point, unless the step was measured before."""
+    """Return the points, and one more at ``step`` unless that step was measured or is outside their range."""
     if not points or not step or not points[-1].step < step < points[0].step or not patience():
         return points
     if any(abs(math.log(p.step / step)) < 0.02 for p in points):
@@ -212,8 +215,10 @@ def _refined(
 def _points_at_largest_step(
     measure: Callable[[float], Point | None], first: float, largest_step: float, patience: Callable[[], bool]
 ) -> list[Point]:
-    """Return points up to the largest possible step, found to a factor `FINER` from a first guess; [] if there is
-    none near it."""
+    """Return the first points of a scan, from the largest possible step down to ``first``.
+
+    If a run with ``first`` fails, the step is reduced by factors `FINER` until a run succeeds; [] if none does.
+    """
     step, point = first, measure(first)
     for _ in range(FAILURES):
         if point is not None or not patience():
@@ -232,7 +237,8 @@ def _points_at_largest_step(
 
 
 def _is_too_costly(points: Sequence[Point], accuracy: float, order: int, worth: float) -> bool:
-    """Whether the accuracy, extrapolated by the order, would cost more than ``worth``."""
+    """Whether the accuracy, by extrapolation of the points, would cost more than ``worth`` nanoseconds per unit of
+    time."""
     last = points[-1]
     if last.cost > worth and last.error > accuracy:
         return True
@@ -244,10 +250,10 @@ def _is_too_costly(points: Sequence[Point], accuracy: float, order: int, worth: 
 
 
 def proposals(tried_curves: Mapping[Setting, Curve], refused: Sequence[Setting], accuracy: float) -> list[Setting]:
-    """Return the settings to try next, the most promising first; empty if none is promising.
+    """Return the settings to try next, the most promising first; [] if none is promising.
 
-    A bi-realisation whose cost is near the best is tried at the next higher order while the cost decreases, then at the
-    next lower one. The best one is also tried without gauge and as a composition.
+    A bi-realisation whose cost is near the least cost is tried at the next higher order, as long as the cost decreases,
+    then at the next lower order. The best bi-realisation is also tried without gauge and as a composition.
     """
     costs = {setting: curve.cost(accuracy) for setting, curve in tried_curves.items()}
     families: dict[Setting, dict[int, float]] = {}
@@ -276,7 +282,11 @@ def proposals(tried_curves: Mapping[Setting, Curve], refused: Sequence[Setting],
 
 
 def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Setting]) -> list[Setting]:
-    """Return the next higher order if it was neither tried nor refused, else the next lower one."""
+    """Return the setting with the next higher order if it was neither tried nor refused, else with the next lower
+    order.
+
+    ``orders`` has the costs of the orders that were tried. The list is empty if the neighbours were tried or refused.
+    """
     higher_orders = [k for k in best.orders if k > best.order]
     lower_orders = [k for k in best.orders if k < best.order]
     closed = {s.order for s in refused if s.family == best.family}
@@ -297,7 +307,7 @@ def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Se
 
 
 def rounded_down(step: float, digits: int = 3) -> float:
-    """Return a step rounded down to few digits."""
+    """Return a step, rounded down to ``digits`` significant digits."""
     exponent = math.floor(math.log10(step)) - digits + 1
     rounded = float(f"{math.floor(step / 10.0**exponent + 1e-9)}e{exponent}")
     return rounded if rounded <= step else step

@@ -1,4 +1,4 @@
-"""Settings of a spec: bi-realisation, order, gauge, composition, scheme; and their lines in the spec."""
+"""Settings of a spec that the search compares: bi-realisation, order, gauge, composition and scheme."""
 
 from __future__ import annotations
 
@@ -17,24 +17,25 @@ from phigen.spec.names import BIREALISATIONS, LOGARITHMIC
 from phigen.splitting.parts import split as split_in_parts
 from phigen.symbolic.expression import Expression, symbol
 
-#: Name of a choice in the spec that has no other name: formulas, or options of a kind.
+#: Name that stands for a choice in the spec that no word describes: formulas, or options of a bi-realisation.
 OWN = "as in the spec"
 
-#: Orders of direct series. canonical-euler also has order 1, which is explicit for separable H.
+#: Orders that are tried for series without composition; for the kind canonical-euler, order 1 is tried too, which is
+#: explicit for separable H.
 ORDERS = tuple(range(2, limits.ORDER + 1, 2))
 
-#: Name in place of the kind of bi-realisation, for splittings, which have none.
+#: Word for ``kind`` of a setting that is a splitting, and so has no bi-realisation.
 SPLITTING = "splitting"
 
-#: The name in place of the kind for Gauss collocation, and the orders that are tried.
+#: Word for ``kind`` of a setting that is Gauss collocation; below, the orders that are tried.
 GAUSS = "gauss"
 GAUSS_ORDERS = (4, 8, 12, 16)
 
-#: The name in place of the kind for the automatic choice among all schemes.
+#: Word for ``kind`` of a setting with ``scheme: auto``, in which phigen chooses the scheme.
 AUTO = "auto scheme"
 
-#: Candidate methods for near-integrable systems, with their orders: the best for each set of error terms in ε and h,
-#: and methods with a corrector, whose steps are the cheapest.
+#: Compositions that are tried for near-integrable H = A + εB, with their orders: one for each order of the error in ε
+#: and h, and two with a corrector, whose steps are the cheapest.
 NEAR_INTEGRABLE = (
     ("saba-8-2", 2),
     ("wisdom-holman-17", 2),
@@ -43,7 +44,7 @@ NEAR_INTEGRABLE = (
     ("aba-10-6-4", 4),
 )
 
-#: Kinds of bi-realisations that need formulas of the user, and kinds with options.
+#: Kinds of bi-realisations that need formulas of the user; below, kinds with options, which are tried separately.
 FORMULAS = ("custom", "group-map", "spray")
 CHOICES = ("auto", "canonical-euler", "product", "pullback")
 _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("pullback", "cayley"))
@@ -51,11 +52,11 @@ _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("p
 
 @dataclass(frozen=True, order=True)
 class Setting:
-    """A bi-realisation, order, gauge, composition and scheme.
+    """A choice of method: bi-realisation or other scheme, order, gauge and composition.
 
-    ``kind`` and ``gauge`` may be `OWN`. ``of`` is the inner kind of products and pull-backs. A splitting has the kind
-    `SPLITTING`, no gauge, and the composition ``auto``; Gauss collocation has the kind `GAUSS`. An empty ``monitor``
-    stands for that of the spec.
+    ``kind`` is the kind of bi-realisation, or `SPLITTING`, `GAUSS` or `AUTO` for other schemes; ``of`` is the inner
+    kind of products and pull-backs. `OWN` as ``kind`` or ``gauge`` leaves the choice of the spec. An empty ``monitor``
+    leaves the monitor of the spec.
     """
 
     kind: str
@@ -67,17 +68,17 @@ class Setting:
 
     @property
     def family(self) -> Setting:
-        """The setting without its order; methods of different orders have it in common."""
+        """This setting with order 0, by which methods that differ in the order only are recognised."""
         return replace(self, order=0)
 
     @property
     def chart(self) -> Setting:
-        """The setting reduced to its bi-realisation."""
+        """This setting reduced to its bi-realisation: with order 0, and default gauge and composition."""
         return Setting(self.kind, 0, of=self.of)
 
     @property
     def orders(self) -> tuple[int, ...]:
-        """The orders that are available for the family of the setting."""
+        """Orders that are available for settings which differ from this one in the order only."""
         if self.is_splitting:
             return tuple(choosing.orders(self.composition))
         if self.is_gauss:
@@ -87,8 +88,10 @@ class Setting:
         return (1, *ORDERS) if self.kind == "canonical-euler" else ORDERS
 
     def described(self, kind: str = "") -> str:
-        """Return the setting in words: ``exponential, order 8, without gauge, kahan-li``; ``kind`` is the kind that
-        was built."""
+        """Return the setting in words, such as ``exponential, order 8, without gauge, kahan-li``.
+
+        ``kind`` is the kind that was built, if the setting leaves the choice to phigen.
+        """
         chart_name = self.kind if self.of == "auto" else f"{self.kind} of {self.of}"
         attributes = [kind or chart_name, f"order {self.order}"]
         attributes += ["without gauge"] if self.gauge == "none" and self.scheme == "series" else []
@@ -106,11 +109,11 @@ class Setting:
 
     @property
     def scheme(self) -> str:
-        """The scheme, as in specs."""
+        """Value of ``scheme:`` in a spec with this setting: series, splitting, gauss or auto."""
         return "auto" if self.kind == AUTO else self.kind if self.kind in (SPLITTING, GAUSS) else "series"
 
     def lines(self) -> list[str]:
-        """Return the top-level lines of a spec that request the setting; for `OWN` the lines of the spec remain."""
+        """Return the lines of a spec that request this setting. Where it has `OWN`, the lines of the spec remain."""
         kind = "auto" if self.scheme != "series" else self.kind
         chart_value = kind if self.of == "auto" else f"{{kind: {kind}, of: {self.of}}}"
         lines = [f"scheme: {self.scheme}"]
@@ -120,7 +123,7 @@ class Setting:
         return lines if self.gauge == OWN else [*lines, f"gauge: {self.gauge}"]
 
     def applied(self, spec: Spec) -> Spec:
-        """Return the spec with this setting."""
+        """Return the spec with this setting in place of its scheme, bi-realisation, order, composition and gauge."""
         kind = "auto" if self.scheme != "series" else self.kind
         choice = spec.birealisation if kind == OWN else BirealisationChoice(kind, of=self.of)
         return replace(
@@ -132,7 +135,10 @@ class Setting:
 
 
 def monitor_of(expression_text: str, spec: Spec) -> str | Expression:
-    """Return the monitor of a text: ``log``, or a function of coordinates and parameters."""
+    """Return the monitor that a text states: the word ``log``, or a function of coordinates and parameters.
+
+    Raises `ValueError` if the text is neither.
+    """
     if expression_text == LOGARITHMIC:
         return LOGARITHMIC
     names = (*spec.coordinates, *(p.name for p in spec.parameters))
@@ -143,7 +149,7 @@ def monitor_of(expression_text: str, spec: Spec) -> str | Expression:
 
 
 def own_setting(compilation: Compilation) -> Setting:
-    """Return the present setting of a spec, with the kinds that ``auto`` chose."""
+    """Return the setting of the spec of a compilation, with the kind that phigen chose if the spec says ``auto``."""
     spec, order = compilation.spec, compilation.order.order
     gauge = spec.gauge if isinstance(spec.gauge, str) else OWN
     if compilation.scheme_name != "series":
@@ -151,28 +157,27 @@ def own_setting(compilation: Compilation) -> Setting:
     choice = spec.birealisation
     is_plain = choice == BirealisationChoice(choice.kind, order=choice.order) and choice.kind not in FORMULAS
     kind = compilation.kind if is_plain else OWN
-    if spec.lattice:  # the series of a lattice has order 2 and is composed for higher orders
+    if spec.lattice:  # on lattices the series has order 2, and higher orders need a composition
         composition = "auto" if spec.composition == "none" else spec.composition
         return Setting(kind if compilation.birealisation else "auto", order, OWN, composition)
     return Setting(kind, order, gauge, spec.composition if compilation.is_composed else "none")
 
 
 def charts(system: System, current: Setting) -> list[Setting]:
-    """Return the first settings: one of order 4 for each bi-realisation that might apply, and that of the spec at
-    several orders.
+    """Return the settings to measure first.
 
-    Two groups of kinds are omitted: those that need formulas of the user, and Karasev's paths for constant or linear π,
-    for which the same maps have closed forms. The builds of the others show which of them apply. Splittings and Gauss
-    steps come first.
+    They are splittings and Gauss methods, the setting of the spec at orders 4 and 8, and each bi-realisation that might
+    apply, at order 4. Their builds show which of them apply. Left out are kinds that need formulas of the user, and,
+    for constant or linear π, Karasev's paths, since other kinds have the same maps in closed form.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
     plain_kinds = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]
     plain_settings = [Setting(kind, 4) for kind in plain_kinds if not (kind == "karasev" and linear)]
     nested = [Setting(kind, 4, of=inner_kind) for kind, inner_kind in _NESTED]
-    # The other side is the adjoint, which has the same errors in reversed time.
+    # Only one of the two sides, q or p, is tried: the method of the other side is the adjoint, with the same errors.
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
     composed = _near_integrable(system)
-    # They are built in seconds, whereas series of order 8 may take minutes.
+    # Splittings and Gauss methods come first, since they are built in seconds; series of order 8 may take minutes.
     quick = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
     quick += [Setting(GAUSS, order, "none") for order in (8, 16)]
     quick = [s for s in quick if s.chart != current.chart]
@@ -182,7 +187,7 @@ def charts(system: System, current: Setting) -> list[Setting]:
 
 
 def _near_integrable(system: System) -> list[Setting]:
-    """Return splittings of H = A + εB with methods for near-integrable systems; empty if H is not such a sum."""
+    """Return splittings of H = A + εB, with the compositions of `NEAR_INTEGRABLE`; [] if H is no sum of this form."""
     try:
         small = split_in_parts(system).small
     except PhigenError:
@@ -191,12 +196,16 @@ def _near_integrable(system: System) -> list[Setting]:
 
 
 def direct(setting: Setting) -> str:
-    """Return the composition of the plain methods of the setting's kind."""
+    """Return the value of ``composition:`` for a setting of this scheme without a composition of whole steps.
+
+    It is ``none`` for series and Gauss methods; splittings, whose flows are always composed, have ``auto``.
+    """
     return "auto" if setting.is_splitting or setting.composition == "auto" else "none"
 
 
 def variants(best: Setting, gauged: bool, symmetric: bool) -> list[Setting]:
-    """Return variants of a bi-realisation at about the same order: without gauge, or as a composition."""
+    """Return variants of a setting of about the same order: without gauge if it is ``gauged``; as a composition if it
+    is ``symmetric``."""
     variations = [replace(best, gauge="none")] if gauged else []
     if symmetric and direct(best) == "none":
         recommended = {c.order: c.name for c in reversed(COMPOSITIONS)}

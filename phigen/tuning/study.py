@@ -1,4 +1,4 @@
-"""Tuning of one run of a spec: search, confirmation, comparison."""
+"""Tuning: the search for the cheapest method for one run of a spec, the confirmation of steps, and a fair timing."""
 
 from __future__ import annotations
 
@@ -20,26 +20,28 @@ from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import Point
 from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 
-#: Share of the budget for one confirming run, factor by which it may be exceeded, and number of attempts at a step.
+#: CONFIRMING: share of the time budget for the run that confirms a step. PATIENCE: factor by which this run may exceed
+#: its share. ATTEMPTS: number of steps that are tried for one method.
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
-#: Number of finalists, their largest cost relative to the best, and number of rounds of timings.
+#: FINALISTS: number of best methods that are confirmed and timed. BEHIND: their largest cost relative to the best one.
+#: ROUNDS: number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
-#: Share of the budget after which only settings that the result needs are confirmed.
+#: Share of the time budget after which only methods that the result needs are confirmed.
 CONFIRMED = 1.0
-#: Share of the budget after which methods are timed only once; a round of timings takes some tenth of it.
+#: Share of the time budget after which no further round of timings begins. A round takes about a tenth of the budget.
 TIMED = 1.1
-#: Share of the budget, counted from its start, after which no monitor and no automatic scheme is tried. Monitors have
-#: half of the budget if the search used up all of it.
+#: Share of the time budget after which no monitor and no automatic scheme is tried. If the search has used up the
+#: budget, half of the budget remains for monitors.
 MONITORED = 1.5
-#: Factor within which costs count as equal; the lower order is then preferred.
+#: Costs that differ by less than this factor count as equal, and the simpler method is preferred.
 EQUAL = 1.1
 
 
 @dataclass(frozen=True)
 class Finalist:
-    """A method at its proposed step, confirmed over ``point.time``, and timed in rounds with the others.
+    """A method with its proposed step, which a run over the time ``point.time`` has confirmed.
 
-    ``seconds`` are CPU times (s) per unit of simulated time, one for each round.
+    ``seconds`` are its processor times in seconds per unit of simulated time, one for each round of timings.
     """
 
     curve: Curve
@@ -48,21 +50,24 @@ class Finalist:
 
     @property
     def cost(self) -> float:
-        """Median over the rounds of the CPU time (s) per unit of simulated time; NaN if the method was not timed."""
+        """Median of the processor times, in seconds per unit of simulated time; NaN if the method was not timed."""
         return median(self.seconds) if self.seconds else math.nan
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """The result of a tuning. ``finalists`` meet the accuracy, the best first; empty if no method does.
+    """Result of a tuning. ``finalists`` are the best methods that reach the accuracy, the best first.
 
-    ``own`` is the setting of the spec at the step that reaches the accuracy, None if no step does. ``present`` is the
-    setting of the spec at the step of the run. ``peers`` are the classical methods that reach the accuracy. Scans were
-    made over ``piece`` of the ``horizon``. ``refused`` has the reasons why other candidates were not measured.
-    ``finished`` says whether all promising candidates were measured. ``orbit_error`` is the error of the orbit of the
-    best finalist over ``piece`` if the energy error was measured, None if it is unknown. ``unit`` is the unit of energy
-    errors. ``monitors`` are the gains of monitors, if the spec has none and the speed of the motion varies much.
-    ``sizes`` are the sizes of the measured lattice, empty for other systems. Times are values of the ``clock``, t or τ.
+    ``own`` is the setting of the spec with the step that reaches the accuracy, None if no step does. ``present`` is the
+    setting of the spec with the step of the run. ``peers`` are the classical methods that reach the accuracy.
+    ``curves`` are the results of all methods over the time ``piece``, a part of the duration ``horizon``. ``refused``
+    has the reasons why other candidates were not measured. ``finished`` says that all promising candidates were
+    measured.
+
+    If the energy error is the ``measure``, ``orbit_error`` is the error of the orbit of the best finalist over
+    ``piece``; None if it is unknown. ``unit`` is the unit of energy errors. ``monitors`` has the gains of monitors, if
+    the spec has none and the speed of the motion varies much. ``sizes`` are the sizes of the measured lattice, () for
+    other systems. Times are values of the ``clock``, t or τ.
     """
 
     measure: str
@@ -81,24 +86,26 @@ class Tuning:
     monitors: Monitors | None = None
     sizes: tuple[int, ...] = ()
     clock: str = "t"
-    automatic: str = ""  # the scheme that ``scheme: auto`` chooses at the order of the proposal
+    automatic: str = ""  # scheme that ``scheme: auto`` chooses at the order of the best method
 
     @property
     def automatic_ratio(self) -> float:
-        """Cost of the best method of the automatic scheme relative to the proposal; infinite if none reaches the
-        accuracy."""
+        """Cost of the best method with the scheme that ``scheme: auto`` chooses, relative to the least cost.
+
+        It is infinite if no method with this scheme reaches the accuracy.
+        """
         costs = [c.cost(self.accuracy) for c in self.curves if c.setting and c.setting.scheme == self.automatic]
         best = min((c.cost(self.accuracy) for c in self.curves if c.setting), default=math.inf)
         return min(costs, default=math.inf) / best
 
     @property
     def winner(self) -> Finalist | None:
-        """The proposed method: the best finalist, None if there is none."""
+        """The best finalist, which is proposed to the user; None if no method reaches the accuracy."""
         return self.finalists[0] if self.finalists else None
 
     @property
     def closest(self) -> tuple[Curve, Point]:
-        """Return the curve and the point with the smallest measured error."""
+        """The smallest measured error of a phigen method: the curve of the method, and the point."""
         measured_points = [(c, p) for c in self.curves for p in c.points if c.setting]
         return min(measured_points, key=lambda pair: pair[1].error)
 
@@ -107,12 +114,12 @@ def tune(
     compilation: Compilation, problem: Problem, measure: str, accuracy: float, budget: float | TimeBudget,
     note: Notify = lambda text: None,
 ) -> Tuning:  # fmt: skip
-    """Measure the candidates of a spec on a run, and find the cheapest that meets the accuracy.
+    """Measure candidate methods for a spec on a run, and find the cheapest one that reaches the accuracy.
 
-    ``measure`` is ``energy``, the largest error of the energy along the run, or ``orbit``, the distance from a
-    reference. It takes at most about ``budget`` seconds; a `TimeBudget` may have begun before. Raises `StepError` if
-    the setting of the spec cannot make even small steps, `CheckError` if there is no reference, `ToolchainError`
-    without a C compiler.
+    ``measure`` is ``energy``, the largest energy error along the run, or ``orbit``, the distance from a reference
+    solution. The search takes about ``budget`` seconds; a `TimeBudget` may have begun before the call. ``note``
+    receives messages on the progress. Raises `StepError` if the setting of the spec cannot make even small steps,
+    `CheckError` if there is no reference solution, and `ToolchainError` if the C compiler fails.
     """
     clock = budget if isinstance(budget, TimeBudget) else TimeBudget(budget)
     tuner = Tuner(compilation, problem, accuracy, clock, note)
@@ -136,7 +143,10 @@ def tune(
 
 
 def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
-    """Return the gains of monitors over the time of a scan; None if the speed of the motion varies little."""
+    """Return the gains of monitors over the time span of the search.
+
+    None if the spec has a monitor, if monitors do not apply, or if the speed of the motion varies little.
+    """
     compilation, problem = tuner.compilation, tuner.problem
     spec, setting = compilation.spec, current.setting
     if spec.monitor is not None or not problem.evens_out or setting is None:
@@ -155,8 +165,10 @@ def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
 
 
 def automatic(compilation: Compilation, ranked: Sequence[Finalist]) -> str:
-    """Return the scheme that ``scheme: auto`` chooses at the order of the best; "" for a lattice, and if there is no
-    best."""
+    """Return the scheme that ``scheme: auto`` chooses at the order of the best method in ``ranked``.
+
+    The result is "" for a lattice, and if ``ranked`` is empty.
+    """
     if not ranked or compilation.spec.lattice:
         return ""
     setting = replace(ranked[0].curve.setting or own_setting(compilation), kind=AUTO, composition="auto", gauge="auto")
@@ -168,9 +180,10 @@ def automatic(compilation: Compilation, ranked: Sequence[Finalist]) -> str:
 
 
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
-    """Return finalists by cost.
+    """Return the finalists in the order of their cost, except that the first one is the simplest of the best.
 
-    Among those with about the cost of the best, the lowest order comes first, and then settings without a gauge.
+    Among methods whose cost is about the least one, that with the smallest order times stages is the simplest; of two
+    such methods, the one without gauge.
     """
     ranked = sorted(finalists, key=lambda f: f.cost)
     equal = [f for f in ranked if f.cost <= EQUAL * ranked[0].cost]
@@ -179,7 +192,10 @@ def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
 
 
 def final(tuner: Tuner, current: Curve) -> list[Finalist]:
-    """Return the best candidates and the setting of the spec, each at a step that a longer run confirmed."""
+    """Return the best methods, and that of the spec, each with a step that a longer run has confirmed.
+
+    ``current`` is the curve of the setting of the spec.
+    """
     accuracy = tuner.accuracy
     finalists: list[Finalist] = []
     for curve in sorted(tuner.tried.values(), key=lambda c: c.cost(accuracy)):
@@ -195,9 +211,10 @@ def final(tuner: Tuner, current: Curve) -> list[Finalist]:
 
 
 def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
-    """Measure the cheapest step, rounded to few digits, over the horizon, or as much of it as there is time for.
+    """Confirm the cheapest step of a method, rounded down, by a run over the horizon or as much of it as time allows.
 
-    A step that misses the accuracy is reduced a few times; None if no step reaches the accuracy.
+    If the run misses the accuracy, a smaller step is tried, at most `ATTEMPTS` steps in all. None if no step reaches
+    the accuracy, or if there is not enough time.
     """
     accuracy = tuner.accuracy
     method, measure = tuner.methods[curve.key], tuner.measures[curve.bounded]
@@ -219,9 +236,10 @@ def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
 
 
 def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
-    """Return the time span of a confirming run: the horizon, or as much as its share of the budget allows.
+    """Return the duration of a run that confirms a step of size ``h``: the horizon, or as much as the budget allows.
 
-    Orbits are measured over the time span of their reference. 0 if even the time span of a scan would take too long.
+    If orbits are measured, it is the time span of the reference. It is 0 if even a run over the time span of the search
+    would take too long.
     """
     seconds_per_step = 1e-9 * search.nanoseconds_at(curve.points, h)
     affordable = h * CONFIRMING * tuner.clock.budget / seconds_per_step
@@ -231,7 +249,7 @@ def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
 
 
 def _present(tuner: Tuner, current: Curve) -> Finalist | None:
-    """Return the setting of the spec at the step of the run."""
+    """Return the setting of the spec with the step of the run, measured; None if it fails or there is no time."""
     h = tuner.problem.step
     span = confirming_span(tuner, current, h) if tuner.clock.left(CONFIRMED) > 0 else 0.0
     point = tuner.measures[current.bounded](tuner.methods[current.key], h, span) if span else None
@@ -239,9 +257,9 @@ def _present(tuner: Tuner, current: Curve) -> Finalist | None:
 
 
 def time_all(finalists: Sequence[Finalist], tuner: Tuner) -> list[Finalist]:
-    """Return the methods with timings in several rounds, at least one.
+    """Return the methods with their times in several rounds, or in one if the budget is used up.
 
-    The methods are timed in turn, so that disturbances affect all of them alike.
+    In a round all methods are timed in turn, so that other load on the machine affects all of them.
     """
     seconds: list[list[float]] = [[] for _ in finalists]
     for completed in range(ROUNDS):

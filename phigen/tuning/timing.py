@@ -1,4 +1,4 @@
-"""The time of a step in a long run."""
+"""Measurement of the time that one step takes in a long run."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from phigen.tuning.problem import CompiledMethod
 
 #: Least duration of a measurement of time, in seconds.
 LEAST_SECONDS = 2e-3
-#: Numbers of timed steps: in the first part of a run, in the largest of the parts that double, and in total.
+#: A run is timed in parts. The first part has FEW_STEPS steps. Each further part has at least as many steps as all
+#: parts before it, and up to PART_STEPS if steps are fast. After TIMED_STEPS steps no part follows.
 FEW_STEPS, PART_STEPS, TIMED_STEPS = 64, 4096, 32_768
 
 
 def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
-    """Return the CPU time of a step on this thread in nanoseconds, the fastest of several measurements; NaN if steps
-    fail.
+    """Return the processor time of a step of size ``h`` in nanoseconds, in a run of ``steps`` steps; NaN if steps fail.
 
-    Work that is done once, such as the choice of a gauge, and the call from Python are excluded.
+    It is the smallest of several measurements. The call from Python, and work that is done once for a run, such as the
+    choice of a gauge, are subtracted.
     """
     fastest = call = math.inf
     spent = 0.0
@@ -36,10 +37,10 @@ def nanoseconds_per_step(method: CompiledMethod, h: float, steps: int) -> float:
 
 
 def _run_seconds(walk: Callable[[int], object], steps: int) -> tuple[float, float]:
-    """Return the measured seconds, and the seconds that all steps of a run would take.
+    """Time the beginning of a run; return the measured seconds, and the estimated seconds of all ``steps`` steps.
 
-    Long runs are timed in part, until their steps are as fast as the remaining ones: a solver in C first fits its
-    predictor, and then makes blocks of steps, several times as fast.
+    The first steps of a solver in C are slower: its predictor is fitted first, and then steps are made in blocks. So
+    the parts grow until one takes long enough, and the last part determines the time of the remaining steps.
     """
     seconds, steps_done, part = 0.0, 0, min(FEW_STEPS, steps)
     while True:

@@ -1,4 +1,4 @@
-"""Errors of a method at one step size over a part of a run, extrapolated to the whole run."""
+"""Measurement of the error of a method with one step size over a part of a run, and extrapolation to the whole run."""
 
 from __future__ import annotations
 
@@ -12,22 +12,23 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import CompiledMethod, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: Number of times at which an orbit is compared.
+#: Approximate number of equidistant times at which an orbit is compared with the reference solution.
 MARKS = 256
-#: Relative change of the energy by one rounding; over n steps roundings add up like a random walk.
+#: Relative change of the energy by the rounding error of one step. Over n steps, rounding errors add up to about √n
+#: times this, as a random walk.
 ROUNDING = 1.1e-16
-#: Powers of time by which the growth of errors is classified. Errors that grow faster than LINEAR are those of chaotic
-#: motion; slower than STEADY, they are treated as linear apart from oscillations.
+#: Bounds of the power of time with which errors grow. An error that grows faster than the power LINEAR shows that the
+#: motion is chaotic. Below the power STEADY, the growth counts as linear, up to oscillations.
 LINEAR, STEADY = 1.8, 1.3
 
 
 @dataclass(frozen=True)
 class Point:
-    """Measurements at one step size: the error over ``time``, the expected error at the horizon, and the cost of a
-    step.
+    """Result of a method with one step size: its error, and the time of a step in ``nanoseconds``.
 
-    ``error`` is the error at the horizon, ``measured`` that over the time. ``growth`` is the power of time with which
-    it grows, NaN if that is unknown; ``rounding`` is the known part of the error that smaller steps do not reduce.
+    ``measured`` is the largest error in a run over ``time``, ``error`` the error that is expected over the whole
+    duration (horizon). ``growth`` is the power of time with which the error grows, NaN if unknown; ``rounding`` is the
+    part of the error that comes from rounding, and that smaller steps do not reduce.
     """
 
     step: float
@@ -40,28 +41,32 @@ class Point:
 
     @property
     def cost(self) -> float:
-        """Nanoseconds of computing per unit of simulated time."""
+        """Processor time in nanoseconds per unit of simulated time."""
         return self.nanoseconds / self.step
 
 
-#: Function (spacing, count) that returns the states (count + 1, DIM) of the solution at multiples of the spacing.
+#: A solution: function of (spacing, count) that returns the states (count + 1, DIM) at 0, 1, …, count times the
+#: spacing.
 Solution = Callable[[float, int], Floats]
 
-#: Function (method, step, time) that measures a method; None if a step fails.
+#: A measurement: function of (method, step size, time) that returns the point of the method, or None if a step fails.
 Measure = Callable[[CompiledMethod, float, float], Point | None]
 
 
 def marks(span: float, h: float) -> tuple[int, int]:
-    """Return a stride in steps, and the number of strides, about `MARKS`, that fill a span without exceeding it."""
+    """Return a stride, as a number of steps of size ``h``, and the number of strides that fit into a time span.
+
+    The number of strides is about `MARKS`.
+    """
     stride = max(1, round(span / h / MARKS))
     return stride, max(1, int(span / h / stride + 1e-9))
 
 
 def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
-    """Return the measure of the largest energy error during the run, in the unit of the energy.
+    """Return the function that measures the largest energy error in a run, in the unit of the energy.
 
-    Energy errors of Poisson maps are ``bounded``: the same over the horizon, apart from rounding. Those of other
-    methods are extrapolated if they grow with time.
+    ``bounded`` is for Poisson maps, whose energy error does not grow with time, apart from rounding errors. The error
+    of other methods is extrapolated to the horizon if it grows with time.
     """
     unit = problem.unit
 
@@ -76,7 +81,7 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
         largest = float(np.max(errors))
         if not math.isfinite(largest):
             return None
-        # Rounding errors remain even if a method has no drift.
+        # Even if the measured error is 0, rounding errors are expected in a longer run.
         largest, time = max(largest, ROUNDING), steps * h
         growth = _growth(errors)
         ratio = max(problem.horizon / time, 1.0)
@@ -90,11 +95,11 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
 
 
 def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True) -> Measure:
-    """Return the measure of the largest distance from a reference at about `MARKS` times, relative to the largest
-    coordinate.
+    """Return the function that measures the largest distance of a run from a reference solution.
 
-    Orbit errors of Poisson maps are extrapolated linearly in time, since their energy errors are ``bounded``, unless
-    they grow faster, as rounding errors do. Orbit errors of other methods are extrapolated at least linearly.
+    States are compared at about `MARKS` times; the distance is relative to the largest coordinate. It is extrapolated
+    to the horizon: with the measured power of time, but for methods with ``bounded`` energy errors (Poisson maps)
+    linearly, unless the distance clearly grows faster. The power is between 1 and 2.
     """
 
     def measure(method: CompiledMethod, h: float, span: float) -> Point | None:
@@ -116,8 +121,10 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
 
 
 def _growth(errors: Floats) -> float:
-    """Return the power of time with which errors at equidistant times grow, from their maxima over both halves of
-    the run."""
+    """Return the power of time with which errors at equidistant times grow; NaN if it cannot be determined.
+
+    It follows from the largest error in the first half of the run, and the largest error in the whole run.
+    """
     if len(errors) < 5:
         return math.nan
     half_count = len(errors) // 2 + 1

@@ -1,4 +1,4 @@
-"""The search for one run of a spec: candidates are built and scanned, within a budget of time."""
+"""The search for methods for one run: candidates are built, and measured with several steps, within a time budget."""
 
 from __future__ import annotations
 
@@ -19,40 +19,45 @@ from phigen.tuning.search import Curve
 from phigen.tuning.settings import SPLITTING, Setting, direct, own_setting
 from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
 
-#: Shares of the budget: after which no build starts; for one round of builds; for the expected time of a first guess;
-#: for one scan; and for one reference solution.
+#: Shares of the time budget. SEARCHING: after this share no build starts. The others are durations: of one round of
+#: builds; of the build of a candidate of the first round, as expected; of the scan of one candidate (measurements with
+#: several steps); and of one reference solution.
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
-#: Shares of the budget after which no candidate, and no classical method, is scanned.
+#: Shares of the time budget after which no candidate, and no classical method, is measured.
 SCANNED, COMPARED = 0.9, 0.85
-#: Largest cost of a candidate, and of a classical method, relative to the best so far.
+#: The measurement of a candidate, or of a classical method, ends if it costs more than this multiple of the best so
+#: far.
 WORTH, WORTH_KNOWING = 4.0, 100.0
-#: Classical methods with which the result is compared: their names in tables, and orders.
+#: Classical methods with which the result is compared, with their names in tables and their orders.
 PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
 
 Notify = Callable[[str], object]
 
 
 class TimeBudget:
-    """The seconds that a search may take, counted from ``start`` (`time.perf_counter`), by default the present time."""
+    """The number of seconds that a search may take, counted from ``start``, a time as of `time.perf_counter`.
+
+    The default of ``start`` is the present time.
+    """
 
     def __init__(self, budget: float, start: float | None = None) -> None:
         self.budget, self.start = budget, time.perf_counter() if start is None else start
 
     def at(self, share: float) -> float:
-        """Return the time, as of `time.perf_counter`, at which a share of the budget is used up."""
+        """Return the time, as of `time.perf_counter`, at which this share of the budget is used up."""
         return self.start + share * self.budget
 
     def left(self, share: float) -> float:
-        """Return the seconds until this share of the budget is used up, negative afterwards."""
+        """Return the number of seconds until this share of the budget is used up; it is negative afterwards."""
         return self.at(share) - time.perf_counter()
 
 
 class Tuner:
-    """The state of a search.
+    """A search in progress: the candidates that were tried, with their curves, and those that were refused.
 
-    ``measures`` maps True to the error measure of Poisson maps, False to that of other methods. ``piece`` is the time
-    span over which candidates are scanned, ``most`` the largest useful step. ``referring`` says whether orbits are
-    compared with a reference.
+    ``measures`` has the functions that measure errors, by whether a step is a Poisson map. ``piece`` is the time span
+    over which candidates are measured, ``most`` the largest useful step. ``referring`` says whether orbits are compared
+    with a reference solution, instead of energies.
     """
 
     def __init__(
@@ -78,10 +83,10 @@ class Tuner:
         self._state = problem.start.copy()
 
     def start(self, measure: str) -> Curve:
-        """Scan the setting of the spec, which determines the scales of the search and the cost to improve on.
+        """Measure the setting of the spec with several steps, and return its curve.
 
-        ``measure`` is ``energy`` or ``orbit``. Raises `CheckError` if there is no reference for the orbit, and
-        `StepError` if no step can be made.
+        Its speed determines the time span of the search. ``measure`` is ``energy`` or ``orbit``. Raises `CheckError` if
+        there is no reference solution for orbits, and `StepError` if steps of all sizes fail.
         """
         compilation = self.compilation
         setting = own_setting(compilation)
@@ -96,7 +101,10 @@ class Tuner:
         return curve
 
     def search(self, current: Curve) -> bool:
-        """Try candidates. Return true if no further candidate is promising, false if the time is up."""
+        """Try candidates until none is promising, or the time is up; return whether no promising candidate is left.
+
+        ``current`` is the curve of the setting of the spec.
+        """
         assert current.setting is not None
         guesses = self.problem.guesses(current.setting)
         limit = GUESSING * self.clock.budget
@@ -107,7 +115,10 @@ class Tuner:
         return not proposed
 
     def add(self, build: Built, method: CompiledMethod, worth: float) -> Curve:
-        """Measure the errors of a candidate at several steps, and add its curve."""
+        """Measure a candidate with several steps; add its curve to those that were tried, and return it.
+
+        The measurement ends early if the accuracy costs more than ``worth`` nanoseconds per unit of time.
+        """
         setting = build.setting
         self._known[build.fingerprint] = setting
         points = self._scanned(method, build.order, worth, bounded=build.exact)
@@ -120,7 +131,7 @@ class Tuner:
         return curve
 
     def peers(self) -> list[Curve]:
-        """Return the curves of the classical methods; none if there is no time to compile them."""
+        """Measure the classical methods with several steps, and return their curves; [] if there is no time for it."""
         current = next(iter(self.tried.values()))
         if self._race is None and current.seconds > self.clock.left(COMPARED):
             return []
@@ -136,7 +147,10 @@ class Tuner:
         return curves
 
     def try_all(self, settings: Sequence[Setting]) -> None:
-        """Build settings in parallel, and measure them when all builds have ended."""
+        """Build settings in parallel, and measure each with several steps when all builds have ended.
+
+        Results are added to ``tried``, reasons of failures to ``refused``.
+        """
         outcomes: dict[Setting, Outcome] = {s: self._made[s] for s in settings if s in self._made}
         until = min(self.clock.at(SEARCHING), time.perf_counter() + BUILDING * self.clock.budget)
         affordable = self._affordable([s for s in settings if s not in self._made])
@@ -161,11 +175,14 @@ class Tuner:
 
     @property
     def least(self) -> float:
-        """Return the least cost so far, in nanoseconds per unit of time."""
+        """Least cost with which a method that was tried reaches the accuracy, in nanoseconds per unit of time."""
         return min((c.cost(self.accuracy) for c in self.tried.values()), default=math.inf)
 
     def orbit_error(self, curve: Curve, h: float) -> float | None:
-        """Return the error of the orbit over the time span of a scan, by DOP853; None if that is unknown."""
+        """Return the error of the orbit over the time span of the search, for a method with steps of size ``h``.
+
+        The reference solution is computed by DOP853; None if this fails.
+        """
         stride, count = marks(self.piece, h)
         states = self.methods[curve.key].rows(h, stride * count, stride)
         if states is None or self._race is None:
@@ -174,7 +191,7 @@ class Tuner:
         return orbit_error(states, stride * h, self._classical("dop853"), self.problem.step, seconds)
 
     def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
-        """Return the settings without those whose builds would take too long, as estimated from lower orders."""
+        """Return the settings whose builds take short enough, as estimated from lower orders; refuse the others."""
         affordable = []
         for setting in settings:
             expected = expected_seconds(setting, self.tried.values())
@@ -194,7 +211,7 @@ class Tuner:
 
     @property
     def _raced(self) -> race.Race:
-        """Return the classical methods, which are compiled on first use."""
+        """The classical methods, which are compiled when they are first needed."""
         if self._race is None:
             self._race = self.problem.classical(self.compilation, list(PEERS), self._state)
         return self._race
@@ -203,7 +220,11 @@ class Tuner:
         return Classical(self._raced.runners[name], self._state, self.problem)
 
     def _refer(self, setting: Setting, method: Candidate) -> None:
-        """Measure orbit errors from now on, against a solver of higher order if there is one, confirmed by DOP853."""
+        """Compute a reference solution, and measure errors of orbits from now on.
+
+        The reference is computed by a solver of higher order than the setting of the spec, if one can be built, and is
+        confirmed by DOP853.
+        """
         problem, until = self.problem, time.perf_counter() + BUILDING * self.clock.budget
         high = replace(setting, order=max(setting.order, 8), composition=direct(setting))
         candidates = [s for s in (Setting(SPLITTING, 8, "none", "auto"), high) if s != setting]
@@ -223,7 +244,11 @@ class Tuner:
             _expect_linear(self.measures[True], method, problem, self.piece)
 
     def _reference(self, method: CompiledMethod) -> Reference:
-        """Return the reference over the piece, which is shortened if rounding or chaos require it."""
+        """Return the reference solution over the time span of the search, confirmed by DOP853.
+
+        If rounding errors or chaotic motion prevent this, the time span of the search is shortened. Raises `CheckError`
+        if that does not help.
+        """
         problem, second, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
         step, clock = problem.step, problem.clock
         for shorter in (1, 4, 16):
@@ -239,7 +264,7 @@ class Tuner:
 
 
 def _unreachable(method: Candidate, problem: Problem) -> StepError:
-    """Return the error for a run that the setting of the spec cannot complete with any step."""
+    """Return the exception for a run that the setting of the spec cannot complete with any step size."""
     h = problem.step / 16
     until, status = method.reach(h, steps_in(problem.horizon, h))
     clock = problem.clock
@@ -251,7 +276,7 @@ def _unreachable(method: Candidate, problem: Problem) -> StepError:
 
 
 def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, span: float) -> None:
-    """Raise `CheckError` if the orbit error grows too fast to be extrapolated to a longer run."""
+    """Raise `CheckError` if the error of the orbit, measured over ``span``, grows too fast to be extrapolated."""
     h, clock = problem.step, problem.clock
     for _ in range(12):
         point = measure(method, h, span)
@@ -267,9 +292,10 @@ def _expect_linear(measure: Measure, method: CompiledMethod, problem: Problem, s
 
 
 def expected_seconds(setting: Setting, tried_curves: Iterable[Curve]) -> float:
-    """Return the estimated seconds of a build, from lower orders of the same family, by a power of the order; else 0.
+    """Return the estimated time of a build in seconds, from the builds of the same method at lower orders.
 
-    The code of compositions has the same length at all orders, apart from the table of stages.
+    The time grows by a factor from each order to the next; for compositions it is constant, since their code has the
+    same length at all orders, apart from the table of stages. The result is 0 if no lower order was built.
     """
     timings = sorted((c.order, c.seconds) for c in tried_curves if c.setting and c.setting.family == setting.family)
     lower_timings = [(order, seconds) for order, seconds in timings if order < setting.order]
