@@ -112,9 +112,8 @@ def _coefficient(
         lambda k, j: momentum.combined(source[k], j) if k < len(x) else unit_shift.get(j, functions.ring.zero),
     )
     coefficient = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
-    zero = functions.seems_zero(coefficient) and functions.vanishes(
-        coefficient
-    )  # the test is for symmetric bi-realisations, in which S_i = 0 for even i
+    # In a symmetric bi-realisation S_i = 0 for even i, which the sum may hide.
+    zero = functions.seems_zero(coefficient) and functions.vanishes(coefficient)
     return sympy.Integer(0) if zero else functions.expression(coefficient)
 
 

@@ -1,4 +1,4 @@
-"""Spec files: from YAML to `Spec` with source positions, and all errors of users in a spec.
+"""Reader of spec files. It makes a `Spec` with source positions of YAML, and reports all errors that users can make.
 
 `load` and `loads` read a spec, `schema` describes the format for editors, `starter` returns a first spec.
 """

@@ -138,7 +138,7 @@ class Token:
 
 
 class _AbandonedError(Exception):
-    """The rest of the expression cannot be read; the error has been reported."""
+    """Raised after a syntax error that has been reported, since the rest of the expression cannot be read."""
 
 
 def tokens(source: str, report: Report) -> list[Token] | None:

@@ -372,8 +372,8 @@ class Record(Kind):
     def _read_unknown(self, name: str, node: MappingNode, path: Path, reader: Reader) -> tuple[str, Any]:
         """Report an unknown key. Return the key that was probably meant, "" if none was, and the value under that key.
 
-        So the names that the value declares are known, and errors inside the value are reported. The value is None if
-        it cannot be read, or if the unknown key is a synonym from another program (`MEANT`): there, values often have
+        The value is read, so that the names that it declares are known, and errors inside it are reported. It is None
+        if it cannot be read, or if the unknown key is a synonym from another program (`MEANT`), where values often have
         another form.
         """
         key, item = node.entries[name]

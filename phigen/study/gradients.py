@@ -208,10 +208,7 @@ def _differences(run: GradedRun, displaced: _Moved) -> Iterator[float]:
         for weights in (_WEIGHTS, _FORWARD_WEIGHTS):
             try:
                 changes = [(w, run.rows(*displaced(k * apart)) - middle) for k, w in weights]
-            except (
-                StepError,
-                ValueError,
-            ):  # the displaced run meets a singularity, or violates the bound of a parameter
+            except (StepError, ValueError):  # the run meets a singularity, or a parameter violates its bound
                 continue
             yield float(sum(w * np.sum(run.bars * change) for w, change in changes)) / apart
             break

@@ -13,7 +13,7 @@ from phigen.geometry.system import System
 from phigen.study.methods import Method, by_differences
 from phigen.symbolic.arrays import Floats, evaluate
 
-#: Relative error of the size of a rounding error; errors of a few times this size are not those of the method.
+#: Relative rounding error of a few operations. Errors up to a few times this are not errors of the method.
 ROUNDING = 4e-16
 
 #: Finite differences are computed with the usual displacements, and with displacements divided by the second factor.

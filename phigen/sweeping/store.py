@@ -93,10 +93,7 @@ class Job:
 
 
 def digest_of(plan: Plan, solver: Mapping[str, Any]) -> str:
-    """Return a hash of the plan and the solver, by which stores with different results differ.
-
-    The division into chunks does not enter.
-    """
+    """Return a hash of the plan, except the division into chunks, and of the solver, which identifies the results."""
     facts = {**plan.as_json(), "chunk": None}
     return hashlib.sha256(json.dumps([facts, solver], sort_keys=True).encode()).hexdigest()[:16]
 

@@ -40,8 +40,8 @@ THIRD = "amplitude3"
 #: of terms of the series. At t/16 the omitted terms are below 10⁻¹⁸.
 DOUBLINGS, TERMS = 4, 6
 
-#: Ratio c/a of the arithmetic–geometric mean at which the iteration ends: the next c/a, a quarter of its square, is
-#: below rounding.
+#: The iteration a, b → (a + b)/2, √(ab) of the arithmetic–geometric mean ends when c = (a − b)/2 is at most this
+#: fraction of a: in the next iteration, c/a would be a quarter of its square, which is below rounding.
 MEAN_RATIO = 1e-8
 
 #: Number of duplication steps for Carlson's R_D in SIMD code, which has no branches. The arguments of R_D there differ

@@ -43,8 +43,8 @@ class Symbol(str):
         return (self.kind, *self.key)
 
 
-#: Symbols: STEP, the size of a step or the duration of a flow; ELAPSED, the time of an exact solution; MATRIX, a matrix
-#: Σ p_i E_i.
+#: Symbols. STEP: size of a step, or duration of a flow. ELAPSED: time of an exact solution. MATRIX: the matrix Σ p_i
+#: E_i that belongs to momenta p_i, for the basis E_i of a matrix Lie algebra.
 STEP, ELAPSED, MATRIX = Symbol("h"), Symbol("time"), Symbol("P")
 
 #: Kind of the increment of a Wiener process in a step; the key is the number of the source of noise.

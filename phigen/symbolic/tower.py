@@ -266,7 +266,7 @@ class Tower(Arithmetic[Poly]):
             sine = self._entire("sinroot", s * self.constant(Fraction(1, 4)))
             numerator = sine**2 * self.constant(Fraction(1, 2)) - 3 * self._entire("arcroot", s)
             return numerator * self._reciprocal(s) * self.constant(Fraction(1, 2))
-        if name == "arcroot":  # by functions of s/4, of half the angle √s, which the formulas of flows contain too
+        if name == "arcroot":  # by functions of s/4, that is of half the angle √s: formulas of flows contain them too
             quarter = s * self.constant(Fraction(1, 4))
             return (1 - self._entire("sinroot", quarter) * self._entire("cosroot", quarter)) * self._reciprocal(s)
         cos, sin = self._generator("cosroot", [s]), self._generator("sinroot", [s])

@@ -47,10 +47,11 @@ def slopes(
 
 
 def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any) -> Any:
-    """Return the universal anomaly s of a Kepler motion after the time t, with the arguments of the module.
+    """Return the universal anomaly s of a Kepler motion q̈ = −μq/r³ after the time t.
 
-    The precision is double if the library is `math`, else that of an mpmath context. ``spin`` is |q × q̇|². Raises
-    `ValueError` if there is no value: at r = 0, and after a collision of a radial motion.
+    The arguments are r = |q|, η = q·q̇, β = 2μ/r − q̇² and ``spin`` = |q × q̇|² at the start. The precision is double
+    if the library is `math`, else that of an mpmath context. Raises `ValueError` if there is no value: at r = 0, and
+    after a collision of a radial motion.
     """
     if not r > 0:
         raise ValueError("the distance of a Kepler motion is not positive")

@@ -129,7 +129,7 @@ class LatticeProblem(Problem):
 
     @property
     def evens_out(self) -> bool:
-        """Whether monitors may be tried: False, since lattices have none that could be tried."""
+        """Whether monitors may be tried, which is never so for lattices."""
         return False
 
     def energies(self, states: Floats) -> Floats:

@@ -191,7 +191,7 @@ class Tuner:
         return orbit_error(states, stride * h, self._classical("dop853"), self.problem.step, seconds)
 
     def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
-        """Return the settings whose builds take short enough, as estimated from lower orders; refuse the others."""
+        """Return the settings whose builds will end in time, as estimated from lower orders; refuse all others."""
         affordable = []
         for setting in settings:
             expected = expected_seconds(setting, self.tried.values())
