@@ -202,10 +202,10 @@ class Declarations:
         return AllowedNames({}, {n: (f"expected a number; {n!r} is not constant", hint) for n in declared})
 
     def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
-        """Return the declarations for a structure inside this one, with other coordinates: a block or a pull-back.
+        """Return the declarations for a Poisson structure inside another: a block of a product, or a pull-back.
 
-        ``within`` is its path of keys. If it uses a coordinate that only the outer structure has, the error is
-        ``message``, followed by that name.
+        ``within`` is the path of keys to the inner structure, ``coordinates`` are its coordinates. If the inner
+        structure uses a coordinate that only the outer one has, the error is ``message``, followed by the name.
         """
         excluded = [c for c in self.coordinates if c not in coordinates]
         gone = {n for n, e in self.definitions.items() if any(s in excluded for s in symbols_of(e))}

@@ -1,4 +1,4 @@
-"""Quotes that a line of YAML lacks: inside { } or [ ], an expression with an index, such as ``x[i+1]``, needs them."""
+"""Repair of lines of YAML in which an expression with an index, such as ``x[i+1]``, lacks quotes inside { } or [ ]."""
 
 from __future__ import annotations
 

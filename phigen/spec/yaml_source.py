@@ -68,7 +68,7 @@ class Scalar(Node):
 
 @dataclass
 class Sequence(Node):
-    """A YAML sequence."""
+    """A YAML sequence, with its items in the order of the file."""
 
     items: list[Node] = field(default_factory=list)
 
@@ -218,7 +218,7 @@ class _Builder:
         return self.problems.stop(f"not valid YAML: {what}", location, hint)
 
     def take(self, event: Any) -> None:
-        """Handle one event of the YAML parser."""
+        """Handle one event of the YAML parser: add its node to the tree, or refuse what specs must not contain."""
         kind = type(event).__name__
         if kind == "DocumentStartEvent":
             self.start_document(event)

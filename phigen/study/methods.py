@@ -46,8 +46,8 @@ class Method:
 def of_solver(solver: Solver, parameters: Mapping[str, float], gauge: Floats | None = None, t0: float = 0.0) -> Method:
     """Return the method of a generated solver with its parameters, for steps that begin at the time ``t0``.
 
-    Solvers with a gauge choose multiples of Casimirs, or e, at the initial state. If they are given by ``gauge``, all
-    steps are the same map, whatever the initial state.
+    Some solvers choose constants at the initial state: multiples of Casimirs, or the energy level e = −H(x₀). If
+    ``gauge`` states these constants, all steps are the same map, whatever the initial state.
     """
     fixed_gauge = solver if gauge is None else Solver(solver.backend.with_gauge(gauge), solver.interface)
     begin = t0 if solver.interface.time else None

@@ -56,7 +56,7 @@ class Race:
 def compiled(
     compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """Return the race of the solver and those ``methods`` that are explicit, in compiled C and double precision.
+    """Return the functions that run the solver, and those ``methods`` that are explicit, in C and double precision.
 
     With a monitor, all methods make steps of equal size in τ. Raises `ToolchainError` if the C cannot be compiled.
     """
@@ -104,7 +104,10 @@ def compiled(
 def interpreted(
     solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """Return the race of the solver and the ``methods``, all in Python. With a monitor, steps have equal size in τ."""
+    """Return the functions that run the solver and the ``methods``, all in Python.
+
+    With a monitor, all methods make steps of equal size in τ.
+    """
 
     begin = t0 if solver.interface.time else None
 

@@ -248,7 +248,7 @@ class Taylor:
             if not self.ring.vanishes(a[0]):
                 raise ValueError(f"{e.op} has a series about 0 only, and its argument does not vanish at p = 0")
             return self.ring.constant(coefficient(order, 0))
-        powers = self._powers.setdefault(id(e), [])  # powers[k - 1] is a**k, whose levels below k vanish
+        powers = self._powers.setdefault(id(e), [])  # powers[k - 1] has the coefficients of a**k; the first k are 0
         powers.append([self._zero] * i)
         for k in range(i):
             powers[k].append(a[i] if k == 0 else self._convolve(a, [*powers[k - 1], self._zero], i))

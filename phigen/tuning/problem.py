@@ -165,7 +165,7 @@ class CompiledMethod(Protocol):
         ...
 
     def walk(self, h: float) -> Callable[[int], object]:
-        """Return a function of a number of steps, for timing. Each call makes so many further steps of size ``h``.
+        """Return a function for timing. A call with a number makes this number of further steps of size ``h``.
 
         The first call starts from the initial state.
         """

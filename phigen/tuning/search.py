@@ -48,7 +48,7 @@ class Curve:
 
     @property
     def key(self) -> Setting | str:
-        """Key of the method in tables: its setting, or the label of a classical method."""
+        """Key by which the method is stored: its setting, or the label of a classical method."""
         return self.setting or self.label
 
     @property
