@@ -220,8 +220,8 @@ def _identifier(name: str, *, called: bool) -> Atom:
 def _scripts(kind: str, parts: Sequence[Element], depth: int, *, called: bool, whole: bool) -> list[Atom]:
     """Return a base with its index and exponent as atoms.
 
-    A base that is a sum in parentheses may be broken. A power of e with a long exponent becomes exp(…), for the same
-    purpose.
+    A base that is a sum in parentheses may be broken. A power of e with a long exponent becomes exp(…), whose argument
+    may be broken too.
     """
     base, *scripts = parts
     script_atoms = [_one([s]) for s in scripts]

@@ -50,9 +50,10 @@ def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], time
 
 
 def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
-    """Return the source of the Taylor coefficients a_μ of α, given by expressions in x and p.
+    """Return a function of a degree, a `Source`, for the Taylor coefficients a_μ in p of ``alpha``.
 
-    The expressions must be defined at p = 0 as they are written: they may contain no quotient such as sin(p)/p.
+    The components of ``alpha`` are expressions in x and p. They must be defined at p = 0 as they are written: they may
+    contain no quotient such as sin(p)/p.
     """
 
     @cache
@@ -112,7 +113,7 @@ def _coefficient(
         lambda k, j: momentum.combined(source[k], j) if k < len(x) else unit_shift.get(j, functions.ring.zero),
     )
     coefficient = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
-    # In a symmetric bi-realisation S_i = 0 for even i, which the sum may hide.
+    # In a symmetric bi-realisation S_i = 0 for even i, but the sum need not look like 0 before relations are used.
     zero = functions.seems_zero(coefficient) and functions.vanishes(coefficient)
     return sympy.Integer(0) if zero else functions.expression(coefficient)
 

@@ -63,7 +63,10 @@ def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
 
 
 def source_of_paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], time: int = 0) -> Source:
-    """Return the source of the Taylor coefficients of α = m(0), for ``time`` 0, or of β = m(1), for ``time`` 1."""
+    """Return a function of a degree, a `Source`, for the Taylor coefficients in p of α = m(0), or of β = m(1).
+
+    ``time`` is 0 for α, 1 for β.
+    """
     s = sympy.Dummy("s")
     following = paths(poisson, x, p, s)
     parts: list[list[Any]] = []

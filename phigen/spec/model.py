@@ -404,10 +404,10 @@ class Lattice:
     ``axes`` name the directions of a grid, with a ``boundary`` for each: ``periodic`` or ``open``. ``graph`` is the
     name of the list of bonds. ``pairs`` says that every two sites form a pair. ``poisson`` and ``hamiltonian`` of the
     spec are those of a site. ``bonds`` is the density of H of a bond or a pair. ``brackets`` maps pairs (f, g) of
-    symbols at two different sites to the bracket {f, g}; it contains (f, g) or (g, f), not both. ``kinds`` says for
-    each Casimir whether it is one at every site (``sites``), or the ``sum`` or ``product`` of a density over the sites
-    is. ``reductions`` has the reductions of observables to one number; an observable without a reduction is a field,
-    with a value at each site.
+    symbols at two different sites to the bracket {f, g}; it contains (f, g) or (g, f), not both. ``kinds`` says for the
+    density of each Casimir what is constant: its value at every site (``sites``), or its ``sum`` or ``product`` over
+    the sites. ``reductions`` has the reductions of observables to one number; an observable without a reduction is a
+    field, with a value at each site.
     """
 
     axes: tuple[str, ...] = ()

@@ -241,7 +241,7 @@ class Watch:
 
 
 def _is_telling(turns: NDArray[np.int64]) -> bool:
-    """Whether the first window contains an oscillation of every coordinate that oscillates, so that windows compare.
+    """Whether windows can be compared: the first one contains an oscillation of each coordinate that oscillates.
 
     ``turns`` (2, DIM) are the numbers of turning points in the first window and in the whole run.
     """

@@ -58,9 +58,9 @@ def sweep(
     also contain ``random: n`` and ``seed: k``.
 
     With ``output``, the results are stored in the Zarr store of this name, and loaded on demand; an existing store of
-    the same sweep is continued. Without it, the results are in memory. ``scheduler`` is the address of a Dask cluster.
-    Without it, ``workers`` processes of this machine are used, by default one for each core, or for each device of the
-    target. ``target``, ``order``, ``scheme`` and ``profile`` have the meaning that they have in `phigen.compile`.
+    the same sweep is continued. Otherwise the results are in memory. ``scheduler`` is the address of a Dask cluster. If
+    there is none, ``workers`` processes of this machine are used, by default one for each core, or for each device of
+    the target. ``target``, ``order``, ``scheme`` and ``profile`` have the meaning that they have in `phigen.compile`.
     ``progress`` receives the numbers of computed and of failed members after each chunk.
 
     The function starts processes, so scripts that call it need the guard ``if __name__ == "__main__":``. Raises

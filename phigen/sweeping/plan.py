@@ -155,9 +155,9 @@ def values_of(axis: Axis) -> Floats:
 
 
 def _spaced(axis: Axis, share: Floats) -> Floats:
-    """Return the values at the fractions ``share``, from 0 to 1, of the way between the ends of an axis.
+    """Return the values at the fractions ``share``, from 0 to 1, of the interval between the ends of an axis.
 
-    The way is linear, or linear in the logarithm.
+    With the scale log they are fractions of the interval of logarithms.
     """
     first, last = axis.ends
     if axis.scale == "log":

@@ -1,4 +1,4 @@
-"""Expressions evaluated on whole trajectories."""
+"""Evaluation of expressions at all states of a trajectory at once, with arrays."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def _product(a: Any, b: Any) -> list[Any]:
 
 
 def _divided_by_quadric(d: list[Any], c: Any) -> tuple[list[Any], list[Any]]:
-    """Return the quotient and the remainder of a polynomial of degree 6 on division by p."""
+    """Return quotient and remainder of a polynomial of degree 6 on division by x⁴ − c_3 x³ − c_2 x² − c_1 x − c_0."""
     d = [*d]
     for k in (6, 5, 4):
         for j in range(4):

@@ -239,9 +239,10 @@ class Taylor:
         return self.ring.combine(terms)
 
     def _analytic(self, e: Expression, a: list[Any], i: int) -> Any:
-        """Return level ``i`` of φ(a) or of a derivative of φ, by its power series at 0.
+        """Return the coefficient of tⁱ of φ(a) or of a derivative of φ at a, by its power series at 0.
 
-        ``a`` has the coefficients of the argument, the first of which must be 0, else `ValueError` is raised.
+        φ is the function of the exponential bi-realisation. ``a`` has the coefficients of the argument; `ValueError` is
+        raised if the first one is not 0.
         """
         order = order_of(e.op)
         if i == 0:

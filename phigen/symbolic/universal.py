@@ -89,10 +89,10 @@ def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any
 
 
 def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
-    """Return an initial value for the iteration that solves for s.
+    """Return an initial value for the iteration that computes the universal anomaly s after the time t.
 
-    For a small part of an orbit it is a power series in t, or its first term t/r. Otherwise it is βt/μ, the mean of s
-    over an elliptic orbit, or 1/√−β for a hyperbolic one; if this is too small, the iteration doubles it.
+    For a small part of an orbit it is a power series in t, or its first term t/r. Otherwise it is βt/μ, which s is on
+    the average over an elliptic orbit, or 1/√−β for a hyperbolic one; if this is too small, the iteration doubles it.
     """
     u = t / r
     if abs(beta) * u**2 > 1:

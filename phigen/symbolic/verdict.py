@@ -80,7 +80,7 @@ def decide_zero(
 def decide_elements(
     name: str, tower: Tower, residuals: Iterable[tuple[str, Poly]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """Return the statement that elements of a tower vanish, with its verdict; see `decide_zero` for the arguments."""
+    """Return the statement that elements of a ring, ``tower``, vanish, with its verdict, as `decide_zero` does."""
     pending = [(label, element) for label, element in residuals if not tower.is_zero(element)]
     if not pending:
         return Statement(name, PROVED, detail)

@@ -182,8 +182,8 @@ def automatic(compilation: Compilation, ranked: Sequence[Finalist]) -> str:
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
     """Return the finalists in the order of their cost, except that the first one is the simplest of the best.
 
-    Among methods whose cost is about the least one, that with the smallest order times stages is the simplest; of two
-    such methods, the one without gauge.
+    Among methods whose cost is about the least one, the simplest has the smallest product of order and number of
+    stages. If two methods have the same product, the one without gauge is the simpler one.
     """
     ranked = sorted(finalists, key=lambda f: f.cost)
     equal = [f for f in ranked if f.cost <= EQUAL * ranked[0].cost]

@@ -25,8 +25,8 @@ from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, 
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
 #: Shares of the time budget after which no candidate, and no classical method, is measured.
 SCANNED, COMPARED = 0.9, 0.85
-#: The measurement of a candidate, or of a classical method, ends if it costs more than this multiple of the best so
-#: far.
+#: A candidate, or a classical method, is not measured further if reaching the accuracy costs more than this multiple of
+#: the least cost so far.
 WORTH, WORTH_KNOWING = 4.0, 100.0
 #: Classical methods with which the result is compared, with their names in tables and their orders.
 PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
