@@ -1,4 +1,6 @@
-"""The transpose of generated steps and runs: against the tangent map, many digits, and differences."""
+"""Transposes (reverse mode) of generated steps and runs, compared with tangent maps, with arithmetic in many digits and
+with differences.
+"""
 
 import ctypes
 from functools import cache
@@ -31,13 +33,13 @@ hamiltonian: p**2/(2*m) - g*cos(q)
 """
 DRIVEN = "time: t\n" + SWING.replace("g*cos(q)", "g*cos(q)*(1 + cos(w*t)/5)")
 FALLING = SWING.replace("g: 1.5", "g: {value: 1.5, positive: true}").replace("cos", "exp")
-#: All three parts depend on the time, so flows of two parts share coefficients for one time.
+#: A top whose three parts of H all depend on the time, so that flows of two parts share the coefficients of one time.
 SHAKEN = "time: t\n" + TOP.replace(
     "(x1**2/I1 + x2**2/I2 + x3**2/I3)/2", "cos(t)*x1**3/I1 + sin(t)*x2**3/I2 + exp(-t)*x3**3/I3"
 )
 SHORT = "profile: small\n"
 
-#: Every kind of step, with times, forces and monitors; those that are as fast as can be do blocks of steps.
+#: Specs of every kind of step, with time dependence, forces and monitors. Fast code makes blocks of steps where it can.
 KINDS = {
     "newton": (TOP + "order: 4\ngauge: none\n", Newton),
     "newton, composed": (SWING + "order: 6\ncomposition: kahan-li\n", Newton),
@@ -94,19 +96,21 @@ def weights(shape):
 
 
 def difference(f, width=1e-3):
-    """The derivative at 0, by central differences of order 6."""
+    """Return the derivative of f at 0, by central differences of order 6."""
     return sum(w * (f(k * width) - f(-k * width)) for k, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))) / width
 
 
 def given(integrator):
-    """The parameters that tests of all kinds use: other than the defaults."""
+    """Return parameter values that differ from the defaults."""
     return {name: 1.07 * value for name, value in integrator.interface.parameters.items()}
 
 
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("kind", KINDS)
 def test_pullback_is_the_gradient_of_the_run(kind):
-    """All rows have a cotangent; what is held fixed by a gauge is held fixed here too, e of a monitor follows."""
+    """All rows have a cotangent. The differences hold the gauge fixed, as the gradient does; the level e of a monitor
+    follows the start.
+    """
     integrator, numpy, x = *(solver(compilation(kind), target) for target in ("c", "numpy")), start(kind)
     if compilation(kind).program.gauge:
         gauge = numpy.backend.module.gauge(x, **given(integrator))
@@ -155,7 +159,9 @@ def test_pullback_is_the_transpose_of_the_tangent_map(kind, target):
 
 
 def test_stages_whose_paths_are_long_are_gone_back_through_one_after_the_other():
-    """Each begins where the one after it has traced its path back to; what moves that to the mean must not do harm."""
+    """The reverse pass of a path starts at the point to which the next stage was traced back. The shift of this point
+    to the mean of the stages must not change the gradient.
+    """
     integrator, x, bar, h, steps = solver(compilation("path, long"), "c"), start("path, long"), weights(3), 0.3, 50
     product = np.eye(3)
     for _, tangent in integrator.tangents(x, h, steps):
@@ -171,7 +177,7 @@ def test_stages_whose_paths_are_long_are_gone_back_through_one_after_the_other()
 
 @precisely
 def exact_gradient(kind, parameters, x, bar, steps):
-    """Of the product of the last state with ``bar``, along state and parameters, by the scheme in many digits."""
+    """Return the gradient of bar · (last state), along state and parameters, from the scheme in many digits."""
     step_of = PrecisePathStep if isinstance(compilation(kind).program.step, Path) else PreciseStep
 
     def end(x, **changed):
@@ -206,7 +212,9 @@ def test_gradient_agrees_with_many_digits(kind):
 
 
 def test_sparse_newton_matrices_are_gone_back_through_in_lanes():
-    """Their zeros are not stored: a chain of seven species. The lanes are steps of one run, or members."""
+    """A chain of seven species, whose Newton matrix is sparse: its zeros are not stored. The SIMD lanes are steps of
+    one run, or members of an ensemble.
+    """
     rows = [[(j - i) if abs(i - j) == 1 else 0 for j in range(7)] for i in range(7)]
     names = [f"x{k}" for k in range(7)]
     text = f"coordinates: [{', '.join(names)}]\nparameters: {{r: 1.1}}\npoisson: {{log_canonical: {rows}}}\n"
@@ -288,7 +296,9 @@ def test_one_start_is_that_of_all_members_and_there_may_be_none(target):
 
 @pytest.mark.parametrize("kind", ["newton, time", "splitting, monitor", "path, time, composed", "kicks, time"])
 def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypatch):
-    """Those that are not in lanes. Steps, parameters and times of their own; long runs are those of segments."""
+    """Members outside of SIMD lanes, with their own steps, parameters and times. Long runs are pulled back in
+    segments.
+    """
     integrator, rng = solver(compilation(kind), "c"), np.random.default_rng(2)
     monkeypatch.setattr(runs, "PART_GRANULARITY", 2)
     monkeypatch.setattr(runs, "_STEPS_PER_THREAD", 1)
@@ -312,14 +322,14 @@ def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypat
         assert bars == pytest.approx(together.parameters_bar[name], rel=1e-10, abs=1e-13)
 
 
-#: Members that are pulled back in lanes. Of one the state, or the step, is so many times as large: in splittings all in
-#: lanes take the ways that are for large arguments then; the others cannot do it (functions have no values, Newton's
-#: method or expansions fail), but of a composition.
+#: Cases of members in SIMD lanes: the kind of step, the factor by which the state of one member is larger, and that of
+#: its step. In splittings, all lanes then use full-range functions. In other kinds of steps the lanes of this member
+#: fail (functions have no values, or Newton's method or expansions fail), except in compositions.
 FAR = {
     "splitting": (40, 1, True),
-    "kicks": (1, 1, True),  # all, after some steps
-    "splitting, saddle": (1, 12, False),  # flows are undone to another state
-    "splitting, damped": (1, 1, True),  # flows are not undone
+    "kicks": (1, 1, True),  # all members, after some steps
+    "splitting, saddle": (1, 12, False),  # the inverse flows lead to another state
+    "splitting, damped": (1, 1, True),  # the reverse pass uses stored states, not inverse flows
     "explicit": (1e7, 1, False),
     "newton, gauge": (1, 35, False),
     "path": (1, 15, False),
@@ -327,7 +337,7 @@ FAR = {
     "newton, monitor": (1, 1, True),
 }
 
-#: Specs of those that are not in `KINDS`.
+#: Specs of the cases that are not in `KINDS`.
 FURTHER = {
     "splitting": f"{TOP}order: 4\n",
     "kicks": f"{SWING}order: 6\n",
@@ -340,8 +350,10 @@ FURTHER = {
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("kind", FAR)
 def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
-    """As each is alone: with rows, and numbers of its own, splittings in segments; one that lanes cannot do to the last
-    bit, since it is done by itself. The last group is not full. Long runs are those of segments."""
+    """The gradient of each member is that of a run of this member alone: with cotangents of rows, parameters and steps
+    of each member, and splittings in segments. A member that lanes cannot compute is computed alone, with the same
+    bits. The last group is not full, and long runs are pulled back in segments.
+    """
     text, scheme = FURTHER.get(kind), "splitting" if kind.startswith(("splitting", "kicks")) else None
     head = "phigen: 1\nname: t\nadjoint: true\n"
     compiled = compile_spec(spec.loads(head + text), scheme=scheme) if text else compilation(kind)
@@ -409,7 +421,7 @@ def test_what_cannot_be_pulled_back_is_told(target):
     with pytest.raises(StepError) as failed:
         integrator.pullback(1e3 * x, 50.0, 10, x)
     assert failed.value.step == 0
-    assert failed.value.members == ()  # one state is no ensemble
+    assert failed.value.members == ()  # a single state is not an ensemble
     with pytest.raises(StepError) as failed:
         integrator.pullback(np.array([x, 1e3 * x, x, x]), 0.5, 10, np.array([x, x, x, x]))
     assert failed.value.members == (1,)
@@ -456,7 +468,9 @@ def test_adjoint_is_refused_where_it_is_not_offered():
 
 
 def test_transposes_of_flows_compute_nothing_that_is_known_or_unused():
-    """Of rotations they take the cosine from 1 - cos; a time that no parameter changes gets no cotangent."""
+    """The cosine of a rotation is computed from 1 − cos. A time that does not depend on parameters gets no
+    cotangent.
+    """
     head = "phigen: 1\nname: t\nscheme: splitting\nadjoint: true\n"
     turned = compile_spec(spec.loads(head + TOP)).program.step.adjoint.steps
     used = [{e.op for e in topological(kernel.roots)} for kernel in turned]
@@ -476,7 +490,9 @@ def test_c_defines_functions_of_flows_only_where_flows_call_them():
 
 
 def test_steps_that_forget_what_was_before_are_pulled_back_too():
-    """Where a guess misleads, a step is made again without: then the solver remembers fewer steps than it has made."""
+    """A step whose predictor fails is repeated without it. The history of the predictor is then shorter than the number
+    of steps.
+    """
     both = {"tangent": True, "adjoint": True}
     integrator = solver(compile_spec(spec.loads(f"phigen: 1\nname: t\n{RATTLEBACK}"), **both), "c")
     x, steps, bar, product = np.array([0.01, 0.5, -1]), 20, weights(3), np.eye(3)
@@ -489,7 +505,7 @@ def test_steps_that_forget_what_was_before_are_pulled_back_too():
 @pytest.mark.parametrize("composition", ["blanes-moan", "blanes-moan-rkn"])
 @pytest.mark.parametrize("kick", ["sin(q)", "-cos(q)"])
 def test_batches_define_functions_that_only_transposes_call(kick, composition):
-    """A kick of sin(q) calls cos, its transpose sin."""
+    """A kick by H = sin(q) calls cos, and its transpose calls sin."""
     text = f"hamiltonian: p**2/2 + a*{kick}\nparameters: {{a: {{value: 1.3}}}}\nscheme: splitting\norder: 4\n"
     pair = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nadjoint: true\n"
     solve = solver(compile_text(f"{pair}{text}composition: {composition}\n"), "c")

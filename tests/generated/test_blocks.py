@@ -1,4 +1,4 @@
-"""Blocks of steps and groups of members do what single steps do, to round-off."""
+"""Blocks of steps and groups of members agree with single steps to round-off."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,14 +22,14 @@ from support import (
 from phigen.compiler import compile_spec, emit
 from phigen.lanes.in_lanes import Blocks, in_lanes
 
-#: Where 300 steps multiply round-off. Elsewhere blocks and single steps agree to two units of the last place for each
-#: stage: with uncompensated sums they would be ten apart.
+#: Factors by which the instability of a motion multiplies round-off in 300 steps. In other systems blocks and single
+#: steps agree to two units in the last place for each stage; uncompensated sums would be ten units apart.
 GROWING = {"gaussian_moments": 20, "henon_heiles": 20, "kowalevski_top": 20, "pendulum": 20}
 GROWING |= {"nambu_pendulum": 20}
-GROWING |= {"poisson_not_hamiltonian": 500}  # a start changed by one unit ends 220 units apart
-GROWING |= {"dzhanibekov": 150}  # the same, 67
+GROWING |= {"poisson_not_hamiltonian": 500}  # a start that differs by one unit in the last place ends 220 units apart
+GROWING |= {"dzhanibekov": 150}  # a start that differs by one unit in the last place ends 67 units apart
 
-#: Chaotic motions, and one that is quiet and then flips: recurrences do not foresee them well enough to be used.
+#: Chaotic motions, and one that rotates for a long time before it flips: fitted recurrences do not predict them.
 UNFORESEEN = {"henon_heiles", "kowalevski_top", "dzhanibekov"}
 
 EXERCISE = Path(__file__).with_name("blocks.c")
@@ -54,14 +54,14 @@ def test_blocks_and_groups_equal_single_steps(name, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["rigid_body", "toda3", "volterra5"])
 def test_vectorised_blocks_and_groups_equal_single_steps(name, tmp_path):
-    """-O0 leaves the loops over lanes as they are, -O3 makes vector instructions of them."""
+    """The compiler does not vectorise the loops over lanes with -O0, and does with -O3."""
     exercise(compiled(name), "-O3", tmp_path)
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but(["rigid_body", "pendulum"], ["rigid_body", "pendulum", "volterra5"]))
 def test_blocks_of_several_stages_equal_single_steps(name, tmp_path):
-    """Of the pendulum y is the mean of the ends of a stage."""
+    """In the bi-realisation of the pendulum, y is the mean of the states at both ends of a stage."""
     composed = replace(compiled(name).spec, composition="suzuki")
     compilation = compile_spec(composed, order=4)
     assert len(compilation.program.fractions) == 5
@@ -87,11 +87,11 @@ def test_blocks_with_sparse_factors_equal_single_steps(composition, optimisation
     compilation = compile_text(f"{text}runs: {{r: {{initial: {start}, step: 0.2, steps: 10}}}}\n")
     assert compilation.program.step.factors
     assert compilation.program.step.eliminate
-    exercise(compilation, optimisation, tmp_path, foreseen=False, units=200)  # with the inverse: 91
+    exercise(compilation, optimisation, tmp_path, foreseen=False, units=200)  # 91 with the inverse matrix
 
 
 def test_members_go_one_by_one_where_a_group_would_take_too_much_stack():
-    """Seventeen stages: blocks are small enough, groups with the past values of eight members are not."""
+    """With seventeen stages, a block fits the stack limit, and a group with the history of eight members does not."""
     composed = replace(compiled("rigid_body").spec, composition="kahan-li")
     compilation = compile_spec(composed, order=8)
     code = emit(compilation.program, "c", COMMAND, single_file=True)["rigid_body.c"]
@@ -122,7 +122,7 @@ def exercise(compilation, optimisation, folder, *, foreseen=True, units=2):
 
 
 def test_code_without_lanes_is_shorter_and_does_the_same():
-    """`lanes: false`: a loop over single steps, which blocks agree with."""
+    """`lanes: false` gives a loop over single steps, which agrees with blocks."""
     body = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + q**4/4\norder: 4\n"
     with_lanes, without = compile_text(body), compile_text(f"{body}solver: {{lanes: false}}\n")
     lengths = [len(emit(c.program, "c", COMMAND)["t.c"].splitlines()) for c in (with_lanes, without)]

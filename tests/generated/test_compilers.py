@@ -1,4 +1,4 @@
-"""Generated C compiles without a warning everywhere, uses nothing but libm, and runs clean under the sanitizers."""
+"""Generated C compiles without warnings with all compilers, calls only functions of libm, and passes the sanitizers."""
 
 from itertools import product
 from pathlib import Path
@@ -30,20 +30,21 @@ pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 
 _CPP_FLAGS = "-std=c++11 -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wold-style-cast -Werror"
 _SANITIZERS = "-std=c99 -O0 -g1 -fsanitize=address,undefined -fno-sanitize-recover=all"
-#: Beside bounds, these are three quarters of what the sanitizers cost. Kernels differ between systems, but hand on no
-#: pointers: that is the runtime, which is the same in all systems with a kind of step.
+#: Checks of pointers other than bounds, which are left out: they take three quarters of the time of the sanitizers.
+#: Kernels, which differ between systems, pass no pointers on; the runtime does, and it is the same for all systems with
+#: a kind of step.
 _OF_POINTERS = "-fno-sanitize=null,alignment,pointer-overflow"
 EXERCISE = Path(__file__).with_name("exercise.c")
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 
-#: What a library may need from outside.
+#: Symbols that a generated library may import.
 _LIBM = "exp expm1 fmax log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh pow sqrt cbrt fabs sincos"
 ALLOWED = {*_LIBM.split(), "memcpy", "memset", "memcmp", "memmove"}
 
 
 @pytest.fixture
 def sources(name, tmp_path):
-    """A folder with the generated files of a system; the single file in a folder of its own."""
+    """Return a folder with the generated files of a system; the single-file form is in a folder of its own."""
     write(tmp_path, files(compiled(name), "c"))
     (tmp_path / "single").mkdir()
     write(tmp_path / "single", single_file(compiled(name)))
@@ -51,10 +52,11 @@ def sources(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", QUICK)
-@pytest.mark.slow  # `test_all_solvers_can_be_one_translation_unit` does this for all, beside what differs in one file
+@pytest.mark.slow  # `test_all_solvers_can_be_one_translation_unit` compiles all systems
 def test_c_compiles_without_a_warning(name, sources):
-    """`library` asks gcc for all of its warnings, those of -O3 included. All of clang come before it optimises, and
-    `test_fast_code_with_derivatives_is_cpp_as_well` asks it about other systems."""
+    """The fixture of libraries compiles with all warnings of gcc, including those of -O3. Clang gives all of its
+    warnings before it optimises; `test_fast_code_with_derivatives_is_cpp_as_well` compiles further systems with clang.
+    """
     assert library(compiled(name)).exists()
     assert not list((sources / "single").glob("*.h"))
     for folder in (sources, sources / "single"):
@@ -67,7 +69,7 @@ def test_single_file_needs_no_other(name, sources):
     run([tool("clang"), "-std=c99", *WARNINGS, "-fsyntax-only", f"{name}.c"], sources / "single")
 
 
-#: What headers have beside the names of a system: explicit steps, a gauge.
+#: Compilers and systems whose headers differ by more than names: an explicit step, and a gauge.
 HEADERS = [("g++", "rigid_body"), ("clang++", "pendulum_euler")]
 
 
@@ -78,20 +80,22 @@ def test_header_compiles_as_cpp(name, compiler, sources):
     run([tool(compiler), *_CPP_FLAGS.split(), "-fsyntax-only", "user.cpp"], sources)
 
 
-#: Where constants of several enumerations meet in C++ 20, compilers ask whether that is meant.
+#: Compilers and standards. In C++20 compilers warn of arithmetic with constants of different enumerations.
 STANDARDS = [*product(["g++", "clang++"], ["c++17", "c++20"])]
 
 
 @pytest.mark.parametrize(("compiler", "standard"), slow_but(STANDARDS[:1], STANDARDS))
 def test_all_c_is_cpp_as_well(compiler, standard, tmp_path):
-    """As where a project compiles all its files so, or as Microsoft's compiler, which has no restrict in brackets."""
+    """Some projects compile C files as C++, as Microsoft's compiler does by default; it has no ``restrict`` in brackets
+    of arrays.
+    """
     solvers = sorted(GENERATED.glob("*/*.c"))
     after = "#include <stdlib.h>\nint restrict = 0; /* a macro no longer */\n"
     write(tmp_path, {"all.cpp": "".join(f'#include "{path}"\n' for path in solvers) + after})
     run([tool(compiler), f"-std={standard}", *WARNINGS, "-Wvla", "-fsyntax-only", "all.cpp"], tmp_path)
 
 
-#: A lattice, equations that are solved in lanes, an explicit step, and flows.
+#: Systems with gradients: a lattice, an implicit step in SIMD lanes, an explicit step, and a splitting.
 BACK = ["klein_gordon", "lotka_volterra", "pendulum_euler", "kepler"]
 
 
@@ -103,7 +107,8 @@ def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
     run([tool("g++"), "-x", "c++", "-std=c++20", *WARNINGS, "-fsyntax-only", "rigid_body.c"], tmp_path)
 
 
-#: Systems whose code with derivatives has the parts of others; that of the planets takes 17 s to compile.
+#: Systems whose code with derivatives has the same parts as that of others. The code of the planets takes 17 s to
+#: compile.
 LIKE_OTHERS = {*ALIKE, "planets"} - {*BACK, *QUICK}
 
 
@@ -114,8 +119,10 @@ LIKE_OTHERS = {*ALIKE, "planets"} - {*BACK, *QUICK}
     + [pytest.param(name, marks=pytest.mark.exhaustive) for name in sorted(LIKE_OTHERS)],
 )
 def test_fast_code_with_derivatives_is_cpp_as_well(name, tmp_path):
-    """By one standard of each compiler, `test_all_c_is_cpp_as_well` has both of both. clang alone says which inline
-    functions nothing calls. As C++ kernels are what they are as C, and the rest is the same in all of a kind."""
+    """Each compiler is called with one standard; `test_all_c_is_cpp_as_well` covers both standards. Only clang reports
+    inline functions that are not called. Kernels are the same in C and C++, and the runtime is the same for all systems
+    with a kind of step.
+    """
     specification = spec_of(name)
     extras = {
         "tangent": not specification.lattice,
@@ -129,7 +136,7 @@ def test_fast_code_with_derivatives_is_cpp_as_well(name, tmp_path):
 
 @pytest.mark.parametrize("compiler", slow_but(["clang"], ["gcc", "clang"]))
 def test_all_solvers_can_be_one_translation_unit(compiler, tmp_path):
-    """No name of one is a name of another, static ones and macros included."""
+    """No two solvers share a name, including static names and macros."""
     solvers = sorted(GENERATED.glob("*/*.c"))
     write(tmp_path, {"all.c": "".join(f'#include "{path}"\n' for path in solvers)})
     assert len(solvers) >= 10
@@ -137,13 +144,13 @@ def test_all_solvers_can_be_one_translation_unit(compiler, tmp_path):
 
 
 def symbols_in(path):
-    """Pairs (kind, symbol) of an object."""
+    """Return the pairs (kind, symbol) of an object file."""
     return {tuple(line.split()[-2:]) for line in run([tool("nm"), path], path.parent).splitlines()}
 
 
 @pytest.fixture(scope="session")
 def of_every_library(tmp_path_factory):
-    """The symbols that the compiler puts into a library without being asked."""
+    """Symbols that the compiler itself adds to every library."""
     folder = tmp_path_factory.mktemp("empty")
     write(folder, {"empty.c": "extern int nothing;\n"})
     run([tool("gcc"), "-fPIC", "-shared", "empty.c", "-o", "empty.so"], folder)
@@ -153,7 +160,7 @@ def of_every_library(tmp_path_factory):
 @pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize("name", NAMES)
 def test_library_has_no_state_and_needs_only_libm(name, of_every_library):
-    """No heap, no input or output, no writable globals: reentrant."""
+    """The library uses no heap, no input or output, and no writable globals: it is reentrant."""
     symbols = symbols_in(library(compiled(name))) - of_every_library
     undefined = {symbol.partition("@")[0] for kind, symbol in symbols if kind == "U"}
     assert undefined <= ALLOWED
@@ -164,7 +171,7 @@ def test_library_has_no_state_and_needs_only_libm(name, of_every_library):
 
 
 def build_exercise(compilation, folder, *command):
-    """The program of exercise.c for a system."""
+    """Compile exercise.c for a system, and return the path of the program."""
     at, name = setting(compilation), compilation.program.name
     definitions = [f"-DNAME={name}", f'-DHEADER="{name}.h"', f"-DSTEP={at.h!r}"]
     definitions.append("-DSTATE=" + ", ".join(map(repr, at.x)))
@@ -179,11 +186,11 @@ def check_with_sanitizers(compiler, compilation, folder, *without):
     run([program], folder, ASAN_OPTIONS="detect_leaks=0:detect_stack_use_after_return=1")
 
 
-#: clang puts sanitizers into code in half the time that gcc takes, and finds what those of gcc find. One for each kind
-#: of step, with stages and without.
+#: Compilers and systems, one for each kind of step, with one stage and with several. Clang needs half the time of gcc
+#: for code with sanitizers, and its sanitizers report the same faults.
 FEW = [("clang", name) for name in ("ablowitz_ladik3", "nambu_pendulum", "pendulum_euler", "rigid_body")]
-#: Kernels differ between systems, but hand on no pointers: of other systems those are here that have a kind of
-#: bi-realisation, an attitude, or many coordinates.
+#: Further systems, with other kinds of bi-realisations, an attitude, or many coordinates. Kernels, which differ between
+#: all systems, pass no pointers on.
 FURTHER_SYSTEMS = ["guiding_centre", "lagrange_top", "lotka_volterra", "pendulum", "poisson_not_hamiltonian"]
 ALL = [*FEW, *product(["clang"], FURTHER_SYSTEMS), ("gcc", "lotka_volterra"), ("gcc", "nambu_pendulum")]
 
@@ -201,8 +208,8 @@ birealisation: karasev
 runs: {r: {initial: [0.5, 0.2], step: 0.05, steps: 1}}
 """
 
-#: What few systems have, or none: splittings, whose C shares little with that of implicit steps; powers along paths;
-#: Gauss collocation in batches of members, of all unknowns and of some.
+#: Further cases: splittings, whose C shares little with that of implicit steps; powers along paths; Gauss collocation
+#: in batches of members, for all unknowns and for some.
 FURTHER = {name: lambda name=name: compiled(name, 4, "splitting") for name in ("kepler", "toda3_quadratic")}
 FURTHER |= {
     "kowalevski_top": lambda: compiled("kowalevski_top", 6, "splitting"),
@@ -222,15 +229,16 @@ def test_further_code_is_clean_under_sanitizers(case, tmp_path):
 @pytest.mark.thin(1)
 @pytest.mark.parametrize("name", slow_but(["toda3"], ["toda3", "nambu_pendulum", "pendulum_euler"]))
 def test_whole_interface_is_clean_under_valgrind(name, sources):
-    """Uninitialised memory in particular, which the sanitizers do not see."""
+    """Valgrind reports uninitialised memory, which the sanitizers do not."""
     valgrind = tool("valgrind")
     program = build_exercise(compiled(name), sources, tool("gcc"), "-std=c99", "-O1", "-g")
     run([valgrind, "--error-exitcode=9", "--quiet", "--track-origins=yes", program], sources)
 
 
-#: A graph, a chain, rows; and what the quick systems have not: Gauss collocation, splittings, forces, noise.
+#: Systems for checks of initialisation: lattices on a graph, a chain and rows of sites; then kinds of steps that the
+#: quick systems lack: Gauss collocation, splittings, forces, noise.
 INITIALISED = ["food_web", "kdv", "heisenberg"]
-#: The orders of some; with one of 8, Gauss collocation has batches of members too.
+#: Orders other than the default; at order 8, Gauss collocation has batches of members too.
 INITIALISED_AT = {"kowalevski_gauss": 8}
 FURTHER_KINDS = ["kowalevski_gauss", "satellite_wheels", "landau_lifshitz", "thermal_spin", "kepler_eccentric"]
 
@@ -238,7 +246,9 @@ FURTHER_KINDS = ["kowalevski_gauss", "satellite_wheels", "landau_lifshitz", "the
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but(INITIALISED, [*INITIALISED, *FURTHER_KINDS]))
 def test_compilers_see_that_all_is_initialised(name, tmp_path):
-    """With -O1 it looks into functions, but not as far as with more; clang asks whether all ways to a use assign."""
+    """gcc with -O1 analyses functions, but less far than with higher optimisation; clang checks whether all paths to a
+    use assign the variable.
+    """
     compilation = compiled(name, INITIALISED_AT[name]) if name in INITIALISED_AT else as_given(name)
     write(tmp_path, files(compilation, "c"))
     run([tool("gcc"), "-std=c99", "-O1", *WARNINGS, "-c", f"{name}.c", "-o", "object.o"], tmp_path)

@@ -1,4 +1,4 @@
-"""Over long times: Casimirs to round-off, energy within a window that does not grow."""
+"""Long runs conserve Casimirs to round-off, and keep the energy error within a window that does not grow."""
 
 from fractions import Fraction
 
@@ -11,30 +11,31 @@ from phigen.symbolic.expression import gradient
 
 pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 
-#: With --all; five times fewer without.
+#: Number of steps with --all; quick tests make a fifth of them.
 STEPS = 100_000
 WINDOWS = 10
 
-#: Runs that end earlier, and why.
+#: Runs with fewer steps, with the reason.
 FEWER_STEPS = {
-    ("lotka_volterra", "blow_up"): 2_550,  # the solution itself ends soon after
-    ("lotka_volterra", "takeover"): 50_000,  # two species die out like exp(−t); below 1e-308 nothing is left of them
+    ("lotka_volterra", "blow_up"): 2_550,  # the exact solution ends soon after
+    ("lotka_volterra", "takeover"): 50_000,  # two species decay like exp(−t), and underflow below 1e-308
 }
 
-#: Runs with an angle that grows for ever: the Casimirs cannot be better than the angle's own rounding.
+#: Runs with an unbounded angle: the error of Casimirs is at least the rounding error of the angle.
 GROWING = {("nambu_pendulum", "rotations")}
 
-#: The Laplace–Runge–Lenz vector turns: every symplectic method has a precession of the order of its energy error.
+#: Components of the Laplace–Runge–Lenz vector: every symplectic method rotates it slowly, at a rate of the order of its
+#: energy error.
 PRECESSING = {("kepler", "A1"), ("kepler", "A2")}
 
-#: Energies that are conserved exactly, but for rounding, have no windows to speak of: the rounding errors of 1e5 steps
-#: make a random walk, which ends some sqrt(1e5) units of the last place away and reaches out a few times as far.
+#: Bound for errors that are due to rounding only, and have no windows to compare: the rounding errors of 1e5 steps make
+#: a random walk, which ends about sqrt(1e5) units in the last place away and reaches a few times as far.
 ROUND_OFF = 2e-13
 
 
 @pytest.fixture
 def trajectory(name, run, request):
-    """A long trajectory in C."""
+    """Return a long trajectory by the solver in C."""
     compilation, steps = compiled(name), STEPS if request.config.option.all else STEPS // 5
     at, steps = setting(compilation, run), min(steps, FEWER_STEPS.get((name, run), STEPS))
     stride = max(1, steps // 4_000)
@@ -52,7 +53,9 @@ def test_what_is_conserved_stays_where_it_was(name, run, trajectory):
 
 
 def conditioning(compilation, states, parameters, casimir):
-    """Σ|x_i ∂C/∂x_i|, the largest of some states: relative rounding of x by ε changes C by ε times that."""
+    """Return the largest Σ|x_i ∂C/∂x_i| of some states: relative rounding errors ε of x change C by ε times
+    this sum.
+    """
     slopes = gradient(compilation.system.casimirs[casimir], compilation.system.coordinates)
     sizes = []
     for row in states[:: max(1, len(states) // 50)]:
@@ -62,7 +65,7 @@ def conditioning(compilation, states, parameters, casimir):
 
 
 def check_casimirs(name, run, trajectory):
-    """Constant to round-off."""
+    """Check that a Casimir is constant to round-off."""
     for casimir, casimir_values in trajectory.casimirs.items():
         scale = size_of_casimir(compiled(name), trajectory, casimir, growing=(name, run) in GROWING)
         assert np.max(np.abs(casimir_values - casimir_values[0])) <= 1e-13 * scale, casimir
@@ -82,18 +85,18 @@ def test_casimirs_are_constant_to_round_off_in_numpy(name):
 
 
 def size_of_casimir(compilation, trajectory, casimir, *, growing=False):
-    """The value of a Casimir; where that is 0, or x grows, what unit relative changes of x make of it."""
+    """Return the value of a Casimir or, if the value is 0 or x grows, the change of C by unit relative changes of x."""
     value = abs(trajectory.casimirs[casimir][0])
     if growing:
         return conditioning(compilation, trajectory.x, trajectory.parameters, casimir)
     terms = conditioning(compilation, trajectory.x[:1], trajectory.parameters, casimir)
-    if terms == 0:  # all products in it vanish at the start
+    if terms == 0:  # all products in C vanish at the start
         terms = conditioning(compilation, trajectory.x, trajectory.parameters, casimir)
     return value if value > 1e-3 * terms else terms
 
 
 def energy_scale(compilation, trajectory):
-    """The energy, or where it is nearly zero, its variation over unit relative changes of x."""
+    """Return the energy or, if it is nearly zero, its change by unit relative changes of x."""
     slopes = gradient(compilation.system.hamiltonian, compilation.system.coordinates)
     at = {**trajectory.parameters, **dict(zip(compilation.system.coordinates, trajectory.x[0].tolist(), strict=True))}
     slope = [float(d) for d in values(slopes, at)]
@@ -101,7 +104,9 @@ def energy_scale(compilation, trajectory):
 
 
 def check_energy(name, trajectory):
-    """The largest error of the last window is below 1.5 times that of the first, or both are round-off."""
+    """Check that the largest error of the last window is below 1.5 times that of the first, or that both are
+    round-off.
+    """
     error = np.abs(trajectory.energy - trajectory.energy[0]) / energy_scale(compiled(name), trajectory)
     windows = [window.max() for window in np.array_split(error[1:], WINDOWS)]
     assert windows[-1] < 1.5 * windows[0] or max(windows) <= ROUND_OFF
@@ -110,7 +115,9 @@ def check_energy(name, trajectory):
 
 
 def check_invariants(name, trajectory):
-    """Further first integrals of integrable systems, which nobody asked for, keep to a window as well."""
+    """Check that other first integrals of integrable systems, which the method does not know, stay within a
+    window too.
+    """
     compilation = compiled(name)
     rows = trajectory.x[:: len(trajectory) // 1000]
     for invariant, e in compilation.system.invariants.items():
@@ -124,7 +131,7 @@ def check_invariants(name, trajectory):
 
 
 def evaluated(compilation, e, rows, parameters):
-    """Values of an expression at many states."""
+    """Return the values of an expression at many states."""
     names = compilation.system.coordinates
     return [values([e], {**parameters, **dict(zip(names, row.tolist(), strict=True))})[0] for row in rows]
 
@@ -138,7 +145,9 @@ KINDS = ("birealisation: canonical-euler\norder: 1\n", "order: 2\n", "birealisat
 @pytest.mark.parametrize("target", [*TARGETS, "generated module"])
 @pytest.mark.parametrize("kind", KINDS, ids=["explicit", "newton", "path", "splitting"])
 def test_rounding_errors_of_sums_are_carried_along(kind, target):
-    """A free particle: h p is exact, all that is rounded is q + h p; without a carry 1,000 errors add up."""
+    """For a free particle h p is exact, and only q + h p is rounded. Without compensated summation 1,000 errors
+    add up.
+    """
     h, steps, p = 0.125, 1000, 1 / 3
     if target in TARGETS:
         end = solver(compile_text(FREE + kind), target).integrate([0.1, p], h, steps, stride=steps).x[-1, 0]

@@ -1,4 +1,4 @@
-"""Controls: brackets, bi-realisations and methods that are wrong fail the checks that generated solvers pass."""
+"""Controls: wrong brackets, bi-realisations and methods fail the checks that generated solvers pass."""
 
 import mpmath
 import numpy as np
@@ -44,12 +44,12 @@ class Rates:
 
 
 def refuted(statements):
-    """The names of the statements that do not hold."""
+    """Return the names of the refuted statements."""
     return [s.name for s in statements if s.verdict == REFUTED]
 
 
 def rk4(field, h):
-    """The classical Runge–Kutta method."""
+    """Return a step of the classical Runge–Kutta method."""
 
     def step(x):
         k1 = field(x)
@@ -62,7 +62,7 @@ def rk4(field, h):
 
 
 def kahan(field, h):
-    """Kahan's method for a quadratic field: x' = x + h (1 − ½h f'(x))⁻¹ f(x)."""
+    """Return a step of Kahan's method for a quadratic field f: x' = x + h (1 − ½h f'(x))⁻¹ f(x)."""
 
     def step(x):
         jacobian = tangent_by_differences(field, x)
@@ -73,7 +73,7 @@ def kahan(field, h):
 
 
 def flow(field, time):
-    """The exact flow, by Taylor series that mpmath finds."""
+    """Return the exact flow, by Taylor series of mpmath."""
 
     def step(x):
         return list(mpmath.odefun(lambda _, y: list(field(y)), 0, list(x), tol=mpmath.mpf(10) ** -30)(time))
@@ -104,7 +104,7 @@ FIELDS = [(("x", "y", "z"), False), (("x", "y", "-2*z"), True)]
 @pytest.mark.slow
 @pytest.mark.parametrize(("field", "poisson"), slow_but(FIELDS[:1], FIELDS))
 def test_magnetic_field_with_sources_gives_no_poisson_bracket(field, poisson):
-    """div B ≠ 0: the Jacobi identity is refuted, and not even the exact flow preserves the bracket."""
+    """With div B ≠ 0 the Jacobi identity is refuted, and the exact flow does not preserve the bracket either."""
     particle = compile_text(PARTICLE.format(*field))
     rates = Rates(particle)
     jacobi = [s for s in check_geometry(particle.system) if "Jacobi" in s.name]
@@ -120,7 +120,7 @@ def test_magnetic_field_with_sources_gives_no_poisson_bracket(field, poisson):
 
 
 def species(sign):
-    """The Lotka–Volterra system with α_j = x_j exp(sign·u_j/2), β_j with the opposite sign."""
+    """Compile the Lotka–Volterra system with α_j = x_j exp(sign·u_j/2), and β_j with the opposite sign."""
     u = {"x1": "(-x2*p_x2 - x3*p_x3)", "x2": "(x1*p_x1 - x3*p_x3)", "x3": "(x1*p_x1 + x2*p_x2)"}
     alpha, beta = ([f"{x}*exp({s}*{e}/2)" for x, e in u.items()] for s in (sign, -sign))
     listed = f"alpha: [{', '.join(alpha)}], beta: [{', '.join(beta)}]"
@@ -128,7 +128,7 @@ def species(sign):
 
 
 def body(quarter):
-    """The rigid body with the Cayley transform (1 + A/q) x (1 − A/q): q = 2 is right, the paper prints 4."""
+    """Compile the rigid body with the Cayley transform (1 + A/q) x (1 − A/q): q = 2 is right, the paper prints 4."""
     s, t = f"1/{quarter}", f"1/{quarter}**2"
     cross = ["(p_x2*x3 - p_x3*x2)", "(p_x3*x1 - p_x1*x3)", "(p_x1*x2 - p_x2*x1)"]
     dot = "(p_x1*x1 + p_x2*x2 + p_x3*x3)"
@@ -140,7 +140,7 @@ def body(quarter):
 
 
 def observed_order(compilation, x0):
-    """From halving the step, against a method known to be right."""
+    """Return the order that is observed when the step is halved, compared with a method that is known to be right."""
     kind = "log-canonical" if "exp" in str(compilation.realisation.alpha[0]) else "cayley"
     source = SPECIES if kind == "log-canonical" else BODY
     exact = solver(compile_text(f"{source}birealisation: {kind}\norder: 8\n"), "c").integrate(x0, 1 / 64, 64).x[-1]
@@ -159,7 +159,9 @@ def observed_order(compilation, x0):
     ids=["the sign of the paper", "the Cayley transform of the paper"],
 )
 def test_misprints_of_the_paper_are_no_bi_realisations(build, right, wrong, x0):
-    """Corrected they are proved and of order 2; as printed the axioms are refuted and nothing converges."""
+    """The corrected bi-realisations are proved and have order 2. The axioms refute the misprinted ones, which do not
+    converge.
+    """
     good, bad = build(right), build(wrong)
     assert refuted(check_axioms(good.system, good.realisation)) == []
     assert observed_order(good, x0) == pytest.approx(2, abs=0.1)
@@ -168,7 +170,7 @@ def test_misprints_of_the_paper_are_no_bi_realisations(build, right, wrong, x0):
 
 
 def midpoint(compilation):
-    """The system discretised by the implicit midpoint rule: α = x − ½π(x)p, β = x + ½π(x)p."""
+    """Discretise a system by the implicit midpoint rule: α = x − ½π(x)p, β = x + ½π(x)p."""
     system = compilation.system
     products = [
         " + ".join(f"({e})*p_{c}" for e, c in zip(row, system.coordinates, strict=True) if not e.is_zero)
@@ -194,7 +196,7 @@ def midpoint(compilation):
     ids=["log-canonical", "se(3)"],
 )
 def test_midpoint_rule_is_not_a_poisson_map(name, keeps_casimirs):
-    """It keeps quadratic Casimirs, and is still not Poisson: the defect is what tells."""
+    """The midpoint rule keeps quadratic Casimirs and is not Poisson: only the Poisson defect shows this."""
     compilation = compiled(name)
     at = setting(compilation)
     rule = midpoint(compilation)
@@ -220,7 +222,9 @@ def test_midpoint_rule_on_a_constant_bracket_is_a_poisson_map():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "volterra5", "lagrange_top", "so4_manakov"]))
 def test_runge_kutta_fails_every_check(name):
-    """Casimirs and energy drift, the bracket is not preserved, and there is no way back."""
+    """With Runge–Kutta, Casimirs and energy drift, the bracket is not preserved, and a step with −h does not return to
+    the start.
+    """
     compilation = compiled(name)
     at, solve = setting(compilation), solver(compilation, "c")
     rates = Rates(compilation, at.parameters)
@@ -249,7 +253,9 @@ def test_runge_kutta_fails_every_check(name):
     ids=["{x_i, x_j} = x_i x_j", "periodic lattice"],
 )
 def test_kahans_method_is_poisson_for_one_lattice_only(species, poisson):
-    """{x_i, x_j} = x_i x_j with H = Σx: preserved. The periodic Volterra lattice: not."""
+    """Kahan's method preserves the bracket {x_i, x_j} = x_i x_j with H = Σx, and does not preserve that of the periodic
+    Volterra lattice.
+    """
     compilation = species()
     rates = Rates(compilation)
     with mpmath.workdps(50):

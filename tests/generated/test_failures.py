@@ -35,7 +35,7 @@ pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 STATUSES = {"OK": 0, "NO_CONVERGENCE": 1, "SINGULAR": 2, "NOT_FINITE": 3, "BAD_ARGUMENT": 4}
 PAIR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\norder: 2\n"
 
-#: Hamiltonian, state and step size of a step that fails, and how.
+#: For each status of a failing step: Hamiltonian, state and step size.
 FAILURES = {
     # The Newton matrix is diag(1 − h/2, 1 + h/2).
     "SINGULAR": ("p*q", [1.0, 1.0], 2.0),
@@ -46,7 +46,7 @@ FAILURES = {
 
 
 def bits(x):
-    """The bytes of an array: −0 is not 0, NaN is NaN."""
+    """Return the bytes of an array, by which −0 differs from 0 and NaN is equal to NaN."""
     return np.ascontiguousarray(x).tobytes()
 
 
@@ -74,7 +74,7 @@ def test_a_failed_step_leaves_the_state(status):
 
 
 def test_a_sum_that_overflows_leaves_the_state():
-    """The position could move, the momentum cannot: neither does."""
+    """The sum of the momentum overflows and that of the position does not; neither changes."""
     text = PAIR.replace("order: 2", "order: 1") + "birealisation: canonical-euler\nhamiltonian: p**2/2 + exp(q)\n"
     compilation = compile_text(text)
     assert isinstance(compilation.program.step, Explicit)
@@ -89,7 +89,9 @@ def test_a_sum_that_overflows_leaves_the_state():
 @pytest.mark.parametrize("factor", [0.3, 0.7, 1.7])
 @pytest.mark.parametrize("name", [n for n in NAMES if not described(n)[2].path])
 def test_no_step_of_a_long_run_stalls(name, factor):
-    """Coordinates pass through zero, where rounding is large relative to them; the solve must end all the same."""
+    """Coordinates pass through zero, where rounding errors are large relative to them; the inner solve must end
+    nevertheless.
+    """
     compilation = compiled(name)
     run = list(compilation.spec.runs)[-1]
     at, raw = setting(compilation, run), RawC(compilation)
@@ -100,7 +102,7 @@ def test_no_step_of_a_long_run_stalls(name, factor):
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_step_to_a_coordinate_near_zero_does_not_stall(target):
-    """y_3 = 2.7e-8: relative to that, corrections never get below 1e-11, which is their rounding."""
+    """The solution has y_3 = 2.7e-8; corrections relative to it never fall below their rounding error, 1e-11."""
     start = [-1.017117076849337, 0.9827338521080663, 0.0001490710425976643]
     end = solver(compiled("poisson_not_hamiltonian"), target).step(start, 0.035)
     assert np.max(np.abs(end - start)) < 0.1
@@ -109,7 +111,7 @@ def test_a_step_to_a_coordinate_near_zero_does_not_stall(target):
 @pytest.mark.parametrize("factor", [10.0, 1e3, 1e8, -1e5, 1e200])
 @pytest.mark.parametrize("name", NAMES)
 def test_after_a_step_that_was_too_large_the_run_goes_on(name, factor):
-    """As if nothing had happened: the next steps are those that would have been, to round-off."""
+    """The steps after a failed step are those of a run without it, to round-off."""
     compilation = compiled(name)
     at, raw, other = setting(compilation), RawC(compilation), RawC(compilation)
     for solve in (raw, other):
@@ -127,7 +129,9 @@ def test_after_a_step_that_was_too_large_the_run_goes_on(name, factor):
 
 
 def test_a_hopeless_path_ends_early(monkeypatch):
-    """The solve of a step a thousand times too long follows no path for long: in C it took 68 long paths."""
+    """The inner solve of a step that is a thousand times too long abandons paths early; C once followed 68 long
+    paths.
+    """
     compilation = compiled("nambu_pendulum")
     raw, module = RawC(compilation), solver(compilation, "numpy").backend.module
     raw.init([0.6, 0.1, 0.7])
@@ -141,7 +145,9 @@ def test_a_hopeless_path_ends_early(monkeypatch):
 
 
 def test_a_path_of_numpy_costs_and_is_the_same_whatever_the_others_are(monkeypatch):
-    """Members whose path is done, or lost, are followed no further; the others have the bits that they have alone."""
+    """In NumPy, paths that have ended or failed are followed no further; the other members have the same bits
+    as alone.
+    """
     module = solver(compiled("nambu_pendulum"), "numpy").backend.module
     x, p = np.tile([0.6, 0.1, 0.7], (4, 1)), np.outer([0.1, 40.0, 1e9, 0.3], [1.0, 0.8, -0.5])
     rows, follow = [], module._piece
@@ -168,7 +174,9 @@ def test_differences_of_numpy_end_where_no_path_is_left(monkeypatch):
 
 @pytest.mark.parametrize("name", ["newton", "path"])
 def test_numpy_tries_again_only_where_a_guess_may_have_misled(name, monkeypatch):
-    """A member at rest has nothing to guess from; the others of an ensemble are no reason to solve for it twice."""
+    """A member at rest has no predictor, so a repeated solve would start from the same values; the other members must
+    not be solved twice because of it.
+    """
     module, tried = solver(kind(name), "numpy").backend.module, []
 
     def fail(stage, x, carry, guess):
@@ -194,7 +202,7 @@ def test_generated_numpy_refuses_numbers_that_are_none(changes):
 
 
 def test_errors_of_generated_numpy_can_be_copied():
-    """As pools of processes do."""
+    """Pools of processes copy exceptions by pickle."""
     module = solver(kind("explicit"), "numpy").backend.module
     with pytest.raises(module.StepError) as caught:
         module.integrate([[0.3, 0.4], [1e300, 0.4]], 0.1, 3)
@@ -202,13 +210,13 @@ def test_errors_of_generated_numpy_can_be_copied():
     assert (str(twin), twin.step, twin.status, twin.members) == (str(error), 0, "NOT_FINITE", (1,))
 
 
-# -- parameters with which there are no steps
+# -- parameters for which no step exists
 
 POLE = "parameters: {m: {value: 2, description: a mass}, k: {value: 1, positive: true}}\n"
 PAIR_WITH_MASS = PAIR.replace("order: 2", "hamiltonian: p**2/(2*m) + k*q**4/4")
 BODY_WITH_MASS = BODY.replace("x1**2/2", "k*x1**2/m")
 
-#: One spec of each kind of step, with coefficients that are infinite for m = 0, and whose steps need k > 0.
+#: One spec for each kind of step: coefficients are infinite for m = 0, and steps need k > 0.
 KINDS = {
     "newton": f"{POLE}{BODY_WITH_MASS}order: 4\n",
     "gauged": f"{POLE}{BODY_WITH_MASS}order: 4\ncasimirs: {{C: x1**2 + x2**2 + x3**2}}\n",
@@ -221,7 +229,7 @@ STEPS = {"newton": Newton, "gauged": Newton, "explicit": Explicit, "path": Path,
 
 @cache
 def kind(name):
-    """The compilation of a kind of step, with its tangent map, and with a gauge where that is chosen."""
+    """Compile a kind of step with its tangent map, and with an automatic gauge if there is one."""
     specification = spec.loads(f"phigen: 1\nname: t\n{KINDS[name]}")
     compilation = compile_spec(
         specification if name == "gauged" else replace(specification, gauge="none"), tangent=True
@@ -237,7 +245,7 @@ REFUSED = ({"m": 0.0}, {"m": np.nan}, {"k": np.inf}, {"k": 0.0}, {"k": -1.0})
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("name", KINDS)
 def test_parameters_that_give_no_steps_are_refused_from_the_start(name):
-    """What was there before stands; the next start is as if nothing had happened."""
+    """A refused start leaves the solver unchanged, and the next start succeeds as usual."""
     compilation = kind(name)
     x0, raw = [0.3, 0.4, 0.5][: compilation.program.dimension], RawC(compilation)
     assert raw.init(x0) == STATUSES["OK"]
@@ -339,12 +347,12 @@ def test_missing_parameters_are_the_defaults(name):
 
 
 def members_of(name, count):
-    """States near that of the first run."""
+    """Return states near the start of the first run."""
     at = setting(compiled(name))
     return np.array([[v * (1 + 0.003 * k) + 0.001 * k for v in at.x] for k in range(count)]), at
 
 
-#: In NumPy those of each driver, which works on all members at once.
+#: Cases of the quick tests; in NumPy one system for each driver, which advances all members at once.
 QUICK_MEMBERS = [*product(["c"], NAMES), *product(["numpy"], ["rigid_body", "pendulum_euler", "nambu_pendulum"])]
 
 
@@ -363,7 +371,7 @@ def test_members_of_an_ensemble_are_trajectories(name, target):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", TARGETS)
 def test_failing_members_keep_their_last_good_state(target):
-    """One species system runs into its singularity, the others go on."""
+    """One member reaches the singularity of its solution, the others do not."""
     compilation = compile_text(SPECIES + "order: 2\n")
     start = np.array([[0.3, 0.9, 0.6], [-3.0, 5.0, 0.001], [0.5, 0.2, 0.1]])
     with pytest.raises(StepError) as single:

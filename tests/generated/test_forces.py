@@ -1,4 +1,4 @@
-"""Forces and damping: orders, leaves, targets, derivatives, and what is proved and claimed of them."""
+"""Forces and damping: orders, symplectic leaves, agreement of targets, derivatives, and which statements are proved."""
 
 from functools import cache
 
@@ -57,7 +57,7 @@ tangent: true
 """,
         [0.6, 0.9],
     ),
-    # damping has flows of its own: of the field, which turns with the time, and of each axis
+    # damping has its own flows: one of the field, which rotates with the time, and one of each axis
     "split damping": (SPIN.replace("-z -", "-z*cos(t) - 0.2*x + 0.1*z**2 -") + "scheme: splitting\n", [0.8, 0.1, 0.5]),
     "split on leaves": (
         SPIN.replace("damping: lam\n", "forces: {covector: {x: g*x*(x**2 + y**2 + z**2), y: g*y}}\n").replace(
@@ -122,7 +122,9 @@ def test_targets_agree_to_roundoff(kind):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("kind", ["damped", "covector", "path", "split damping", "split on leaves"])
 def test_covectors_keep_casimirs(kind):
-    """A force put beside the leaves, such as f for πζ, changes them at the order of the step."""
+    """A force that is not tangent to the leaves, such as f in place of πζ, changes Casimirs at the order of the
+    step.
+    """
     run = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 20_000, 100)
     assert np.ptp(run.casimirs["C"]) < 1e-13
 
@@ -130,17 +132,19 @@ def test_covectors_keep_casimirs(kind):
 def test_damping_takes_energy_down_to_the_minimum():
     energy = solver(made("damped"), "c").integrate(SYSTEMS["damped"][1], 0.1, 2_000).energy
     assert (np.diff(energy) <= 1e-15).all()
-    assert energy[-1] == pytest.approx(-np.sqrt(0.9), abs=1e-12)  # the spin along the field
+    assert energy[-1] == pytest.approx(-np.sqrt(0.9), abs=1e-12)  # at rest, the spin is along the field
 
 
-#: Damped spins in a splitting, a linear and a quadratic H, which is least at the end.
+#: Damped spins with a splitting, for a linear and a quadratic H, which is smallest at the end.
 SPUN = SPIN.replace("time: t\n", "") + "scheme: splitting\n"
 
 
 @pytest.mark.parametrize("start", [[0.8, 0.1, 0.5], [0, 0, -1], [1e-9, 0, -1], [0, 0, 0]])
 @pytest.mark.parametrize("h", [1e-3, 4.0, 200.0])
 def test_spheres_are_kept_by_steps_of_any_size_and_from_any_start(h, start):
-    """With the field, against it, beside that, and at the centre; a quotient where numbers cancel is another length."""
+    """Starts along the field, against it, close to both, and at the centre, where a quotient with cancellation would
+    change the length.
+    """
     x = solver(compile_text(SPUN), "c").integrate(start, h, 200).x
     assert np.ptp(np.linalg.norm(x, axis=1)) < 3e-14
 
@@ -160,7 +164,7 @@ def test_a_field_or_an_axis_may_vanish(text):
 
 
 def test_damping_in_a_splitting_takes_energy_in_every_step():
-    """Of the wrong sign, or with half of a part left out, it does not, or ends elsewhere."""
+    """With a wrong sign, or with half of a part missing, the energy grows or the spin ends elsewhere."""
     run = solver(compile_text(SPUN), "c").integrate([0.1, 0.2, -0.9], 0.1, 1_000, K=1.0)
     assert (np.diff(run.energy) <= 1e-15).all()
     assert run.energy[-1] == pytest.approx(-0.86 - 0.25, abs=2e-3)  # between the field and the axis
@@ -168,7 +172,7 @@ def test_damping_in_a_splitting_takes_energy_in_every_step():
 
 @pytest.mark.parametrize("kind", ["covector", "vector"])
 def test_the_energy_is_what_time_and_forces_put_in(kind):
-    """The balance has the error of the method, while the work itself is large."""
+    """The energy balance has the error of the method, while the work itself is large."""
     errors_by_step = {}
     for n in (100, 200):
         rows = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 10 / n, n)
@@ -189,7 +193,9 @@ def test_an_ensemble_takes_the_steps_of_its_members():
 @pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("kind", slow_but(["populations"], ["populations", "path"]))
 def test_verification_asks_for_what_is_promised(kind):
-    """The derivative is that of a step though ∂(∇S + hζ) is not symmetric; energy and Poisson are not judged."""
+    """The tangent map is the derivative of a step, though ∂(∇S + hζ) is not symmetric. Energy and Poisson map are not
+    required.
+    """
     solvers = {target: solver(made(kind), target) for target in ("c", "numpy")}
     verification = verify(made(kind), solvers, "test", SYSTEMS[kind][1], {}, 0.1, 50, quick=True)
     assert verification.failures == []

@@ -1,4 +1,6 @@
-"""The Casimir gauge: chosen for each trajectory, the same in both targets, and an exact Poisson map when held fixed."""
+"""The Casimir gauge: it is chosen for each trajectory, equal in C and NumPy, and with a fixed gauge the step is a
+Poisson map.
+"""
 
 import re
 from dataclasses import replace
@@ -38,7 +40,7 @@ def module(compilation):
 
 
 GAUGED = [name for name in NAMES if "init_gauge" in calls()[name]]
-#: A body, and a path.
+#: A rigid body, and a system with a path.
 QUICK = ["rigid_body", "sklyanin_gyrostat"]
 IN_BOTH = [("rigid_body", "fast"), ("rigid_body", "small"), ("sklyanin_gyrostat", "small")]
 
@@ -69,7 +71,9 @@ def test_step_is_a_poisson_map_for_a_fixed_gauge(name):
 
 
 def leading_error(name):
-    """Σ|π∇S_3|² on the samples of the solver, as a function of the gauge, and the size of the error vectors."""
+    """Return Σ|π∇S_3|² over the samples of the solver, as a function of the gauge, and the size of the error
+    vectors.
+    """
     numpy, (x, _) = module(gauged(name)), start_of(name)
     points = numpy._samples(numpy.DEFAULT_PARAMETERS, x[np.newaxis])
 
@@ -81,7 +85,7 @@ def leading_error(name):
 
 @pytest.mark.parametrize("name", GAUGED)
 def test_leading_error_is_cubic_in_the_gauge(name):
-    """So its square is the polynomial of degree six through seven values that the solver takes it for."""
+    """Its square is then a polynomial of degree six, as the solver assumes when it fits seven values."""
     vectors, gauge = leading_error(name)
     for c in range(len(gauge)):
         along = np.array([vectors(gauge + t * np.eye(len(gauge))[c]) for t in range(5)])
@@ -102,7 +106,7 @@ def test_the_gauge_chosen_is_best_along_each_axis(name):
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("away", [1e-12, 1e-3, 0.1])
 def test_a_gauge_is_found_near_steady_rotations(away, axis):
-    """Where the motion begins slowly, samples still follow it."""
+    """Near a steady rotation the motion starts slowly; samples must still cover it."""
     numpy, x = module(gauged("rigid_body")), np.full(3, away)
     x[axis] = 1.0
     points = numpy._samples(numpy.DEFAULT_PARAMETERS, x[np.newaxis])
@@ -111,7 +115,7 @@ def test_a_gauge_is_found_near_steady_rotations(away, axis):
 
 
 def test_short_code_takes_the_gauge_by_which_the_gradient_is_smallest_at_the_start():
-    """Which gains most of what the search gains."""
+    """This choice gains most of what the search of fast code gains."""
     name = "rigid_body"
     short, (x, _) = module(gauged(name, "small")), start_of(name)
     i1, i2, i3 = short.DEFAULT_PARAMETERS.values()
@@ -143,7 +147,7 @@ def test_casimirs_stay_at_roundoff(name):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("order", [2, 4, 6])
 def test_order_is_kept_and_the_error_is_smaller(order):
-    """On the free rigid body, against the flow by another method."""
+    """Compare steps of the free rigid body with the flow by another method."""
     x, _ = start_of("rigid_body")
     field = solver_of(gauged("rigid_body"), "numpy").vector_field
     reference = solve_ivp(lambda _, y: field(y), (0, 10), x, method="DOP853", rtol=2.3e-14, atol=1e-16).y[:, -1]
@@ -169,7 +173,7 @@ def test_members_of_an_ensemble_choose_for_themselves():
 
 
 def test_a_fixed_gauge_is_that_of_the_spec():
-    """H − λC discretised without a gauge is what gauge: {C: λ} makes of H."""
+    """The discretisation of H − λC without a gauge is that of H with ``gauge: {C: λ}``."""
     text = "phigen: 1\nname: t\ncoordinates: [x, y, z]\nparameters: {k: 2}\ncasimirs: {C: x**2+y**2+z**2}\norder: 4\n"
     text += "poisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}\n"
     plain = f"{text}hamiltonian: x**2/2+y**2/4+z**2/6-(x**2+y**2+z**2)*k/8\ngauge: none\n"
@@ -197,7 +201,7 @@ def test_operations_of_the_error_term_are_estimated_before_it_is_derived(name):
 
 
 def neural(terms, rest=""):
-    """Tanh terms on so(3)*, whose S_3 grows like the cube of their number."""
+    """Return a spec on so(3)* with ``terms`` terms of tanh, whose S_3 grows like the cube of their number."""
     numbers = range(terms)
     declared = ", ".join(f"{letter}{k}: {(7 * k + i) % 5 - 2.3}" for k in numbers for i, letter in enumerate("auvwc"))
     h = " + ".join(f"a{k}*tanh(u{k}*x + v{k}*y + w{k}*z + c{k})" for k in numbers)
@@ -206,7 +210,7 @@ def neural(terms, rest=""):
 
 
 def test_a_gauge_that_costs_more_than_it_gains_is_left_out_and_said(tmp_path, monkeypatch):
-    """Of eight terms S_3 has 53,000 monomials, and deriving it took a minute."""
+    """With eight terms S_3 has 53,000 monomials, and deriving it took a minute."""
     monkeypatch.setattr(HamiltonJacobi, "polynomial", lambda *_: pytest.fail("the series was derived"))
     source = spec.loads(neural(8))
     system = system_from_spec(source)

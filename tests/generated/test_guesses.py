@@ -1,4 +1,4 @@
-"""Starting guesses affect the speed of a solver, and nothing else."""
+"""Predictors (starting values of the iteration) affect the speed of a solver, and not its results."""
 
 import ctypes
 
@@ -20,7 +20,9 @@ def body():
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("stride", [1, 8, 20000])
 def test_guesses_near_a_saddle_lead_nowhere_else(body, stride):
-    """Recurrences fitted to the long rest near the middle axis may guess 1e8, where the step has a solution as well."""
+    """Recurrences fitted to the slow motion near the middle axis may predict values of 1e8, where the equation of a
+    step has a solution as well.
+    """
     for h in (0.55, 0.6, 0.7):
         energy = body.integrate([0.1, 1, 0.1], h=h, steps=20000, stride=stride).energy
         assert np.ptp(energy) < 1e-8
@@ -36,7 +38,7 @@ def test_guesses_near_a_saddle_lead_members_of_ensembles_nowhere_else(body):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("stride", [1, 8, 40])
 def test_steps_that_are_too_large_lead_nowhere_else(stride):
-    """The equation of a reversal has a solution far away too, of a hundred times the energy."""
+    """The equation of a step that reverses the motion has a second solution, of a hundred times the energy."""
     solver = solver_of(compile_text(RATTLEBACK), "c")
     with pytest.raises(StepError) as failure:
         solver.integrate([0.01, 0.5, -1], h=0.5, steps=600, stride=stride)
@@ -47,7 +49,7 @@ def test_steps_that_are_too_large_lead_nowhere_else(stride):
 
 @pytest.mark.slow
 def test_steps_in_numpy_that_lead_elsewhere_are_tried_again():
-    """Without, the energy is 700 times as large from some step on, and no step fails."""
+    """Without a second attempt, the energy is 700 times as large from some step on, and no step fails."""
     energy = solver_of(compile_text(RATTLEBACK), "numpy").integrate([0.01, 0.5, -1], h=0.45, steps=120).energy
     assert np.max(energy) < 2 * energy[0]
 
@@ -63,7 +65,9 @@ def test_steps_that_are_too_large_lead_members_of_ensembles_nowhere_else():
 
 
 def test_guesses_after_a_kick_are_of_the_motion_from_there():
-    """With what the kick changes of the slope, the step behind it converges as fast as one behind no kick."""
+    """The predictor takes the change of the slope by the kick into account: the step after it converges as fast as one
+    without a kick.
+    """
     raw = RawC(compile_spec(spec.load(resources.bundled_specs() / "rigid_body.yaml"), order=4, profile="fast"))
     assert raw.init([0.3, 1.0, 0.2]) == 0
     rng = np.random.default_rng(1)

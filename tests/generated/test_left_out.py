@@ -30,7 +30,7 @@ SYSTEMS = {
 }
 WITHOUT = [frozenset[str](), frozenset(["recurrences"]), frozenset(["lanes"]), frozenset(["members"])]
 
-#: A system, what is left out, and the profile; those of one system suffice to see what each does to the others.
+#: Cases: a system, the parts that are left out, and the profile. One system suffices for the interaction of the parts.
 FEW = [
     ("monitor, no parameters", WITHOUT[0], "fast"),
     ("monitor, no parameters", WITHOUT[0], "small"),
@@ -59,7 +59,9 @@ def test_gradients_compile_whatever_is_left_out(name, without, profile, tmp_path
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_code_compiles_with_and_without_each_part(name, tmp_path):
-    """All that is left out with gradients, one thing by turns with tangent maps; clang warns of what gcc does."""
+    """All parts are left out of code with gradients, and one part at a time of code with tangent maps; clang reports
+    the same warnings as gcc.
+    """
     turn = [*SYSTEMS].index(name)
     for without in WITHOUT:
         expect_clean(name, tmp_path, ("clang",), without=without, profile="fast", adjoint=True)

@@ -1,4 +1,4 @@
-"""Ensembles whose members have parameters, steps and times of their own: each is a trajectory of its own."""
+"""Ensembles whose members have their own parameters, steps and times: each member is a trajectory of its own."""
 
 from itertools import product
 
@@ -10,12 +10,13 @@ from phigen.errors import ParameterError, StepError
 from phigen.runtime import members as sharing
 
 DISTINCT = [name for name in NAMES if name not in ALIKE]
-#: Every kind of step: implicit with a gauge, paths, explicit, with a time, with a monitor, and code without lanes.
+#: Systems for every kind of step: implicit with a gauge, paths, explicit, with a time, with a monitor, and code without
+#: lanes.
 KINDS = ["rigid_body", "nambu_pendulum", "pendulum_euler", "spin_resonance", "kepler_eccentric", "toda3"]
 
 
 def own(compilation, count):
-    """States, steps, and what else each of so many members has of its own, by the names of the arguments."""
+    """Return the states, the steps and the other quantities of ``count`` members, by the names of the arguments."""
     at, k = setting(compilation), np.arange(count)
     parameters = {name: value * (1 + 0.003 * k) for name, value in at.parameters.items()}
     if compilation.program.time:
@@ -26,7 +27,9 @@ def own(compilation, count):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("target", "name"), slow_but(product(TARGETS, KINDS), product(TARGETS, DISTINCT)))
 def test_members_with_numbers_of_their_own_are_trajectories(name, target):
-    """To round-off; eleven are a full group of eight and one that is not. Frames are on the same ways."""
+    """Members agree with trajectories to round-off. Eleven members are a full group of eight and a group that is not
+    full; frames are computed in the same groups.
+    """
     compilation = compiled(name)
     solve, (start, h, parameters) = solver(compilation, target), own(compilation, 11)
     frames = solve.ensemble(start, h, 10, 4, **parameters)
@@ -40,7 +43,9 @@ def test_members_with_numbers_of_their_own_are_trajectories(name, target):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "scheme"), [("rigid_body", None), ("lagrange_top", "splitting")])
 def test_numbers_of_all_are_those_of_each_and_neighbours_do_not_matter(name, scheme):
-    """Bit by bit where steps are explicit; implicit ones are iterated until the slowest of a group is solved."""
+    """Explicit steps have the same bits. Implicit ones are iterated until the slowest member of a group has
+    converged.
+    """
     compilation = compiled(name, 4, scheme)
     solve, at = solver(compilation, "c"), setting(compilation)
     start = np.outer(1 + 0.002 * np.arange(40), at.x)
@@ -53,7 +58,7 @@ def test_numbers_of_all_are_those_of_each_and_neighbours_do_not_matter(name, sch
 
 
 def test_the_number_of_threads_changes_no_bit():
-    """More members than one call integrates; as if all were made by one."""
+    """There are more members than one call of the library integrates; the bits are those of a single call."""
     solve, (start, h, parameters) = solver(compiled("rigid_body"), "c"), own(compiled("rigid_body"), 11)
     start, h = np.tile(start, (300, 1)) * (1 + 1e-5 * np.arange(3300))[:, np.newaxis], np.tile(h, 300)
     parameters = {key: np.tile(value, 300) for key, value in parameters.items()}
@@ -75,7 +80,7 @@ def test_parts_of_ensembles_end_where_groups_do(monkeypatch):
 
 FAST = [*product(TARGETS, ["fast"])]
 
-#: Specs, with states or parameters of three members, the second of which cannot begin a step.
+#: Specs with states or parameters of three members, the second of which cannot start.
 REFUSED = {
     "monitor": ("hamiltonian: p**2/2 + a*cos(q)\nmonitor: q\n", [[1.0, 0.1], [-1.0, 0.2], [0.5, 0.3]], {}),
     "coefficient": (
@@ -110,7 +115,9 @@ def test_a_member_that_cannot_begin_leaves_the_others_their_runs(target, kind):
 @pytest.mark.parametrize(("target", "profile"), slow_but(FAST, [*FAST, ("c", "small")]))
 @pytest.mark.parametrize("scheme", ["series", "splitting"])
 def test_a_member_that_fails_has_no_frames_from_then_on(target, profile, scheme):
-    """Of four, the second runs into its singularity after 239 steps; the numbers of the last are refused."""
+    """Of four members, the second reaches the singularity of its solution after 239 steps, and the parameters of the
+    last are refused.
+    """
     solve = solver(compile_text(f"{SPECIES}order: 4\nprofile: {profile}\n", scheme=scheme), target)
     start = np.array([[0.3, 0.9, 0.6], [-3.0, 5.0, 0.001], [0.5, 0.2, 0.1]])
     h = np.array([1e-3, 1e-3, 2e-3])
@@ -166,7 +173,7 @@ def test_wrong_arguments_of_members_are_errors(arguments, error, said):
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_step_too_large_for_one_member_is_that_of_no_other(target):
-    """A step that fails is tried again, with the parameters and the step of the member that it is of."""
+    """A failed step is repeated with the parameters and the step size of the same member."""
     solve, start = solver(compiled("rigid_body"), target), [0.1, 1.0, 0.2]
     with pytest.raises(StepError) as many:
         solve.ensemble(start, [0.1, 1e3, 0.05], 10, I2=[0.9, 1.1, 1.2])
@@ -178,7 +185,9 @@ def test_a_step_too_large_for_one_member_is_that_of_no_other(target):
 
 @pytest.mark.parametrize("name", [*KINDS[:-1], "lagrange_top", "dzhanibekov", "thermal_chain"])
 def test_members_in_numpy_have_the_same_bits_beside_one_that_fails(name, monkeypatch):
-    """In the middle of a step, where guesses, carries, times, noise and attitudes have been under way for some."""
+    """A member fails in the middle of a step, when predictors, compensation terms, times, noise and attitudes of the
+    others are in use.
+    """
     compilation, others = compiled(name), np.array([0, 1, 3])
     solve, (start, h, parameters) = solver(compilation, "numpy"), own(compilation, 4)
     h = h[0] if solve.interface.noise else h
@@ -213,7 +222,9 @@ def test_members_in_numpy_have_the_same_bits_beside_one_that_fails(name, monkeyp
 
 @pytest.mark.parametrize("name", ["rigid_body", "nambu_pendulum", "duffing"])
 def test_members_whose_guess_misleads_begin_again_with_their_own_numbers(name):
-    """The first members' coefficients, parameters, steps or times in place of their own would make other steps."""
+    """With the coefficients, parameters, steps or times of the first members in place of their own, the steps would
+    differ.
+    """
     compilation, few = compiled(name), np.array([1, 3])
     module, (x, h, member_parameters) = solver(compilation, "numpy").backend.module, own(compilation, 4)
     t0 = member_parameters.pop("t0", np.zeros(4))

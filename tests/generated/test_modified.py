@@ -1,4 +1,4 @@
-"""The modified Hamiltonian in generated code: constant along trajectories to the order it claims, in both targets."""
+"""The modified Hamiltonian in generated code is constant along trajectories to its stated order, in C and NumPy."""
 
 import ctypes
 import math

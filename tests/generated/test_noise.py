@@ -1,4 +1,4 @@
-"""Noise: its random numbers, what steps make of them in every target, orders, equilibria, proofs, refusals."""
+"""Noise: random numbers, steps in every target, orders, equilibria, proofs, and refusals."""
 
 from functools import cache
 from itertools import product
@@ -80,7 +80,7 @@ def made(kind):
 
 
 def philox(counter, key, width, multipliers, weyl):
-    """Philox of J. Salmon et al. with ten rounds on four words, by integers of any size."""
+    """Return the output of Philox (J. Salmon et al.) with ten rounds on four words, computed by Python integers."""
     mask, (a, b, c, d) = 2**width - 1, counter
     for turn in range(10):
         first, second = ((k + turn * w) & mask for k, w in zip(key, weyl, strict=True))
@@ -93,7 +93,7 @@ def philox4x32(counter, key):
     return philox(counter, key, 32, (0xD2511F53, 0xCD9E8D57), (0x9E3779B9, 0xBB67AE85))
 
 
-#: Counter, key and output of philox4x32-10, from the known answers that come with Random123.
+#: Counter, key and output of philox4x32-10: known answers of the Random123 library.
 KNOWN = [
     ([0] * 4, [0] * 2, [0x6627E8D5, 0xE169C58D, 0xBC57AC4C, 0x9B00DBD8]),
     ([2**32 - 1] * 4, [2**32 - 1] * 2, [0x408F276D, 0x41C83B0E, 0xA20BC7C6, 0x6D5451FD]),
@@ -114,7 +114,9 @@ def test_the_generator_gives_the_known_answers(counter, key, expected):
 
 
 def test_the_rounds_are_those_of_numpy():
-    """NumPy has Philox with words of 64 bits, which differs in width and constants only; it counts before it draws."""
+    """NumPy has Philox with words of 64 bits, which differs in width and constants only. It increments the counter
+    before it draws.
+    """
     counter, key = (np.array(words, dtype=np.uint64) for words in ([0, 2**40, 3, 2**64 - 1], [7, 2**63 + 1]))
     numpy_generator = np.random.Philox(key=key, counter=counter)
     constants = (0xD2E7470EE14C6C93, 0xCA5A826395121157), (0x9E3779B97F4A7C15, 0xBB67AE8584CAA73B)
@@ -124,7 +126,7 @@ def test_the_rounds_are_those_of_numpy():
 
 
 def normals(seed, member, step, count):
-    """The variates of a step, from the words of the generator."""
+    """Return the normal variates of a step, from the words of the generator."""
     drawn_numbers = []
     for pair in range((count + 1) // 2):
         a, b, c, d = philox4x32([step % 2**32, step >> 32, member, pair], [seed % 2**32, seed >> 32])
@@ -134,7 +136,7 @@ def normals(seed, member, step, count):
     return np.array(drawn_numbers[:count])
 
 
-#: p_i = −Σ ΔW_i: momenta show the numbers.
+#: A system with p_i = −Σ ΔW_i: its momenta are the sums of the random numbers.
 BARE = """coordinates: [q1, q2, q3, p1, p2, p3]
 poisson: {canonical: {q: [q1, q2, q3], p: [p1, p2, p3]}}
 hamiltonian: q1**2*0
@@ -162,7 +164,7 @@ def test_the_numbers_are_normal_and_bounded():
         assert np.mean(drawn**power) == pytest.approx(moment, abs=5 * np.std(drawn**power) / np.sqrt(drawn.size))
     assert np.abs(drawn).max() < MAX_NORMAL_VARIATE
     still = SimpleNamespace(**vars(module))
-    zero = [np.zeros(1, dtype=np.uint64)] * 4  # the rarest: log of 2^-54
+    zero = [np.zeros(1, dtype=np.uint64)] * 4  # the smallest uniform number: log of 2^-54
     module._philox, original = (lambda counter, key: zero), module._philox
     try:
         assert module._normals(0, np.zeros(1, dtype=int), 0)[0, 0] == MAX_NORMAL_VARIATE
@@ -219,7 +221,9 @@ def test_steps_without_increments_are_those_without_noise(kind):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_a_path_does_not_depend_on_how_it_is_cut(target):
-    """By members, by calls, through a file, after a failure of others: the same bits."""
+    """The division of a run by members, by calls, by a file, or by failures of other members does not change the bits
+    of a path.
+    """
     one, x0 = solver(made("thermal"), target), np.array(SYSTEMS["thermal"][1])
     whole = one.integrate(x0, 0.1, 60, seed=9, member=4)
     session = one.backend.start(x0, dict(whole.parameters), draws=SimpleNamespace(seed=9, member=4, step=0))
@@ -236,7 +240,7 @@ def test_a_path_does_not_depend_on_how_it_is_cut(target):
     assert halves == pytest.approx(states, abs=1e-14)
 
 
-#: Prints the bits of all members.
+#: Program that prints the bits of all members.
 THREADS = """
 #include <stdio.h>
 #include "t.c"
@@ -281,7 +285,7 @@ def test_the_strong_order_is_reached(kind):
 
 
 def wrong(kind, *, drift=0.0, spread=1.0):
-    """A solver whose reference has another drift (in units of the state) or another amplitude of the noise."""
+    """Return a solver whose reference has another drift (in units of the state) or another amplitude of the noise."""
     right = solver(made(kind), "c")
     backend = SimpleNamespace(
         vector_field=lambda x, p, t=None: right.backend.vector_field(x, p, t) + drift * x,
@@ -292,7 +296,9 @@ def wrong(kind, *, drift=0.0, spread=1.0):
 
 @pytest.mark.parametrize("off", [{"drift": 0.5}, {"spread": 1.1}], ids=["Itô", "amplitude"])
 def test_noise_in_another_sense_has_no_strong_order(off):
-    """Itô's dm = … + Σ X dW has the drift −½ Σ (X·∇)X = 2λT m in Stratonovich's sense, half of m with these numbers."""
+    """In the Itô sense, dm = … + Σ X dW has the Stratonovich drift −½ Σ (X·∇)X = 2λT m, which is half of m with these
+    numbers.
+    """
     parameters = {"lam": 0.5, "T": 0.5, "B": 1.0}
     observed_order = strong_order(wrong("thermal", **off), np.array([0, 0.6, 0.8]), parameters, 0.0, 0.1, 4, 32)
     assert observed_order < 0.25
@@ -300,14 +306,16 @@ def test_noise_in_another_sense_has_no_strong_order(off):
 
 @cache
 def nodes(sources):
-    """Nodes (points, sources) and weights of the Gauss–Hermite rule of degree 13 for normal variates."""
+    """Return nodes (points, sources) and weights of the Gauss–Hermite rule of degree 13 for normal variates."""
     points, weights = np.polynomial.hermite_e.hermegauss(7)
     combinations = product(zip(points, weights / weights.sum(), strict=True), repeat=sources)
     return tuple(np.array(part) for part in zip(*(zip(*pairs, strict=True) for pairs in combinations), strict=True))
 
 
 def mean_map(compilation, h):
-    """E of a step of linear motion, a matrix: no random numbers, all of the increments by quadrature."""
+    """Return the expectation of a step of linear motion, a matrix; the average over the increments is computed by
+    quadrature, without random numbers.
+    """
     program, module = compilation.program, solver(compilation, "numpy").backend.module
     points, weights = nodes(program.noise.draws)
     dw = np.sqrt(h / program.noise.parts) * points
@@ -327,7 +335,7 @@ noise: {k: {hamiltonian: (q**2 + p**2)/2, amplitude: 0.5}, l: {hamiltonian: q**2
     "spin": SPIN + HEAT,
 }
 
-#: Friction is a part of the splitting, beside H.
+#: An oscillator with friction, which is one part of the splitting.
 LANGEVIN = LINEAR["oscillator"] + "forces: {vector: {p: -0.3*p}}\nscheme: splitting\n"
 
 SPLIT = (
@@ -339,7 +347,7 @@ noise: {x: {hamiltonian: x, amplitude: 0.7}, y: {hamiltonian: y, amplitude: 0.9}
 
 
 def generator(compilation):
-    """A + ½ Σ B², the matrix of dE[x]/dt, of linear motion."""
+    """Return A + ½ Σ B², the matrix of dE[x]/dt for linear motion."""
     integrator, eye = solver(compilation, "numpy"), np.eye(compilation.program.dimension)
     fields = np.moveaxis(integrator.noise_fields(eye), 1, 0)
     return integrator.vector_field(eye).T + sum(b.T @ b.T for b in fields) / 2
@@ -347,7 +355,9 @@ def generator(compilation):
 
 @pytest.mark.parametrize(("text", "order"), [*((text, 1) for text in LINEAR.values()), (SPLIT, 2), (LANGEVIN, 2)])
 def test_the_weak_order_is_reached(text, order):
-    """Were both halves of a step of a splitting of one increment, sources that do not commute had order 1 only."""
+    """If both halves of a step of a splitting used one increment, the order would be 1 for sources that do not
+    commute.
+    """
     compilation = compile_text(text)
     exact = expm(generator(compilation))
     coarse, fine = (np.abs(np.linalg.matrix_power(mean_map(compilation, 1 / n), n) - exact).max() for n in (8, 16))
@@ -360,7 +370,9 @@ def test_the_weak_order_is_reached(text, order):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("scheme", "h"), [("series", 0.1), ("splitting", 0.5)])
 def test_a_spin_in_a_bath_has_the_magnetisation_of_langevin(scheme, h):
-    """⟨m⟩ = coth(B/T) − T/B; half of the variance of the noise is told from that. Splittings are of weak order 2."""
+    """The magnetisation is ⟨m⟩ = coth(B/T) − T/B. The test would see a noise of half the variance. Splittings have weak
+    order 2.
+    """
     integrator = solver(compile_text(SYSTEMS["thermal"][0] + f"scheme: {scheme}\n"), "c")
     members = 4_000
     starts, beta = np.tile([0.0, 0.6, 0.8], (members, 1)), 2.0
@@ -442,7 +454,7 @@ def test_verification_asks_for_what_is_promised(kind):
         "tangent map against differences",
         "steps that fail with the largest increments",
     } <= required
-    assert ("Poisson defect, exact tangent" in required) == (kind != "thermal")  # there forces act
+    assert ("Poisson defect, exact tangent" in required) == (kind != "thermal")  # forces act in the thermal system
 
 
 def test_no_panel_of_a_report_sets_noise_beside_a_method_that_takes_none():
@@ -469,7 +481,7 @@ def test_what_cannot_be_done_is_refused(more, message):
 
 
 def test_one_sided_steps_are_refused():
-    """They take the noise at an end of the step, which is not Stratonovich's sense."""
+    """They evaluate the noise at one end of the step, which is not the Stratonovich sense."""
     with pytest.raises(SpecError, match="noise needs a symmetric bi-realisation; canonical-euler is not"):
         compile_text(LINEAR["oscillator"] + "birealisation: canonical-euler\n")
 
@@ -495,7 +507,7 @@ def test_arguments_of_noise_are_checked():
 
 
 def test_states_at_times_are_those_after_whole_steps():
-    """A part of a step has other random numbers than the whole: its end is not on the path."""
+    """A shorter step has other random numbers than a whole step, so its end is not on the path."""
     run = solver(made("thermal"), "numpy").integrate([0, 0, 1], 0.1, 6, 2, seed=3)
     assert run.at([0.4, 0.2]).tolist() == [run.x[2].tolist(), run.x[1].tolist()]
     for between in (0.1, 0.25):

@@ -1,4 +1,4 @@
-"""Observed orders are the stated ones, on non-linear problems."""
+"""Observed orders equal the stated ones, on non-linear problems."""
 
 from itertools import product
 
@@ -9,14 +9,15 @@ from support import BODY, SPECIES, compile_text, slow_but, solver
 
 from phigen.scheme.steps import Explicit, Newton
 
-#: Below this the error is that of the reference and of rounding.
+#: Errors below this are due to the reference and to rounding.
 FLOOR = 1e-13
 
 PAIR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
 ROD = PAIR + "hamiltonian: p**2/2 - cos(q)\n"
 BEAD = PAIR + "hamiltonian: p**2*(1 + q**2)/2 - cos(q)\n"  # not separable
 
-#: One-sided in the logarithms of x and y, whose bracket is canonical: not symmetric, and not of the catalogue.
+#: A system whose bi-realisation is one-sided in the logarithms of x and y, where the bracket is canonical: it is not
+#: symmetric, and not in the catalogue.
 GRAZING = """coordinates: [x, y]
 poisson: {log_canonical: [[0, 1], [-1, 0]]}
 hamiltonian: x + y - 2*log(x) - log(y) + x*y/5
@@ -25,7 +26,7 @@ birealisation: {kind: custom, alpha: [x, y*exp(x*p_x)], beta: [x*exp(y*p_y), y]}
 
 
 def order_of(compilation, x0, time):
-    """The slope between n and 2n steps, with n as large as rounding permits."""
+    """Return the slope of the error between n and 2n steps, with n as large as rounding permits."""
     solve = solver(compilation, "c")
     flow = solve_ivp(lambda _, x: solve.vector_field(x), (0, time), x0, method="DOP853", rtol=2.3e-14, atol=1e-16)
 
@@ -83,7 +84,7 @@ def test_a_custom_realisation_that_is_not_symmetric_has_every_order(order):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("text", [BODY, SPECIES], ids=["rigid body", "Lotka–Volterra"])
 def test_one_term_of_a_symmetric_method_is_the_second_order_already(text):
-    """PHI-1 of the paper is its PHI-2: both have order 2."""
+    """For a symmetric method, PHI-1 of the paper is equal to its PHI-2: both have order 2."""
     one, two = (solver(compile_text(f"{text}terms: {k}\n"), "c") for k in (1, 2))
     assert one.order == two.order == 2
     x0 = [0.3, 0.9, 0.6]

@@ -1,4 +1,4 @@
-"""Ensembles of splittings and explicit steps: members in packs do what single trajectories do."""
+"""Ensembles of splittings and explicit steps: members in SIMD batches agree with single trajectories."""
 
 import re
 from itertools import product
@@ -15,7 +15,8 @@ from phigen.targets.c import kernels
 
 EXERCISE = Path(__file__).with_name("packs.c")
 
-#: Splittings, and a factor of the step at which functions leave the polynomials that are used near 0.
+#: Splittings, each with a factor of the step size beyond which arguments leave the range of the small-argument
+#: polynomials.
 FAR = {
     "ablowitz_ladik3": 1,
     "henon_heiles": 1,
@@ -32,7 +33,7 @@ PAIR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
 EULER = PAIR + "birealisation: canonical-euler\norder: 1\n"
 RUN = "runs: {one: {initial: [1, 0.5], step: 0.1, steps: 1}}\n"
 
-#: Explicit steps, and units of the last place: sin has a version of its own for lanes.
+#: Explicit steps, with the allowed difference in units in the last place: sin has its own version for SIMD lanes.
 EXPLICIT = {
     "a quartic": (EULER + "hamiltonian: p**2/2 + q**4/4\n", 0),
     "a pendulum": (EULER + "hamiltonian: p**2/2 - cos(q)\n", 40),
@@ -41,7 +42,7 @@ EXPLICIT = {
 
 
 def exercise(compilation, folder, optimisation, ulps, far):
-    """Build and run packs.c for a system."""
+    """Compile and run packs.c for a system."""
     name, at = compilation.program.name, setting(compilation)
     write(folder, emit(compilation.program, "c", COMMAND, single_file=True))
     definitions = [f"-DNAME={name}", f'-DSOURCE="{name}.c"', f"-DSTEP={at.h!r}", f"-DULPS={ulps}", f"-DFAR={far}"]
@@ -51,18 +52,20 @@ def exercise(compilation, folder, optimisation, ulps, far):
     run([folder / "packs"], folder)
 
 
-SAME = {*FAR} - {"kepler"}  # whose anomaly is found by other iterations in packs
+SAME = {*FAR} - {"kepler"}  # in batches the eccentric anomaly is computed by another iteration
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but(SAME - {"ablowitz_ladik3", "spin_chain5", "volterra5"}, sorted(SAME)))
 def test_members_of_splittings_equal_single_trajectories_bit_for_bit(name, tmp_path):
-    """Where arguments are small and products are not fused; else to round-off."""
+    """The bits are equal if arguments are small and multiplications and additions are not fused; otherwise members
+    agree to round-off.
+    """
     exercise(compiled(name, 4, "splitting"), tmp_path, "-O0", 0, FAR[name])
 
 
 def test_flows_that_are_printed_in_parts_do_the_same(tmp_path, monkeypatch):
-    """Parts are functions apart, which read the coefficients of every lane."""
+    """Large flows are divided into several functions, which read the coefficients of every lane."""
     monkeypatch.setattr(kernels, "LONGEST_FUNCTION", 2)
     compilation = compiled("henon_heiles", 4, "splitting")
     (text,) = emit(compilation.program, "c", COMMAND, single_file=True).values()
@@ -87,14 +90,16 @@ def test_members_of_explicit_steps_equal_single_trajectories(kind, tmp_path):
 @pytest.mark.parametrize("name", slow_but(["toda3_quadratic"], ["kepler", "toda3_quadratic"]))
 @pytest.mark.parametrize("compiler", slow_but(["clang"], ["gcc", "clang"]))
 def test_packs_compile_without_a_warning_where_loops_cannot_be_vectorised(name, compiler, tmp_path):
-    """Not even by -Wpass-failed of clang, which forgets where a loop was when OpenMP moves it into another function."""
+    """This includes -Wpass-failed of clang, which loses the place of a loop when OpenMP moves it into another
+    function.
+    """
     write(tmp_path, emit(compiled(name, 4, "splitting").program, "c", COMMAND, single_file=True))
     strict = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror"]
     for flags in (["-O2", "-fopenmp"], ["-O3", "-march=native"]):
         run([tool(compiler), *strict, *flags, "-c", f"{name}.c", "-o", "packs.o"], tmp_path)
 
 
-#: Prints the status and the bits of all members, one of which has no state.
+#: Program that prints the status and the bits of all members, one of which has no state.
 THREADS = """
 #include <stdio.h>
 #include "{name}.c"
@@ -112,13 +117,13 @@ int main(void)
 }}
 """
 
-#: The second and the last become infinite, one after the other.
+#: Starts of members of which the second and the last become infinite, one after the other.
 BLOW_UP = np.array([[0.3, 0.9, 0.6], [-3.0, 5.0, 0.001], [0.5, 0.2, 0.1], [-2.5, 5.0, 0.001]])
 
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_members_that_blow_up_keep_their_last_states_and_disturb_nobody(target):
-    """They fail in the midst of a stretch of steps."""
+    """They fail between two checks for finite values."""
     solve = solver(compile_text(SPECIES + "order: 4\n", scheme="splitting"), target)
     with pytest.raises(StepError) as many:
         solve.ensemble(BLOW_UP, 1e-3, 400)
@@ -155,7 +160,7 @@ def test_functions_without_a_version_for_lanes_leave_members_by_themselves():
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", ["kepler", "lagrange_top", "pendulum_euler"])
 def test_threads_change_no_bit(name, tmp_path):
-    """100 members are four groups, the last of which is not full."""
+    """100 members make four groups, the last of which is not full."""
     scheme = None if name == "pendulum_euler" else "splitting"
     compilation = compiled(name, None, scheme)
     at = setting(compilation)
@@ -173,7 +178,9 @@ def test_threads_change_no_bit(name, tmp_path):
 
 @pytest.mark.parametrize("scheme", ["series", "splitting"])
 def test_what_lanes_cannot_compute_is_not_taken_for_infinite(scheme):
-    """exp(-800) is 0, but out of reach in a lane: taken for infinite, the force would be 0, and the step no failure."""
+    """exp(−800) is 0, but outside of the range of the lane version of exp. If it were taken for infinite, the force
+    would be 0, and the step would not fail.
+    """
     text = "coordinates: [q, p, c]\npoisson: {brackets: {q: {p: 1}}}\nhamiltonian: p**2/2 + q/(1 + exp(c))\norder: 2\n"
     compilation = compile_text(text, scheme=scheme)
     assert isinstance(compilation.program.step, Explicit | Splitting)
@@ -187,14 +194,15 @@ VECTORS = list(product(["gcc", "clang"], ["henon_heiles", "spin_chain5", "volter
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("compiler", "name"), slow_but([v for v in VECTORS if v[1] == "henon_heiles"], VECTORS))
 def test_steps_of_packs_become_vector_instructions(name, compiler, tmp_path):
-    """All of their arithmetic, by both compilers, with no more than -O2 and the instructions of 2013; coefficients that
-    members share are read as one number for all lanes."""
+    """Both compilers vectorise all arithmetic with -O2 and instructions of the year 2013. Coefficients that members
+    share are loaded as one number for all lanes.
+    """
     write(tmp_path, emit(compiled(name, 4, "splitting").program, "c", COMMAND, single_file=True))
     flags = ["-std=c99", "-O2", "-march=haswell", "-fno-math-errno", "-S"]
     run([tool(compiler), *flags, f"{name}.c", "-o", "packs.s"], tmp_path)
     vector, scalar, spread, function = 0, 0, 0, ""
     steps = re.compile(r".*_(?:lanes|group_(?:run|steps|advance))")
-    beside = ("_group_run", "_far_lanes")  # single steps may be part of the one; the other calls libm lane by lane
+    beside = ("_group_run", "_far_lanes")  # the first may contain single steps; the second calls libm for each lane
     for line in (tmp_path / "packs.s").read_text().splitlines():
         label = re.match(r"(\w[\w.]*):", line)
         function = label[1] if label else function
@@ -207,4 +215,4 @@ def test_steps_of_packs_become_vector_instructions(name, compiler, tmp_path):
             scalar += arithmetic[1] == "sd" and not function.endswith(beside)
     assert vector > 40
     assert scalar == 0
-    assert spread > 4  # clang spreads two of a member that joins
+    assert spread > 4  # clang broadcasts two more for a member that joins

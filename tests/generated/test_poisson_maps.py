@@ -1,4 +1,4 @@
-"""The scheme is a Poisson map, the generated code is the scheme, and both targets are the same."""
+"""The scheme is a Poisson map, and the generated code of both targets computes the scheme."""
 
 import json
 from pathlib import Path
@@ -30,12 +30,12 @@ pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 REFERENCES = json.loads(Path(__file__).parents[1].joinpath("references.json").read_text(encoding="utf-8"))["references"]
 EPSILON = 2.0**-52
 
-#: Systems whose α and β are formulas; those that follow a path are in tests/paths.
+#: Systems whose α and β are formulas; tests/paths has those that are computed by following a path.
 IN_CLOSED_FORM = [name for name in NAMES if not described(name)[2].path]
 
 
 def state_after(compilation, at, steps):
-    """The state of the C solver after some steps."""
+    """Return the state of the C solver after some steps."""
     raw = RawC(compilation)
     raw.init(at.x, at.parameters)
     assert raw.integrate(at.h, steps) == 0
@@ -47,7 +47,7 @@ def state_after(compilation, at, steps):
 
 @pytest.mark.parametrize("name", IN_CLOSED_FORM)
 def test_scheme_is_a_poisson_map(name):
-    """DΦ π DΦᵀ = π∘Φ to 1e-12 with an exact tangent map, at the beginning of a run and further on."""
+    """Check DΦ π DΦᵀ = π∘Φ to 1e-12 with an exact tangent map, at the start of a run and later."""
     compilation = compiled(name)
     at = setting(compilation)
     step = PreciseStep(compilation, at.parameters, at.h)
@@ -57,14 +57,14 @@ def test_scheme_is_a_poisson_map(name):
 
 @pytest.mark.parametrize("name", IN_CLOSED_FORM)
 def test_scheme_is_a_poisson_map_for_steps_that_are_not_small(name):
-    """The defect is that of rounding whatever the step: the map is Poisson exactly, not to some order."""
+    """The defect is due to rounding for all step sizes: the map is exactly Poisson, not to some order."""
     compilation = compiled(name)
     at = setting(compilation)
     assert PreciseStep(compilation, at.parameters, 4 * at.h).defect(at.x) <= 1e-12
 
 
 def test_tangent_map_is_the_derivative_of_the_step():
-    """Implicit differentiation against differences in many digits."""
+    """Compare implicit differentiation with differences in many digits."""
     compilation = compiled("rigid_body")
     at = setting(compilation)
     step = PreciseStep(compilation, at.parameters, 0.3)
@@ -78,7 +78,9 @@ def test_tangent_map_is_the_derivative_of_the_step():
 
 @pytest.mark.parametrize(("name", "run"), [(name, run) for name, run in RUNS if name in IN_CLOSED_FORM])
 def test_generated_steps_are_those_of_the_scheme_to_round_off(name, run):
-    """From x + carry to x + carry, after some steps, so that the starting guess is the extrapolated one."""
+    """Compare the exact sums of state and compensation term before and after a step. Some steps are made first, so that
+    the predictor extrapolates.
+    """
     compilation = compiled(name)
     at = setting(compilation, run)
     step, raw = PreciseStep(compilation, at.parameters, at.h), RawC(compilation)
@@ -92,7 +94,7 @@ def test_generated_steps_are_those_of_the_scheme_to_round_off(name, run):
             error = max(abs(computed - exact) for computed, exact, _ in pairs)
             increment = max(abs(exact - start) for _, exact, start in pairs)
             size = max(abs(start) for *_, start in pairs)
-        # The increment is rounded, not the state; a user's own α and β may cancel, though.
+        # Only the increment is rounded, not the state; the α and β of a user may have cancellation.
         bound = 8 * EPSILON * size if compilation.realisation.kind == "custom" else 16 * EPSILON * increment
         assert error <= bound + 1e-18 * size + 4e-324, f"after {steps} steps"
 
@@ -114,7 +116,7 @@ def test_generated_steps_of_high_order_are_those_of_the_scheme(order):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", NAMES)
 def test_c_and_numpy_agree(name):
-    """To 1e-13 over 100 steps; paths, which take their time in NumPy, over 20."""
+    """They agree to 1e-13 over 100 steps; for paths, which are slow in NumPy, over 20."""
     compilation = compiled(name)
     at, steps = setting(compilation), 100 if name in IN_CLOSED_FORM else 20
     ends = [
@@ -126,7 +128,7 @@ def test_c_and_numpy_agree(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_observables_agree_with_their_formulas(name):
-    """Hamiltonian, Casimirs and vector field of both targets, against many digits."""
+    """Compare Hamiltonian, Casimirs and vector field of both targets with many digits."""
     compilation = compiled(name)
     at, system = setting(compilation), compilation.system
     moved = np.array(at.x) * 1.01 + 0.003
@@ -151,7 +153,7 @@ REVERSIBLE = [name for name in NAMES if described(name)[2].symmetric]
 
 @pytest.mark.parametrize("name", REVERSIBLE)
 def test_a_step_back_undoes_a_step(name):
-    """Φ_{−h}∘Φ_h = id for symmetric bi-realisations, to round-off."""
+    """Check that Φ_{−h}∘Φ_h is the identity to round-off for symmetric bi-realisations."""
     compilation = compiled(name)
     at = setting(compilation)
     raw = RawC(compilation)
@@ -182,10 +184,10 @@ def test_one_sided_methods_are_not_reversible():
     assert np.max(np.abs(back - at.x)) > 1e-6
 
 
-# -- answers that are known
+# -- known solutions
 
 
-#: That NumPy, which takes a thousand times longer, agrees with C everywhere is another test.
+#: Cases in NumPy, which takes a thousand times longer. Another test compares NumPy with C for all systems.
 IN_NUMPY = [("numpy", name) for name in QUICK if name in REFERENCES and name in IN_CLOSED_FORM]
 IN_C = [("c", name) for name in REFERENCES]
 
@@ -205,7 +207,7 @@ EXACT = [(name, run) for name, run in RUNS if described(name)[0].runs[run].exact
 
 @pytest.mark.parametrize(("name", "run"), EXACT)
 def test_closed_form_is_followed(name, run):
-    """Within the method's error, which falls by 2^order when the step is halved."""
+    """The solution is followed within the error of the method, which falls by 2^order when the step is halved."""
     compilation = compiled(name)
     at, order = setting(compilation, run), compilation.order.order
     steps = min(compilation.spec.runs[run].steps, 200)
@@ -219,12 +221,12 @@ def test_closed_form_is_followed(name, run):
 
 
 def columns(compilation, run):
-    """The coordinates that have a closed form."""
+    """Return the coordinates that have a closed form."""
     return [i for i, c in enumerate(compilation.system.coordinates) if c in compilation.spec.runs[run].exact]
 
 
 def closed_form(compilation, run, times, at):
-    """The exact solution at some times, NaN for coordinates without one."""
+    """Return the exact solution at some times, with NaN for coordinates without a closed form."""
     formulas = compilation.spec.runs[run].exact
     coordinates = compilation.system.coordinates
     names = {**at.parameters, **{f"x0:{c}": v for c, v in zip(coordinates, at.x, strict=True)}}

@@ -1,4 +1,4 @@
-"""Short code does what fast code does, and is short."""
+"""Code of the profile small makes the steps of fast code, and is short."""
 
 import re
 from dataclasses import replace
@@ -11,7 +11,8 @@ import phigen
 from phigen import resources, spec
 from phigen.compiler import compile_spec
 
-#: One of each kind of step; how far a regular motion of 300 steps may be apart, in sizes of the state.
+#: One system for each kind of step, with the allowed difference after 300 steps of a regular motion, relative to the
+#: size of the state.
 KINDS = {
     ("rigid_body", None): 1e-14,
     ("lotka_volterra", None): 1e-14,
@@ -50,7 +51,9 @@ def test_small_code_makes_the_steps_of_fast_code(name, scheme):
     ],
 )
 def test_small_code_is_short(name, order, lines, runtime, row):
-    """With a gauge that is chosen, which most tests do without. The table of docs/generated.md has the figures."""
+    """The code includes the choice of the gauge, which most tests leave out. docs/generated.md lists the figures in a
+    table.
+    """
     specification = spec.load(resources.bundled_specs() / f"{name}.yaml")
     compilation = compile_spec(replace(specification, profile="small"), order=order)
     texts = files(compilation, "c").values()
@@ -63,7 +66,8 @@ def test_small_code_is_short(name, order, lines, runtime, row):
     assert not any(word in text for word in ("_LANES", "_block", "_group", "recurrence") for text in texts)
 
 
-#: Of each part that can be left out, a word in code that has it; what only lattices have is in tests/lattice.
+#: For each part that can be left out, a word that occurs in code with the part; tests/lattice has the parts of
+#: lattices.
 WORDS = {
     "ensemble": "_ensemble(",
     "gauge-search": "_guide(",
@@ -76,7 +80,7 @@ WORDS = {
 
 
 def described(name, profile, without=()):
-    """The compilation of a system of the corpus, gauge included, without some parts."""
+    """Compile a system of the corpus with its gauge, without some parts."""
     specification = spec.load(resources.bundled_specs() / f"{name}.yaml")
     return compile_spec(specification, order=4, profile=profile, without=without)
 
@@ -84,7 +88,7 @@ def described(name, profile, without=()):
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("part", WORDS)
 def test_a_part_can_be_left_out_of_fast_code(part):
-    """The steps are those of NumPy, which leaves it out too where it has it."""
+    """The steps agree with those of NumPy, which leaves out the part too if it has it."""
     compilation = described("rigid_body", "fast", [part])
     texts = files(compilation, "c").values()
     has = {other: any(word in text for text in texts) for other, word in WORDS.items()}
@@ -106,7 +110,7 @@ def test_a_part_can_be_left_out_of_fast_code(part):
 
 @pytest.mark.parametrize("profile", ["small", "certified"])
 def test_short_code_changes_parameters_where_the_spec_has_inputs(profile):
-    """And for a binding or an FMU, even if the spec leaves the function out; Python always needs it."""
+    """Bindings and FMUs include this function even if the spec leaves it out; Python always needs it."""
     text = "coordinates: [q, p]\nparameters: {k: 1}\npoisson: {canonical: {q: [q], p: [p]}}\n"
     text += "hamiltonian: p**2/2 + k*q**2/2\n"
     for more, has in [("", False), ("inputs: [k]\n", True), ("inputs: [k]\nwithout: [parameters]\n", False)]:

@@ -1,4 +1,4 @@
-"""Gradients of implicit steps whose Newton matrix has zeros, which are elsewhere in its transpose: random systems."""
+"""Gradients of implicit steps with a sparse Newton matrix, whose transpose has its zeros elsewhere: random systems."""
 
 import random
 
@@ -15,7 +15,9 @@ H, STEPS, WIDTH = 0.1, 10, 1e-4
 
 
 def drawn(seed, pairs):
-    """Canonical pairs with a quartic energy, in which few coordinates of different pairs meet."""
+    """Return a spec of canonical pairs with a quartic energy, in which few coordinates of different pairs occur
+    together.
+    """
     source = random.Random(seed)
     q, p = ([f"{c}{k}" for k in range(pairs)] for c in "qp")
     terms = [f"{a}**2/2" for a in p] + [f"{source.randint(1, 4)}*{a}**2/5" for a in q]
@@ -36,7 +38,9 @@ def compiled(text, lanes):
 
 
 def pivoting(compilation):
-    """The solver in C which takes no pivot for near 1: single steps and stages are solved with pivoting."""
+    """Return a solver in C that treats no pivot as close to 1, so that it solves single steps and stages with
+    pivoting.
+    """
     changed = {
         name: text.replace("_LARGEST_RECIPROCAL 1e3", "_LARGEST_RECIPROCAL 0.0")
         for name, text in files(compilation, "c").items()
@@ -47,7 +51,7 @@ def pivoting(compilation):
 
 
 def slopes(integrator, x, bar):
-    """The derivatives of bar·x(end) along the state and the parameter, by central differences."""
+    """Return the derivatives of bar · x(end) along the state and the parameter, by central differences."""
 
     def end(state, w):
         return bar @ integrator.integrate(state, H, STEPS, STEPS, w=w).x[-1]
@@ -66,7 +70,7 @@ DRAWN = [(2, 3, "order: 2\n"), (3, 3, COMPOSED), (4, 6, "order: 2\n")]
     ("seed", "pairs", "order"), [(1, 2, "order: 2\n"), *(pytest.param(*each, marks=pytest.mark.slow) for each in DRAWN)]
 )
 def test_gradients_of_sparse_implicit_steps_are_differences(seed, pairs, order):
-    """In NumPy, and in C: without lanes, in lanes, and where neither does without pivoting."""
+    """Gradients in NumPy and in C: without lanes, in lanes, and with pivoting."""
     text = drawn(seed, pairs) + order
     plain, laned = compiled(text, lanes=False), compiled(text, lanes=True)
     rng = np.random.default_rng(seed)

@@ -1,4 +1,6 @@
-"""The tangent map of generated steps: against many digits, differences, and the Poisson identity it must satisfy."""
+"""The tangent map of generated steps, compared with many digits and differences, and the Poisson identity that it
+satisfies.
+"""
 
 import ctypes
 from functools import cache
@@ -35,7 +37,7 @@ from phigen.compiler import compile_spec
 from phigen.scheme.steps import Path
 from phigen.symbolic.arrays import evaluate
 
-#: Each driver, with one stage and with several, small systems first.
+#: Systems for each driver, with one stage and with several; small systems first.
 KINDS = ("pendulum_euler", "rigid_body", "volterra5", "lagrange_top", "nambu_pendulum", "sir_epidemic")
 COMPOSED = f"{BODY}order: 6\ncomposition: kahan-li\ngauge: none\n"
 
@@ -62,7 +64,7 @@ def defect(compilation, x, image, tangent, parameters):
 
 
 def differences(step, x, width=1e-3):
-    """The derivative by central differences of order 6."""
+    """Return the derivative of a step by central differences of order 6."""
     columns = []
     for j in range(len(x)):
         total = 0.0
@@ -73,7 +75,8 @@ def differences(step, x, width=1e-3):
     return np.column_stack(columns)
 
 
-#: Of `KINDS` it follows from what comes next, where the derivative is that of a map that is one by another test.
+#: Cases of the test below. For the systems in `KINDS` the Poisson identity follows from the next test, since another
+#: test proves their map Poisson.
 FEW = [("c", name) for name in QUICK if name not in KINDS] + [("numpy", "lotka_volterra")]
 
 
@@ -134,7 +137,7 @@ def test_stages_of_a_composition_are_multiplied(target):
     assert defect(compilation, x, image, tangent, {}) <= 1e-14
     back = integrator.step_tangent(image, -0.2)[1]
     assert np.max(np.abs(back @ tangent - np.eye(3))) <= 1e-14
-    if target == "numpy":  # whose module has a loop of its own
+    if target == "numpy":  # the NumPy module has its own loop
         assert np.max(np.abs(integrator.backend.module.step_tangent(x, 0.2)[1] - tangent)) <= 1e-15
 
 
@@ -154,7 +157,7 @@ def test_gauge_is_held_fixed(target):
 
 
 def test_a_large_step_is_as_exact_as_a_small_one():
-    """The matrix is taken at the solved y, not at the last iterate."""
+    """The tangent map is evaluated at the solution y, not at the last iterate."""
     compilation = with_tangent("rigid_body")
     precise = PreciseStep(compilation, setting(compilation).parameters, 0.6)
     x = [0.2, 1.1, 0.4]
@@ -233,7 +236,7 @@ def test_generated_c_has_no_warnings(name, compiler, tmp_path):
 
 
 def test_splittings_that_turn_an_attitude_have_tangents_too():
-    """The derivative is that of the same steps without."""
+    """The derivative is that of the same steps without an attitude."""
     text = f"{BODY}profile: small\nscheme: splitting\norder: 4\ncomposition: suzuki\n"
     tangent_maps = [
         solver(text_with_tangent(text + more), "c").step_tangent([0.4, 0.9, 0.3], 0.1)

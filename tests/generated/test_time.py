@@ -1,4 +1,6 @@
-"""Hamiltonians that depend on the time: series, order and targets, compared with a pair (t, e) written by hand."""
+"""Hamiltonians that depend on the time: series, orders and targets, compared with specs in which time and energy (t, e)
+are coordinates.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -40,7 +42,7 @@ definitions: {drive: A*cos(omega*t)}
 hamiltonian: p**2/2 - cos(q) - q*drive
 """
 
-#: The same with the time and its conjugate as coordinates.
+#: The same system with the time and its conjugate e as coordinates.
 BY_HAND = """coordinates: [q, t, p, e]
 parameters: {A: 0.5, omega: 2}
 poisson: {canonical: {q: [q, t], p: [p, e]}}
@@ -64,7 +66,7 @@ hamiltonian: x + y - (1 + s*cos(omega*t))*log(x) - 1.5*log(y)
 tangent: true
 """
 
-#: All parts depend on the time: one, or three that do not commute.
+#: Spins whose parts of H all depend on the time: one part, or three that do not commute.
 SPIN = """time: t
 coordinates: [m1, m2, m3]
 poisson: {lie_algebra: {name: so(3)}}
@@ -73,13 +75,13 @@ tangent: true
 """
 DRIVEN = SPIN.replace("m1*cos(t) + m2*sin(t) + 0.4*m3*t", "m1**2*cos(t)/2 + m2**2*sin(t)/3 + m3**2*exp(-t)/4")
 
-#: Those whose code with lanes further tests use.
+#: Kinds of steps whose code with lanes other tests use.
 QUICKLY = ("path", "newton, composed", "splitting, time by itself")
 
 STARTS = {PENDULUM: [1.0, 0.0], BODY: [0.6, 0.5, 0.7], SEASONS: [0.6, 1.5]}
 STARTS |= dict.fromkeys([SPIN, DRIVEN], STARTS[BODY])
 
-#: Every kind of step: text, order, bi-realisation, composition. A splitting has a scheme in place of a bi-realisation.
+#: Every kind of step: text, order, bi-realisation (for a splitting: the scheme), composition.
 KINDS = {
     "newton": (PENDULUM, 4, "auto", "auto"),
     "newton, non-linear π": (BODY, 6, "auto", "auto"),
@@ -133,7 +135,7 @@ def terms_of(text, kind, count):
 def test_the_series_is_that_of_the_pair_typed_by_hand(kind):
     _, realisation, derived = terms_of(PENDULUM, kind, 4)
     both, whole, by_hand = terms_of(BY_HAND, "constant", 4)
-    if kind == "canonical-euler":  # the pair keeps the midpoint
+    if kind == "canonical-euler":  # the spec with (t, e) keeps the midpoint rule
         alpha = [*realisation.alpha[:1], whole.alpha[1], *realisation.alpha[1:], whole.alpha[3]]
         listed = graph_series(both.hamiltonian, alpha, both.coordinates, 4, symmetric=False)
     else:
@@ -193,7 +195,7 @@ def test_the_time_at_an_end_of_the_step_gives_order_one_only(shift):
     assert np.log2(coarse / fine) == pytest.approx(1, abs=0.1)
 
 
-#: Of code with lanes there is enough in the quick ones.
+#: Cases in C; code with lanes is covered by the quick kinds.
 IN_C = [*product(KINDS, ["small"]), *product(QUICKLY, ["fast"])]
 
 
@@ -233,7 +235,7 @@ def test_the_time_is_counted_not_added_up():
 
 
 def steps_in_two(compiled_system, first, second):
-    """The state after so many steps, with a break between them in which the session is saved."""
+    """Return the state after first + second steps; in between the session is saved and resumed."""
     session = compiled_system.backend.start(np.array([1.0, 0.0]), {"A": 0.5, "omega": 2.0}, T0)
     session.advance(H, first)
     session = compiled_system.backend.restored(session.saved(), {"A": 0.5, "omega": 2.0})
@@ -387,7 +389,7 @@ def test_splittings_are_proved_with_the_time_at_rest(kind):
 
 
 def test_a_drift_that_depends_on_the_time_rules_kicks_out():
-    """For V + e as V the conditions of these methods do not hold; it would be an order too low."""
+    """With V + e in place of V the conditions of these methods do not hold; the order would be one less."""
     heavy = PENDULUM.replace("p**2/2 - cos(q) - q*drive", "p**2/2*(1 + cos(t)/2) - cos(q)")
     for text, kind in ((PENDULUM, Nystrom), (heavy, Alternation)):
         system = system_from_spec(spec.loads(f"phigen: 1\nname: t\n{text}"))
@@ -416,7 +418,7 @@ def test_blocks_of_steps_see_the_time_of_each_step(kind):
 
 
 def evaluations(compilation, kind):
-    """How often the generating function was evaluated in 800 steps."""
+    """Return the number of evaluations of the generating function in 800 steps."""
     raw = RawC(compilation)
     assert raw.init(start_of(kind)) == 0
     assert raw.integrate(0.05, 800) == 0

@@ -1,4 +1,4 @@
-"""Loops over lanes and sites become vector instructions: compilers tell which do, so that nothing need be timed."""
+"""Loops over lanes and sites are vectorised: the reports of compilers show this without timing."""
 
 import platform
 import re
@@ -12,9 +12,9 @@ from phigen.runtime import toolchain
 
 pytestmark = pytest.mark.skipif(platform.machine() != "x86_64", reason="other processors have other vectors")
 
-#: As phigen compiles, with vectors of four numbers whatever the processor here has.
+#: Flags as phigen uses them, with vectors of four doubles on any processor.
 FLAGS = ["-std=c99", "-O3", "-march=haswell", *toolchain.TUNING_FLAGS[1:]]
-#: One for each kind of code in lanes: how it is compiled, and functions that do most of the work.
+#: For each kind of code in lanes: how it is compiled, and the functions that do most of the work.
 CASES = {
     "equations": ("rigid_body", {}, "evaluate_lanes linearise_lanes invert_lanes apply foresee group_foresee"),
     "paths": ("nambu_pendulum", {}, "curvature_lanes momentum_lanes values_lanes along_mean_lanes follow add_terms"),
@@ -29,11 +29,12 @@ CASES = {
     "pairs": ("outer_planets", {}, "pair_forces sweep1 sweep2"),
     "equations of sites": ("kdv", {}, "slope relax increment"),
 }  # fmt: skip
-#: Of the cases whose parts are composed by a method that is named: by rotations, in place of one exact flow.
+#: Compositions of some cases, by name: rotations in place of one exact flow.
 COMPOSITIONS = {"flows back": "blanes-moan"}
 
 
-#: Equations clang writes out lane by lane first, and finds the vectors in what stands there then.
+#: Cases for clang. It unrolls the equations of implicit steps into scalar code first, and vectorises the result, which
+#: its report does not show.
 CLANG = [("clang", case) for case in ("explicit", "flows", "flows back", "sites back", "pairs")]
 
 
@@ -52,7 +53,7 @@ def test_loops_over_lanes_become_vectors(compiler, case, tmp_path):
 
 
 def marked_loops(code):
-    """The function of each line with a loop that compilers are told to make vectors of."""
+    """Return, for each line with a loop that the code marks for vectorisation, the function that contains it."""
     loops, function = {}, ""
     lines = code.splitlines()
     for number, line in enumerate(lines, 1):
@@ -64,7 +65,8 @@ def marked_loops(code):
     return loops
 
 
-#: How a compiler is asked to write into a file what it did with loops, and what it says of those that became vectors.
+#: Options with which a compiler writes its report on loops into a file, and the text of the report for a vectorised
+#: loop.
 ASKED = {
     "gcc": (["-fopt-info-vec-optimized=told"], r"\.c:(\d+):\d+: optimized: loop vectorized"),
     "clang": (
@@ -75,7 +77,7 @@ ASKED = {
 
 
 def vectors(compiler, path):
-    """The lines of loops that the compiler makes vectors of."""
+    """Return the lines of loops that the compiler vectorises."""
     options, said = ASKED[compiler]
     run([tool(compiler), *FLAGS, *options, "-c", path.name, "-o", "vectors.o"], path.parent)
     return {int(line) for line in re.findall(said, (path.parent / "told").read_text(encoding="utf-8"))}
