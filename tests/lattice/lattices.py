@@ -1,4 +1,6 @@
-"""Small lattices that tests share: grids of one, two and three axes, both boundaries, graphs, pairs."""
+"""Small lattices that several tests use: grids of one, two and three axes with both kinds of boundary, graphs, and
+pairs.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,7 @@ runs:
 
 
 def spins(axes: str, boundary: str, sizes: str) -> str:
-    """Heisenberg spins in a field along z, with anisotropy."""
+    """Return the spec of Heisenberg spins in a field along z, with anisotropy."""
     bonds = " + ".join(f"{c}*{c}[{a}+1]" for a in axes.split(", ") for c in "xyz")
     return SPINS.format(axes=axes, boundary=boundary, bonds=bonds, sizes=sizes)
 
@@ -151,7 +153,7 @@ LATTICES = {
 
 
 def on_grid(cell: Cell, start: Start, expression: Expression) -> np.ndarray:
-    """An expression at every site of a periodic grid, neighbours by shifted arrays."""
+    """Return an expression at every site of a periodic grid; the values at neighbours are shifted arrays."""
     parameters = {n: v for n, v in start.parameters.items() if n not in cell.neighbours.names}
     fields = dict(zip(cell.fields, start.state, strict=True))
     for symbol, (base, offset) in cell.places(expression).items():
@@ -161,7 +163,9 @@ def on_grid(cell: Cell, start: Start, expression: Expression) -> np.ndarray:
 
 
 def with_threads(compute: Callable[[], np.ndarray]) -> Iterator[np.ndarray]:
-    """What is made with one thread of OpenMP and with several, more than cores: those wait for one another asleep."""
+    """Yield the result with one thread of OpenMP, then with more threads than cores, which wait for one another by
+    sleeping.
+    """
     try:
         library = ctypes.CDLL("libgomp.so.1")
     except OSError:

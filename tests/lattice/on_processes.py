@@ -1,4 +1,4 @@
-"""Run by mpirun: integrates lattices on all processes, one of them interrupted and gone on with."""
+"""Script for mpirun: integrate lattices on all processes. One of the runs is interrupted and resumed."""
 
 import contextlib
 import json
@@ -22,18 +22,18 @@ def interrupt(steps_done: int) -> None:
 
 
 def expect_refused(why: str, **asked: Any) -> None:
-    """A run that would overwrite another, or make it again, is refused by all processes, and changes no file."""
+    """Check that all processes refuse a run that would overwrite another one or repeat it, and that no file changes."""
     before = {path: path.read_bytes() for path in sorted(folder.iterdir())}
     MPI.COMM_WORLD.barrier()
     with pytest.raises(ValueError, match=why):
         lattice.integrate(x0, 0.2, 50, 20, **asked)
     MPI.COMM_WORLD.barrier()
     assert before == {path: path.read_bytes() for path in sorted(folder.iterdir())}
-    MPI.COMM_WORLD.barrier()  # or a process that goes on changes files that another one still looks at
+    MPI.COMM_WORLD.barrier()  # otherwise a fast process changes files that a slow one still reads
 
 
 def expect_failing_run_leaves_nothing() -> None:
-    """A run with a step that cannot be made leaves neither frames nor a checkpoint, as it cannot be gone on with."""
+    """Check that a run with a failing step leaves neither frames nor a checkpoint, as it cannot be resumed."""
     files = folder / f"failing_{count}.npy", folder / f"failing_{count}.state"
     with pytest.raises(StepError):
         lattice.integrate(x0, 1e300, 50, 1, output=files[0], checkpoints=files[1], parameters=values)
@@ -43,7 +43,7 @@ def expect_failing_run_leaves_nothing() -> None:
 
 
 folder, count = Path(sys.argv[1]), MPI.COMM_WORLD.size
-toolchain.BASE_FLAGS = tuple(json.loads((folder / "flags.json").read_text()))  # those of the tests
+toolchain.BASE_FLAGS = tuple(json.loads((folder / "flags.json").read_text()))  # the flags of the tests
 for name in sys.argv[2:]:
     solver, x0, values = pickle.loads((folder / f"{name}.pickle").read_bytes())
     lattice = DistributedLattice(solver)

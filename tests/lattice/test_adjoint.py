@@ -1,4 +1,4 @@
-"""Runs of lattices pulled back: against differences, many digits, and one another."""
+"""Pullbacks of runs of lattices, compared with differences, with arithmetic in many digits and with one another."""
 
 import os
 import signal
@@ -24,7 +24,8 @@ from phigen.symbolic.expression import topological
 H, STEPS, SITES = 0.05, 4, 6
 RING = {"bonds": np.array([[i, (i + 1) % SITES] for i in range(SITES)] + [[0, 2]])}
 
-#: Kicks, open ends with parameters at sites, several sweeps of one part, colours, graphs, pairs; the series.
+#: Lattices by name: kicks, open ends with parameters at sites, several sweeps of one part, colours, graphs, pairs; then
+#: the scheme series.
 LATTICES = {
     "fput": {},
     "xxz_disorder": {"B": 0.5 + np.arange(SITES) / 7},
@@ -38,7 +39,7 @@ LATTICES = {
 }
 
 
-#: Forces, phases at sites, and coefficients that depend on the time.
+#: A lattice with forces, phases at sites, and coefficients that depend on the time.
 DRIVEN = """phigen: 1
 name: driven
 time: t
@@ -49,13 +50,13 @@ poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/2 + (1 + A*cos(w*t + phase))*(q[i+1] - q)**2/2 + A*q**4
 forces: {vector: {p: -damp*p}}
 """
-#: No site has neighbours; derivatives along parameters, and nothing else, call sin of large arguments.
+#: A lattice without neighbours; only the derivatives along parameters call sin of large arguments.
 SWUNG = DRIVEN.replace("driven", "swung").replace(
     "(1 + A*cos(w*t + phase))*(q[i+1] - q)**2/2", "cos(q)*cos(w*t + phase)"
 )
 LATTICES["swung"] = LATTICES["swung series"] = {"w": 1.2, "phase": 2.0 + np.arange(SITES) / 5}
 LATTICES["driven"] = LATTICES["driven composed"] = {"w": 1.2, "A": 0.35, "phase": 0.2 + np.arange(SITES) / 5}
-#: Spins that are damped, whose flow is not a multiple of what it changes.
+#: Damped spins; the damping flow is not proportional to the fields that it updates.
 RELAXING = """phigen: 1
 name: relaxing
 lattice: {axes: [i], boundary: periodic}
@@ -65,7 +66,8 @@ poisson: {lie_algebra: {name: so(3)}}
 hamiltonian: -x*x[i+1] - y*y[i+1] - z
 damping: a
 """
-#: Springs along two axes, whose ends collect what springs of others give them, beside what is no spring.
+#: Springs along two axes: the ends of a spring sum the cotangents of other springs, and there are terms other than
+#: springs.
 MEMBRANE = """phigen: 1
 name: membrane
 lattice: {axes: [i, j], boundary: periodic}
@@ -74,7 +76,7 @@ parameters: {a: 0.7, b: 1.3}
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/2 + a*(q[i+1] - q)**4/4 + b*(q[i+1, j+1] - q)**2/2 - cos(q[j+1] - 2*q)
 """
-#: Parameters that are called as what loops have for themselves.
+#: Parameters with the names of local variables of generated loops.
 NAMED = """phigen: 1
 name: named
 lattice: {axes: [i], boundary: periodic}
@@ -84,7 +86,8 @@ parameters:
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: apart*p**2/2 + l*(q[i+1] - q)**2/2 + share0*whole*q**4 + j*cos(q)
 """
-#: Pairs whose sums at both sites differ by a sign, are the same, or are others; parameters called as what loops have.
+#: Pairs whose sums at the two sites differ by a sign, are equal, or are unrelated; parameters have the names of local
+#: variables of loops.
 PAIRED = """phigen: 1
 name: paired
 lattice: {pairs: all}
@@ -96,7 +99,7 @@ hamiltonian:
   sites: (p**2 + s**2)/2 + cos(q)
   pairs: own0*(cos(q[a] - q[b]) + first[a]*first[b]*sin(r[a] + r[b]))/4
 """
-#: Forces of bonds that are found once more while these go back, with parameters that have the direction of bonds.
+#: Forces of bonds that the reverse pass recomputes, with parameters that depend on the direction of bonds.
 SPRINGS = """phigen: 1
 name: springs
 lattice: {graph: bonds}
@@ -105,7 +108,8 @@ parameters: {k: {value: 1, at: bonds}, d: {value: 0.1, at: bonds}, c: 0.3}
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: {sites: p**2/2 + c*q**4, bonds: "c*k*(q[b] - q[a] - d)**2/2"}
 """
-#: Rotations about what pairs add up, whose cotangents read that; and which read the spins of the others only.
+#: Rotations about axes that are sums over pairs: the cotangents read these sums, and the sums read the spins of the
+#: other sites only.
 MEAN_FIELD = """phigen: 1
 name: mean_field
 lattice: {pairs: all}
@@ -117,7 +121,7 @@ hamiltonian: {sites: B*z, pairs: "J*(x[a]*x[b] + y[a]*y[b] + z[a]*z[b]/2)"}
 """
 LATTICES["springs fast"] = RING | {"k": 0.4 + np.arange(7) / 9, "d": np.arange(7) / 20, "c": 0.4}
 LATTICES["named fast"] = {"l": 0.3 + np.arange(SITES) / 5, "whole": 1.2, "j": 0.4}
-#: Colours, disorder at bonds and sites, and coefficients of bonds that depend on the time.
+#: A graph with colours, disorder at bonds and sites, and coefficients of bonds that depend on the time.
 DRIVEN_GRAPH = """phigen: 1
 name: driven_graph
 time: t
@@ -130,7 +134,7 @@ hamiltonian:
   bonds: -J*cos(w*t)*(x[a]*x[b] + y[a]*y[b] + z[a]*z[b]) - D*(x[a]*y[b] - y[a]*x[b])
 """
 LATTICES["driven_graph"] = RING | {"J": 0.4 + np.arange(7) / 9, "B": 0.5 + np.arange(SITES) / 7, "w": 1.2}
-#: Forces of bonds that do not read what they change, beside those at sites with functions for small arguments.
+#: Forces of bonds that do not read the fields which they update, and forces at sites with small-argument functions.
 ROTORS = """phigen: 1
 name: rotors
 lattice: {graph: bonds}
@@ -157,8 +161,9 @@ OWN = {
 }
 
 
-#: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
-#: colours and parameters at bonds, pairs. The series of several stages, and of a graph and pairs.
+#: Lattices that are tested in C, with their sizes: time and forces, colours, open ends along two axes with parameters
+#: of neighbours; a graph with colours and parameters at bonds, pairs; the series with several stages, of a graph and of
+#: pairs.
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
 IN_C |= {"heisenberg_plane fast": (3, 19), "heisenberg fast": (2, 3, 11), "dnls fast": 11}
 IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES, "driven_graph": SITES, "rotors fast": SITES}
@@ -193,7 +198,7 @@ def made(name, target="numpy"):
 
 
 def beginning(solver, sizes=SITES):
-    """Sites that are all different; planets and vortices far from one another."""
+    """Return a start in which all sites differ, with planets and vortices far from one another."""
     shape = np.empty((len(solver.interface.coordinates), *np.atleast_1d(sizes))).shape
     x = 0.3 + 0.5 * np.random.default_rng(3).random(shape)
     if solver.interface.name in ("outer_planets", "point_vortices"):
@@ -202,24 +207,24 @@ def beginning(solver, sizes=SITES):
 
 
 def arguments(solver, parameters):
-    """Parameters, and when the run begins."""
+    """Return the parameters and the start time of a run."""
     return {"parameters": parameters} | ({"t0": 0.7} if solver.interface.time else {})
 
 
 def difference(f, width=1e-3):
-    """The derivative at 0, by central differences of order 6."""
+    """Return the derivative of f at 0, by central differences of order 6."""
     return sum(w * (f(k * width) - f(-k * width)) for k, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))) / width
 
 
 def numbers(solver, parameters):
-    """All parameters but bonds, as arrays of what was given or of defaults."""
+    """Return all parameters except the bonds, as arrays of the given values or of defaults."""
     return {name: np.asarray(parameters.get(name, value)) for name, value in solver.interface.parameters.items()}
 
 
 @pytest.mark.thin(3)
 @pytest.mark.parametrize("name", LATTICES)
 def test_pullback_is_the_gradient_of_the_run(name):
-    """Along random directions of the state, and of each parameter, with a cotangent of every frame."""
+    """Compare along random directions of the state and of each parameter, with a cotangent of every frame."""
     solver, parameters, random = made(name), LATTICES[name], np.random.default_rng(5)
     x = beginning(solver)
     bar = random.normal(size=(3, *x.shape))
@@ -243,7 +248,9 @@ def test_pullback_is_the_gradient_of_the_run(name):
 
 @precisely
 def precise_end(x, alpha, beta, bar, module):
-    """The product of the last state of an FPUT ring with ``bar``, by drifts and kicks in many digits."""
+    """Return the product of the last state of an FPUT ring with ``bar``, computed by drifts and kicks in many
+    digits.
+    """
     q, p = [list(row) for row in x]
     for _ in range(STEPS):
         for part, row in module.SCHEDULE:
@@ -326,7 +333,9 @@ def test_lattices_may_have_no_members_to_pull_back():
 
 
 def weighed_tangents(solver, x, bar, stride, parameters):
-    """The derivatives of Σ bar·frames along some directions of the start, by tangent vectors; and the directions."""
+    """Return the derivatives of Σ bar·frames along some directions of the start, computed by tangent vectors, and the
+    directions.
+    """
     along = np.random.default_rng(6).normal(size=(2, *x.shape))
     products = np.array([np.sum(bar[0] * v) for v in along])
     run = solver.tangents(x, H, STEPS + 1, along, stride, **arguments(solver, parameters))
@@ -366,7 +375,9 @@ def test_functions_go_back_by_what_is_for_small_arguments_or_for_any(name, scale
 
 
 def test_fields_before_sweeps_are_found_again():
-    """So that they are not kept: rotations and scalings at each site, along bonds, of pairs, and what forces damp."""
+    """The reverse pass recomputes them by inverse flows, so that they are not stored: rotations and scalings at each
+    site, along bonds and of pairs, and damping by forces.
+    """
     for name in ("ablowitz_ladik", "volterra", "chiral_magnet", "food_web", "outer_planets", "driven", "relaxing"):
         spec = phigen.spec.loads(OWN[name]) if name in OWN else phigen.spec.load(bundled()[name])
         program = compile_spec(spec, adjoint=True).program
@@ -380,7 +391,9 @@ def test_derivatives_that_transposes_call_have_the_short_way_of_their_functions(
 
 
 def test_functions_of_what_sweeps_keep_are_called_once_on_the_way_back():
-    """|ψ|² decides how far a phase turns, and is the same before and after."""
+    """|ψ|² determines the rotation of a phase, and a flow does not change it, so the reverse pass needs one
+    evaluation.
+    """
     program = compile_spec(phigen.spec.load(bundled()["dnls"]), adjoint=True).program
     called = [
         sum(e.op in ("sin", "versin", "cos") for e in topological(kernel.roots))
@@ -400,7 +413,7 @@ hamiltonian: p**2/2 - k*q**2/2 + (q[i+1] - q)**2/8
 """
 
 
-#: The same along bonds.
+#: Fields that grow fast, along the bonds of a graph.
 UNSTABLE_GRAPH = """phigen: 1
 name: unstable
 lattice: {graph: bonds}
@@ -414,7 +427,7 @@ hamiltonian: {sites: p**2/2 - k*q**2/2, bonds: "(q[a] - q[b])**2/8"}
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("text", "parameters"), [(UNSTABLE, {}), (UNSTABLE_GRAPH, RING)], ids=["grid", "graph"])
 def test_sweeps_are_undone_over_single_steps_where_fields_grow_fast(text, parameters):
-    """Over 40 steps by a factor of 1e15: of where they began nothing is left in the end, to its last digit."""
+    """Fields grow by a factor of 1e15 in 40 steps: the last state has lost all digits of the first one."""
     spec, random = phigen.spec.loads(text), np.random.default_rng(8)
     in_c, numpy = (phigen.compile(spec, target=target, adjoint=True) for target in ("c", "numpy"))
     x, bar = random.normal(size=(2, 2, SITES))
@@ -423,7 +436,8 @@ def test_sweeps_are_undone_over_single_steps_where_fields_grow_fast(text, parame
     assert in_c_result.parameters_bar["k"] == pytest.approx(expected.parameters_bar["k"], rel=1e-12)
 
 
-#: By a factor of 1e7 in a step: what is left of a velocity does not tell what it was; along one axis, and along bonds.
+#: Velocities decrease by a factor of 1e7 in a step, so that the inverse flow loses their digits; along one axis, and
+#: along bonds.
 DAMPED = """phigen: 1
 name: damped
 time: t
@@ -450,7 +464,7 @@ def test_flows_of_a_step_are_made_anew_where_velocities_are_damped_away(text, pa
     spec, random = phigen.spec.loads(text), np.random.default_rng(8)
     in_c, numpy = (phigen.compile(spec, target=target, adjoint=True) for target in ("c", "numpy"))
     x, bar = random.normal(size=(2, 2, SITES))
-    for h in (0.01, 0.3):  # by 1.8, over single steps; and as above
+    for h in (0.01, 0.3):  # with 0.01 by a factor of 1.8, over single steps; with 0.3 as above
         in_c_result, expected = (solver.pullback(x, h, 40, bar, parameters=parameters) for solver in (in_c, numpy))
         assert in_c_result.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12, abs=1e-13)
         assert in_c_result.parameters_bar["g"] == pytest.approx(expected.parameters_bar["g"], rel=1e-12)
@@ -465,7 +479,9 @@ def same(a, b):
     ("name", "steps", "stride"), [("driven", 17, 7), ("heisenberg_plane small", 150, 60), ("driven_graph", 70, 40)]
 )
 def test_c_has_the_same_bits_for_any_memory(monkeypatch, name, steps, stride):
-    """Of steps that are made again from states that were kept, or where there is no room, from those before."""
+    """Steps are repeated from stored states or, where there is no room for these, from earlier ones; the bits are the
+    same.
+    """
     solver, random = made(name, "c"), np.random.default_rng(8)
     x = 0.3 * beginning(solver, IN_C[name])
     bar, parameters = random.normal(size=(1 + -(-steps // stride), *x.shape)), LATTICES.get(name, {})
@@ -496,7 +512,7 @@ def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
 
 
 def test_all_of_a_run_is_kept_where_steps_are_dear(monkeypatch):
-    """As those of the series are; of a longer run as much as there is room for."""
+    """Steps of the series are costly. Of a longer run, as many steps are stored as there is room for."""
     solver, segment_lengths = made("driven composed", "c"), []
     x = 0.3 * beginning(solver)
     monkeypatch.setattr(c_lattice, "MIN_TAPE_VALUES", 0)
@@ -512,7 +528,7 @@ def test_all_of_a_run_is_kept_where_steps_are_dear(monkeypatch):
     assert room(1000) == half
 
 
-#: Sizes that several threads work at; of "fput", too large for caches, they go back through several flows at once.
+#: Sizes for several threads. That of "fput" exceeds the caches, so its reverse pass uses wavefront blocking.
 LARGE = {"driven": 6000, "driven composed": 6000, "heisenberg_plane small": (80, 76), "fput": 140_000}
 LARGE |= {"driven_graph": 2000, "paired fast": 513}
 LARGE |= {"heisenberg_plane fast": (80, 76), "heisenberg fast": (40, 40, 40)}
@@ -533,13 +549,13 @@ def test_c_has_the_same_bits_for_any_threads(name):
         assert same(one.parameters_bar, results[0].parameters_bar)
     expected = made(name).pullback(x, H, 1, bar, parameters=parameters)
     assert np.allclose(results[0].x0_bar, expected.x0_bar, rtol=1e-12, atol=1e-12)
-    for parameter, value in expected.parameters_bar.items():  # sums over rows of many pieces
+    for parameter, value in expected.parameters_bar.items():  # sums over rows with many segments
         assert results[0].parameters_bar[parameter] == pytest.approx(value, rel=1e-11, abs=1e-11), parameter
 
 
 @pytest.mark.parametrize("name", ["driven", pytest.param("driven composed", marks=pytest.mark.slow)])
 def test_long_pullbacks_in_c_are_interrupted(name):
-    solver, x = made(name, "c"), np.full((2, 4000), 0.1)  # worked at by one thread
+    solver, x = made(name, "c"), np.full((2, 4000), 0.1)  # a size for one thread
     handler = signal.getsignal(signal.SIGINT)
     threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):

@@ -1,4 +1,4 @@
-"""Files of lattices: everything in them is used, or refused with its place."""
+"""Files with arrays of lattices: all their values are used, or an error names the place of what is refused."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ runs: {r: {sizes: [4], bonds: bonds.csv, initial: INITIAL, step: 0.1, steps: 4}}
 """
 NUMBERS = np.arange(8.0).reshape(2, 4)
 MASSES = "m\n1\n2\n3\n4\n"
-#: The places of the values of m, of the initial state, and of the bonds.
+#: Places (line, column) in the spec of the values of m, of the initial state, and of the bonds.
 MASS_PLACE, INITIAL_PLACE, BONDS_PLACE = (5, 77), (8, 51), (8, 31)
 
 
 def start(folder: Path, bonds: str = "a,b\n0,1\n", masses: str = MASSES, initial: str = "state.npy") -> Start:
-    """The start of the run with files of these contents beside the spec."""
+    """Return the start of the run with files of these contents next to the spec."""
     (folder / "springs.yaml").write_text(GRAPH.replace("INITIAL", initial))
     (folder / "bonds.csv").write_text(bonds)
     (folder / "m.csv").write_text(masses)
@@ -40,7 +40,7 @@ def start(folder: Path, bonds: str = "a,b\n0,1\n", masses: str = MASSES, initial
 
 
 def refusal(folder: Path, **files: str) -> tuple[tuple[int, int], str]:
-    """The place and the text of the error."""
+    """Return the place and the text of the error."""
     with pytest.raises(SpecError) as error:
         start(folder, **files)
     (diagnostic,) = error.value.diagnostics

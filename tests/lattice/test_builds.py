@@ -1,4 +1,6 @@
-"""C of lattices with derivatives compiles without a warning, in parts that few lattices have; as C++ it links."""
+"""C of lattices with derivatives compiles without warnings, for parts that few lattices have; compiled as C++
+it links.
+"""
 
 import pytest
 from support import WARNINGS, run, tool, write
@@ -12,7 +14,7 @@ GRID = "lattice: {axes: [i], boundary: periodic}\n"
 PLANE = "lattice: {axes: [i, j], boundary: open}\n"
 PAIRS, GRAPH = "lattice: {pairs: all}\n", "lattice: {graph: links}\n"
 OSCILLATORS = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
-#: The third coordinate has no brackets, so no sweep changes it.
+#: A lattice whose third coordinate has no brackets, so that no sweep updates it.
 BESIDE = "coordinates: [q, p, z]\npoisson: {canonical: {q: [q], p: [p]}}\n"
 HEISENBERG = 'coordinates: [u0, u1, u2]\npoisson: {lie_algebra: {name: "heisenberg(1)"}}\n'
 SERIES = "scheme: series\n"
@@ -41,7 +43,7 @@ def text_of(lattice):
 
 
 def expect_clean(compilation, folder, *compilers):
-    """Write the C, and compile it with all warnings as C, or as C++."""
+    """Write the C, and compile it as C or C++ with all warnings as errors."""
     write(folder, emit(compilation.program, "c", "phigen build"))
     for compiler in compilers:
         language = ["-x", "c++", "-std=c++17"] if compiler.endswith("++") else ["-std=c99"]
@@ -65,7 +67,7 @@ def test_lattices_with_parts_that_have_no_use_compile(lattice, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("lattice", LATTICES)
 def test_lattices_with_parts_that_have_no_use_compile_with_all_extras(lattice, tmp_path):
-    """clang warns of what gcc does; that looks at the code with most parts, as C and as C++."""
+    """Clang gives the warnings of gcc too; gcc compiles the code with the most parts, as C and as C++."""
     for profile, most in (("fast", EXTRAS[1]), ("small", EXTRAS[0])):
         for extras in EXTRAS:
             compilation = compile_spec(spec.loads(text_of(lattice)), **extras, profile=profile)
@@ -83,7 +85,7 @@ int main(void)
 
 
 def test_lattices_in_cpp_link_with_openmp_and_take_no_solver_for_a_bad_argument(tmp_path):
-    """All functions with a status as their value, of a lattice that splits, which has most of them."""
+    """Call all functions that return a status, of a lattice with a splitting, which has most of them."""
     text = text_of("neighbours are read in reverse alone") + "without: []\n"
     compilation = compile_spec(spec.loads(text), tangent=True, adjoint=True, profile="fast")
     files = emit(compilation.program, "c", "phigen build")
@@ -99,7 +101,7 @@ def test_lattices_in_cpp_link_with_openmp_and_take_no_solver_for_a_bad_argument(
 
 
 def functions_with_status(header):
-    """The names of such functions that take a solver, and how many arguments they have."""
+    """Return the names of the functions that return a status and take a solver, with their numbers of arguments."""
     flat = " ".join(header.split())
     for declaration in flat.split("t_status t_")[1:]:
         name, _, arguments = declaration.partition("(")

@@ -1,4 +1,4 @@
-"""Sweeps of lattices one by one over pieces of them, as processes make them that share a lattice."""
+"""Single sweeps over segments of lattices, as processes that share a lattice make them."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from systems import slow_but
 from phigen.compiler import compile_spec, emit
 from phigen.runtime.arguments import Beginning
 
-#: Chains with open and periodic ends, with colours and with functions; planes, with both kinds of ends, and a box.
+#: Chains with open and periodic ends, with colours and with elementary functions; planes with both kinds of ends, and a
+#: box.
 NAMES = ["xxz", "xxz_open", "fput", "volterra", "sheet", "cube"]
 SIZES = {"sheet": (9, 5), "cube": (7, 3, 3), "volterra": (30,)}
 
 
 def by_hand(name: str, x: np.ndarray, h: float, steps: int, seed: int) -> np.ndarray:
-    """Steps stage by stage, each in pieces that are cut at random and made in any order."""
+    """Return the state after steps made stage by stage, each in segments of random sizes and in random order."""
     integrator = solver(name, 4, "c")
     stages = integrator.backend.stages()
     session = integrator.started(Beginning(x, h, integrator.values(disorder(name, x), {}, x.shape[1:])))
@@ -32,7 +33,7 @@ def by_hand(name: str, x: np.ndarray, h: float, steps: int, seed: int) -> np.nda
 
 
 @pytest.mark.thin(2, of_all=1)
-@pytest.mark.parametrize("name", slow_but({*NAMES} - {"xxz"}, NAMES))  # with open ends it is the same and more
+@pytest.mark.parametrize("name", slow_but({*NAMES} - {"xxz"}, NAMES))  # the chain with open ends has all of its code
 def test_sweeps_by_hand_in_pieces_have_the_bits_of_steps(name: str) -> None:
     x = start(name, SIZES.get(name, (40,)))
     whole = solver(name, 4, "c").integrate(x, 0.03, 3, 3, **disorder(name, x)).x[-1]
@@ -41,7 +42,7 @@ def test_sweeps_by_hand_in_pieces_have_the_bits_of_steps(name: str) -> None:
 
 @pytest.mark.parametrize("name", [*NAMES, "charges", "magnet"])
 def test_bits_do_not_depend_on_the_frames(name: str) -> None:
-    """With steps so large that loops for small arguments do not do for all."""
+    """The steps are so large that some need full-range functions."""
     x = start(name, SIZES.get(name))
     runs = [solver(name, 4, "c").integrate(x, 0.15, 120, n, **disorder(name, x)).x[-1].tobytes() for n in (1, 7, 60)]
     assert runs[0] == runs[1] == runs[2]
@@ -49,7 +50,7 @@ def test_bits_do_not_depend_on_the_frames(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_stage_reads_no_further_than_it_says(name: str) -> None:
-    """What lies beyond its halo, and fields that it does not read there, may be anything."""
+    """Values beyond the halo of a stage, and fields that it does not read there, may be arbitrary."""
     x = start(name, SIZES.get(name, (40,)))
     integrator = solver(name, 4, "c")
     first, end = 3, 5
@@ -75,7 +76,7 @@ def test_a_stage_reads_no_further_than_it_says(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["xxz", "cube"])
 def test_planes_that_are_put_are_where_sweeps_begin(name: str) -> None:
-    """Their copies beside rows too: the first sweep has the bits that it has from a start there."""
+    """The copies in halos are set too: the first sweep has the same bits as after a start with these planes."""
     x = start(name, SIZES.get(name, (40,)))
     integrator, swept = solver(name, 4, "c"), []
     for begun in (x, 0.5 * x):

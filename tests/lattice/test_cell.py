@@ -1,4 +1,4 @@
-"""Cells: symbols of neighbours, terms of a density, forces and the field at a site."""
+"""Cells of lattices: symbols of neighbours, terms of a density, forces and the field at a site."""
 
 from __future__ import annotations
 

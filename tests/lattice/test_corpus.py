@@ -1,4 +1,4 @@
-"""The lattices that come with phigen: documented, proved, and the same as their expansions."""
+"""Bundled lattices: they are documented, proved, and equal to their expansions into ordinary specs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ from phigen.symbolic.expression import total
 from phigen.symbolic.verdict import PROVED
 
 FILES = sorted((resources.bundled_specs() / "lattices").glob("*.yaml"))
-#: The most lines of C in profile small, with the header; a monitor has a clock of its own, to save and to resume.
+#: Limits on the lines of C in profile small, including the header; code with a monitor also saves and resumes its
+#: clock.
 MOST_LINES, MOST_LINES_WITH_MONITOR = 800, 900
 PERIODIC = [f for f in FILES if "axes" in f.read_text(encoding="utf-8") and "open" not in f.read_text(encoding="utf-8")]
 
@@ -65,11 +66,11 @@ def test_short_code_is_short_for_any_number_of_sites() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 def test_short_code_with_transposes_has_no_function_that_nothing_calls(path: Path, tmp_path: Path) -> None:
-    """tests/generated/test_compilers.py has fast code."""
+    """tests/generated/test_compilers.py checks fast code."""
     spec = load(path)
     program = compile_spec(spec, profile="small", adjoint=not (spec.noise or spec.monitor)).program
     write(tmp_path, emit(program, "c", "phigen"))
-    # Only clang minds those that are inline.
+    # Only clang warns of unused inline functions.
     run([tool("clang"), "-std=c99", *WARNINGS, "-fsyntax-only", f"{path.stem}.c"], tmp_path)
 
 

@@ -1,4 +1,4 @@
-"""The expansion of a lattice into an ordinary spec, against sums over sites by plain loops and array shifts."""
+"""The expansion of a lattice into an ordinary spec, compared with sums over sites by plain loops and array shifts."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ GRIDS = [n for n, text in LATTICES.items() if "axes" in text]
 
 @cache
 def prepared(name: str) -> tuple[Spec, Cell, Start, Expansion, System]:
-    """A lattice, its first run, and both as an ordinary system."""
+    """Return a lattice, its first run, and both expanded into an ordinary system."""
     spec = loads(LATTICES[name])
     cell, start = cell_from_spec(spec), start_of(spec, next(iter(spec.runs.values())))
     expansion = expand(cell, start.sizes, start.bonds)
@@ -42,7 +42,7 @@ def prepared(name: str) -> tuple[Spec, Cell, Start, Expansion, System]:
 
 
 def values(name: str) -> dict[str, float]:
-    """Coordinates and parameters of the ordinary system, where the run starts."""
+    """Return the coordinates and parameters of the ordinary system at the start of the run."""
     _, _, start, expansion, system = prepared(name)
     return expansion.numbers(start.parameters) | dict(zip(system.coordinates, start.state.reshape(-1), strict=True))
 
@@ -181,7 +181,7 @@ def test_names_of_sites_do_not_clash_with_others() -> None:
 
 
 def random_lattice(seed: int) -> str:
-    """A lattice with a random stencil for H, on a periodic or an open grid."""
+    """Return the spec of a lattice with a random stencil for H, on a periodic or an open grid."""
     draw = random.Random(seed)
     axes = ["i", "j", "k"][: draw.choice([1, 1, 2, 3])]
 

@@ -1,4 +1,6 @@
-"""Gradients of lattices of one and two sites, whose equations GMRES solves exactly in as many directions."""
+"""Gradients of lattices of one and two sites, where GMRES solves the equations exactly in as many iterations as
+unknowns.
+"""
 
 import random
 
@@ -13,7 +15,9 @@ GRAPH, PAIRS = "{graph: links}", "{pairs: all}"
 
 
 def drawn(seed):
-    """A lattice by the series: oscillators or vortices, with a random energy of pairs or bonds."""
+    """Return the spec of a lattice with the scheme series: oscillators or vortices, with a random energy of pairs or
+    bonds.
+    """
     source = random.Random(seed)
     lattice, key = source.choice([(GRAPH, "bonds"), (PAIRS, "pairs")])
     c = source.randint(2, 9)
@@ -28,7 +32,7 @@ def drawn(seed):
 
 
 def bonds(text, sites):
-    """Both directions of the only bond there may be, for a graph."""
+    """Return both directions of the only possible bond, for a graph."""
     links = np.array([[0, 1], [1, 0]]) if sites > 1 else np.empty((0, 2), int)
     return {"bonds": links} if GRAPH in text else {}
 

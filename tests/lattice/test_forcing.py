@@ -37,14 +37,14 @@ CANONICAL = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
 BATH = "noise:\n" + "".join(f"  {c}: {{hamiltonian: {c}, amplitude: sqrt(2*l*T)}}\n" for c in "xyz")
 HEAT = "parameters: {l: {value: 0.3, positive: true}, T: {value: 0.5, at: sites, positive: true}}\n"
 FORCED = {
-    # damping of a lattice with an open end, in a field that turns
+    # damping of a lattice with open ends, in a rotating field
     "damped": "lattice: {axes: [i], boundary: open}\ntime: t\nparameters: {l: 0.3, B: {value: 0.2, at: sites}}\n"
     f'damping: l\n{SPINS}hamiltonian: "-(x*x[i+1] + y*y[i+1] + z*z[i+1]) - B*(x*cos(t) + y*sin(t))"',
-    # friction has a flow of its own, in a splitting with a vector
+    # friction has its own flow, in a splitting with a force that is a vector
     "friction": "lattice: {axes: [i], boundary: periodic}\nparameters: {g: 0.3, w: {value: 1, at: sites}}\n"
     f'forces: {{covector: {{q: g*p}}, vector: {{p: w, q: "p[i+1]/5"}}}}\n{CANONICAL}'
     'hamiltonian: "p**2/2 - cos(q[i+1] - q)"',
-    # brackets with neighbours: damping reaches twice as far
+    # brackets with neighbours: the stencil of the damping is twice as wide
     "stretched": "lattice: {axes: [i], boundary: open}\nparameters: {l: 0.3}\nscheme: series\ndamping: l\n"
     'forces: {covector: {b: "a[i+1]*l"}}\ncoordinates: [a, b]\n'
     'poisson: {brackets: {a: {b: a/2, "b[i+1]": -a/2}}}\nhamiltonian: b**2/2 + 2*a**2',
@@ -57,7 +57,7 @@ FORCED = {
 NOISY = {
     "bath": f"lattice: {{axes: [i, j], boundary: [periodic, open]}}\nscheme: series\n{HEAT}damping: l\n{BATH}{SPINS}"
     'hamiltonian: "-(x*x[i+1] + y*y[i+1] + z*z[i+1] + x*x[j+1] + y*y[j+1] + z*z[j+1])"',
-    # sites of two colours are damped one after the other, anisotropy at all of them
+    # sites of two colours are damped one after the other; the anisotropy acts on all sites
     "cool": f"lattice: {{axes: [i, j], boundary: [periodic, open]}}\n{HEAT}damping: l\n{BATH}{SPINS}"
     'hamiltonian: "-(x*x[i+1] + y*y[i+1] + z*z[i+1] + x*x[j+1] + y*y[j+1] + z*z[j+1]) - z**2/5"',
     # one part of H between the flows of the noise
@@ -93,7 +93,7 @@ def solver(name: str, order: int = 2, target: str = "numpy") -> LatticeSolver:
 
 
 def given(name: str) -> tuple[np.ndarray, dict[str, Any]]:
-    """A state, and all parameters, with the bonds."""
+    """Return a state, and all parameters including the bonds."""
     spec, sizes, random = compiled(name).spec, SIZES.get(name, (4,)), np.random.default_rng(1)
     lengths = {"sites": sizes, "bonds": (len(BONDS),), "all": ()}
     values: dict[str, Any] = {p.name: random.uniform(0.5, 1.5, lengths[p.at]) for p in spec.parameters}
@@ -116,7 +116,7 @@ def at_start(name: str) -> dict[str, Any]:
 def test_the_field_with_forces_is_that_of_the_expansion(name: str) -> None:
     whole, numbers = expansion(name)
     x, values = given(name)
-    spec = specs.loads(spec_text(whole.spec()))  # as phigen show --expand prints it
+    spec = specs.loads(spec_text(whole.spec()))  # the text that phigen show --expand prints
     here = numbers | dict(zip(spec.coordinates, x.reshape(-1), strict=True)) | at_start(name)
     field = evaluate(system_from_spec(spec).vector_field(), here)
     integrator = solver(name).vector_field(x, parameters=values, **at_start(name))
@@ -161,7 +161,7 @@ def test_what_is_claimed_is_proved(name: str) -> None:
 
 
 def increments(name: str, h: float, steps: int, draws: dict[str, int]) -> np.ndarray:
-    """The increments of all sites in the order of the sources of the expansion (steps, draws)."""
+    """Return the increments of all sites in the order of the sources of the expansion, (steps, draws)."""
     module, (x, _) = solver(name).backend._module, given(name)  # type: ignore[attr-defined]
     sites = type(
         "Sites",
@@ -249,7 +249,8 @@ def test_friction_and_noise_have_the_gibbs_measure() -> None:
     np.testing.assert_allclose((q**2).mean(), (0.7 / (3 - 2 * np.cos(waves))).mean(), rtol=0.03)
 
 
-#: One source and several parts; three that do not commute, before and after the parts of a splitting.
+#: One source of noise with several parts of H; three sources that do not commute, before and after the parts of a
+#: splitting.
 STRONG = {"langevin": (1.0, 60), "hot": (0.5, (6, 6))}
 
 
@@ -273,7 +274,9 @@ def test_steps_along_other_increments_have_no_strong_order(monkeypatch: pytest.M
 
 
 def mean_map(compiled_lattice: Compilation, h: float) -> np.ndarray:
-    """E of a step of linear motion at a site, a matrix: every site has increments of its own, all of a quadrature."""
+    """Return the expectation of a step of linear motion at a site, a matrix. Every site has its own increments;
+    together they are the nodes of a quadrature.
+    """
     points, weights = np.polynomial.hermite_e.hermegauss(5)
     noise, count = compiled_lattice.program.noise, len(compiled_lattice.program.coordinates)
     assert noise is not None
@@ -303,7 +306,9 @@ def test_the_weak_order_is_reached_on_lattices(scheme: str, order: int) -> None:
 
 @pytest.mark.parametrize("name", ["cool", "web"])
 def test_damping_by_colours_takes_energy_in_every_step_and_keeps_spins(name: str) -> None:
-    """Sites that were damped together with their neighbours, or all twice, would end elsewhere, or not step by step."""
+    """If neighbouring sites were damped at once, or all sites twice, the state would end elsewhere, or the energy would
+    grow in some step.
+    """
     (x, values), asked = given(name), {"seed": 1} if name == "cool" else {}
     values |= {n: 1e-40 for n in values if n == "T"} | {"l": 0.3}
     run = solver(name, 2, "c").integrate(x, 0.05, 400, parameters=values, **asked)
@@ -331,10 +336,11 @@ def test_an_open_chain_of_spins_has_its_energy_at_every_temperature(scheme: str)
     x /= np.sqrt((x**2).sum(axis=0))
     for T in (0.4, 1.0):
         run = chain.integrate(x, 0.1, 600, 20, seed=4, T=T, l=0.3)
-        # bonds have the Langevin function, each on its own: the variance of one is that of T² (1/T² − 1/sinh²(1/T))
+        # The energy of each bond has the distribution of a spin in a field: its variance is that of T² (1/T² −
+        # 1/sinh²(1/T)).
         energies = run.energy[10:] / 1023
         expected, variance = -(1 / np.tanh(1 / T) - T), T**2 - 1 / np.sinh(1 / T) ** 2
-        independent = 600 * 0.1 * 2 / 3 / 10  # frames that are so far apart as states remember
+        independent = 600 * 0.1 * 2 / 3 / 10  # number of independent frames: the correlation time is ten time units
         assert abs(energies.mean() - expected) < 3 * np.sqrt(variance / 1023 / independent) + 0.005
         assert np.abs(run.casimirs["C"] - 1).max() < 1e-13
 
@@ -372,7 +378,7 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
         (TEXTS["bath"].replace("hamiltonian: x,", 'hamiltonian: "x*x[i+1]",'), "names no neighbours"),
         (f"order: 4\n{TEXTS['bath']}", "steps are not composed"),
         ("scheme: splitting\n" + TEXTS["damped"].replace("damping: l", "damping: l*z"), "damping has no elementary"),
-        # with any colours, but it is not these that are in the way; and what colours cannot part
+        # Systems that are refused for other reasons than colours, and one that no colouring separates.
         (f"scheme: splitting\nlattice: {{axes: [i]}}\ndamping: 0.1\n{CANONICAL}"
          'hamiltonian: "q*q[i+1] + (q**2 + p**2)**2"',
          "on the lattice: phigen cannot solve the equation of q"),

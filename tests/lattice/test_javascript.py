@@ -1,4 +1,4 @@
-"""Lattices in JavaScript, run by Node: equal to NumPy to round-off, on the whole corpus; and what is refused."""
+"""Lattices in JavaScript, run by Node, agree with NumPy to round-off on the whole corpus; and refusals."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ scheme: series
 hamiltonian: {sites: p**2/2 + q**4/4, bonds: "200*(q[a] - q[b])**2 + q[a]*p[b]**2/9"}
 runs: {r: {bonds: [[0, 1], [1, 2], [2, 3], [3, 0], [0, 2]], initial: {random: normal, scale: 0.1}, step: 0.2, steps: 8}}
 """
-#: Names that JavaScript, or the printed loops, have for themselves.
+#: A spec with names that are reserved in JavaScript, or are local variables of printed loops.
 NAMES = """\
 phigen: 1
 name: names
@@ -57,7 +57,7 @@ poisson: {canonical: {q: [near_0], p: [count]}}
 hamiltonian: delete*count**2/2 + sites*cos(near_0[i+1] - near_0[j-1]) + sweep1*near_0**4 + coef*near_0
 runs: {r: {sizes: [3, 3], initial: {random: normal, seed: 3}, step: 0.1, steps: 8}}
 """
-#: Springs between sites, none of which is there; and a ring without brackets.
+#: Springs on a graph without bonds, and a ring without brackets.
 NO_BONDS = """\
 phigen: 1
 name: apart
@@ -77,13 +77,14 @@ poisson: {brackets: {a: {}}}
 hamiltonian: a**2/2 + a*a[i+1]
 runs: {r: {sizes: [3], initial: {a: 1 + i}, step: 0.1, steps: 4}}
 """
-#: What the corpus does not have: open ends, other schemes and orders, kicks with a modified potential, stiff steps.
+#: Specs with features that the corpus lacks: open ends, other schemes and orders, kicks with a modified potential,
+#: stiff steps.
 VARIANTS: dict[str, Callable[[], Spec]] = {
     **{name: lambda text=text: specs.loads(text) for name, text in LATTICES.items()},  # type: ignore[misc]
     "stiff": lambda: specs.loads(STIFF),
     "stiff graph": lambda: specs.loads(STIFF_GRAPH),
     "names": lambda: specs.loads(NAMES),
-    # Pairs of which H has no energy: there is nothing to add up at a site.
+    # Pairs without energy in H: there is nothing to sum at a site.
     "apart": lambda: specs.loads(
         "phigen: 1\nname: apart\nlattice: {pairs: all}\ncoordinates: [q, p]\n"
         "poisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: {sites: p**2/2 + q**4/4}\n"
@@ -96,15 +97,15 @@ VARIANTS: dict[str, Callable[[], Spec]] = {
     "kicks": lambda: replace(specs.loads(LATTICES["fput_open"]), composition="force-gradient"),
     "colours": lambda: replace(specs.loads(LATTICES["volterra"].replace("[5]", "[6]")), order=6),
 }
-#: Lattices with a time, and with forces.
+#: Lattices with time dependence, and with forces.
 DRIVEN = {f"{name}, in time": (test_time, name) for name in test_time.TEXTS}
 DRIVEN |= {f"{name}, forced": (test_forcing, name) for name in test_forcing.FORCED}
 DRIVEN |= {f"{name}, noisy": (test_forcing, name) for name in test_forcing.NOISY}
-#: Whose random numbers they are: numbers of 64, 32 and 48 bits.
+#: Arguments that select random numbers: numbers of 64, 32 and 48 bits.
 DRAWS: dict[str, Any] = {"seed": 2**61 + 5, "member": 2**31 + 3, "step0": 2**45 + 2}
 CASES = [*CORPUS, *VARIANTS, *DRIVEN]
 STEPS, T0 = 8, 0.7
-#: Those of the corpus, and of each further kind one.
+#: Quick tests make the lattices of the corpus, and one of each further kind.
 pytestmark = pytest.mark.few(
     *CORPUS, "stiff", "stiff graph", "names", "apart", "no bonds", "no brackets",
     "kicks", "colours", "spins by the series", "a graph by the series",
@@ -122,7 +123,7 @@ def compiled(case: str) -> Compilation:
 
 @cache
 def begun(case: str) -> tuple[Start, float]:
-    """Where a case starts, and its step."""
+    """Return the start and the step size of a case."""
     if case in DRIVEN:
         module, name = DRIVEN[case]
         x, values = module.given(name)
@@ -134,7 +135,7 @@ def begun(case: str) -> tuple[Start, float]:
 
 
 def job(folder: Path, case: str, **more: Any) -> dict[str, Any]:
-    """The first run of a case, in JavaScript."""
+    """Return the request for the first run of a case in JavaScript."""
     compilation = compiled(case)
     start, h = begun(case)
     (text,) = emit(compilation.program, "js", "phigen").values()
@@ -149,12 +150,12 @@ def job(folder: Path, case: str, **more: Any) -> dict[str, Any]:
 
 
 def node(jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The answers to jobs."""
+    """Return Node's answers to some requests."""
     return answers_of(Path(__file__).with_name("javascript.mjs"), jobs)
 
 
 class Answers(dict[str, dict[str, Any]]):
-    """What the solver of a case says of its run, asked when a test first wants to know."""
+    """Answers of the solver of a case, computed when a test first needs them."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -185,7 +186,7 @@ def test_steps_and_what_is_seen_are_those_of_numpy_to_roundoff(case: str, answer
         np.testing.assert_allclose(np.reshape(mine, theirs.shape), theirs, rtol=part, atol=part * np.abs(theirs).max())
 
     assert answer["done"] == {"value": STEPS}
-    if not compilation.program.is_monitored:  # whose times tests/lattice/test_monitor.py compares
+    if not compilation.program.is_monitored:  # tests/lattice/test_monitor.py compares the times of steps with a monitor
         assert answer["t"] == pytest.approx(end, rel=1e-14)
     np.testing.assert_allclose(np.reshape(answer["x"], x.shape), x, rtol=0, atol=1e-13 * size)
     assert answer["energy"] == pytest.approx(module.hamiltonian(x, **then), rel=1e-12)
@@ -221,7 +222,8 @@ def test_one_number_is_the_value_at_all_bonds_of_none(tmp_path: Path, answers: d
     assert node([request])[0]["x"] == answers["no bonds"]["x"]
 
 
-#: Tangent vectors: open ends, colours, a graph of colours, pairs, noise, the series with sweeps and Newton's method.
+#: Cases of tangent vectors: open ends, colours, a graph with colours, pairs, noise, the series with sweeps and Newton's
+#: method.
 CARRYING = {
     **dict.fromkeys(("sheet", "volterra", "magnet", "tangle", "vortices"), test_tangents.with_tangents),
     **{name: lambda name: carrying(test_forcing.compiled(name)) for name in ("free", "bath")},
@@ -235,7 +237,7 @@ def carrying(compilation: Compilation) -> Compilation:
 
 @pytest.fixture(scope="module")
 def carried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[str, Any], np.ndarray, np.ndarray]]:
-    """What each answers, and the state and vectors that NumPy has."""
+    """Return the answer for each case, with the state and the tangent vectors of NumPy."""
     folder, jobs, expected = tmp_path_factory.mktemp("carried"), [], []
     for case, compiled_lattice in CARRYING.items():
         compilation = compiled_lattice(case)

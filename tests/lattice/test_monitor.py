@@ -39,7 +39,7 @@ PYTHAGOREAN = "pythagorean"
 
 
 def newton(t, y, m):
-    """The accelerations of bodies that attract each other, from positions and momenta in a plane."""
+    """Return the derivatives of positions and momenta of bodies in a plane under gravity."""
     q, p = y.reshape(2, 2, -1)
     apart = q[:, :, None] - q[:, None, :]
     distance = np.sqrt((apart**2).sum(0))
@@ -55,7 +55,7 @@ def reference(x0, m, *times):
 
 @pytest.mark.slow
 def test_three_bodies_that_fall_towards_each_other_pass_an_encounter():
-    # two of the masses 3, 4, 5 come as near as 0.0097, a hundredth of the distances that they began at
+    # Two of the masses 3, 4, 5 approach to 0.0097, a hundredth of their initial distance.
     solver = phigen.compile(PYTHAGOREAN)
     run = solver.run("fall", step=0.1, until=5, every=1.25)
     np.testing.assert_allclose(run.t, [0, 1.25, 2.5, 3.75, 5], rtol=0, atol=1e-14)
@@ -140,7 +140,7 @@ def test_bodies_that_several_threads_share_have_the_steps_of_numpy():
         for target in ("c", "c", "numpy")
     ]
     np.testing.assert_array_equal(runs[0].x, runs[1].x)
-    # the forces of neighbours, some 100 times the sum, cancel
+    # Forces of neighbours, which are some 100 times their sum, cancel.
     np.testing.assert_allclose(runs[0].x[-1], runs[2].x[-1], rtol=0, atol=1e-11)
     np.testing.assert_allclose(runs[0].t[-1], runs[2].t[-1], rtol=1e-13)
 
@@ -153,7 +153,7 @@ def test_a_start_without_attraction_is_refused_and_a_step_to_a_collision_fails(t
         solver.integrate(X0, 0.1, 1, k=1.0)
     session = solver.session(X0)
     with pytest.raises(StepError, match="not finite"):
-        session.x = X0 * np.array([0, 0, 1, 1])[:, None]  # all in one place
+        session.x = X0 * np.array([0, 0, 1, 1])[:, None]  # all bodies at one place
     np.testing.assert_array_equal(session.x, X0)
     session.step(0.02)
     assert session.t > 0
@@ -191,7 +191,7 @@ def test_runs_are_continued_with_the_times_and_the_level_of_one_run(tmp_path):
     with np.load(tmp_path / "half.npz") as half, np.load(tmp_path / "whole.npz") as whole:
         np.testing.assert_allclose(half["t"], np.linspace(0, 1, 11), rtol=0, atol=1e-15)
         np.testing.assert_allclose(half["t"], whole["t"], rtol=0, atol=1e-15)
-        # the part of a step at t = 0.5 makes another map of the same order
+        # A shorter step that ends at t = 0.5 is another map of the same order.
         np.testing.assert_allclose(half["x"], whole["x"], rtol=0, atol=1e-4)
         assert whole["tau"][-1] == pytest.approx(float(whole["steps"]) * 0.02, abs=0.02)
 

@@ -1,4 +1,4 @@
-"""Lattices on several processes of Open MPI: the bits of one."""
+"""Lattices on several processes of Open MPI have the bits of one process."""
 
 from __future__ import annotations
 
@@ -20,15 +20,17 @@ from phigen.runtime import toolchain
 pytest.importorskip("mpi4py")
 MPIRUN = shutil.which("mpirun", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
 SCRIPT = Path(__file__).with_name("on_processes.py")
-#: Chains, one with colours, which is interrupted and gone on with; a box with open ends, given by its planes.
+#: Sizes of lattices: chains, one with colours, whose run is interrupted and resumed; a box with open ends, distributed
+#: by planes.
 SIZES = {"xxz": (37,), "volterra": (34,), "cube": (9, 3, 4)}
-#: And a plane with noise at every site, and a chain whose parameter at sites has a formula of the whole as its default.
+#: Further lattices: a plane with noise at every site, and a chain with a parameter at sites whose default is a formula
+#: in the position along the whole chain.
 NAMES = (*SIZES, "hot", "uneven")
 
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Solvers, states and parameters for the script, and the frames of one process without MPI."""
+    """Return a folder with solvers, states and parameters for the script, and the frames of one process without MPI."""
     folder = tmp_path_factory.mktemp("mpi")
     (folder / "flags.json").write_text(json.dumps(toolchain.BASE_FLAGS))
     for name, sizes in SIZES.items():
@@ -36,7 +38,7 @@ def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         values = disorder(name, x)
         with (folder / f"{name}.pickle").open("wb") as file:
             pickle.dump((integrator, x, values), file)
-        # steps so large that some need the functions for large arguments
+        # The steps are so large that some need full-range functions.
         run = integrator.integrate(x, 0.2, 50, 20, **values)
         np.savez(folder / f"{name}_alone.npz", x=run.x, energy=run.energy)
     integrator, x = forcing.solver("hot", 2, "c"), np.random.default_rng(1).normal(size=(3, 9, 5))

@@ -92,7 +92,7 @@ runs:
 
 
 def of_film(x, t, c):
-    """The observables of `FILM`, site by site."""
+    """Return the observables of `FILM`, computed site by site."""
     _, rows, columns = x.shape
     sites = [(i, j) for i in range(rows) for j in range(columns)]
     field = {(i, j): 0.3 + i * j / 100 for i, j in sites}
@@ -368,7 +368,7 @@ def test_the_skyrmion_number_counts_skyrmions():
     solver = phigen.compile(phigen.spec.loads(SKYRMION), target="numpy")
     i, j = np.indices((16, 16)) - 7.5
     radius, angle = np.hypot(i, j), np.arctan2(j, i)
-    polar = np.pi * np.clip(1 - radius / 7, 0, 1)  # up at the core's edge, down in the middle
+    polar = np.pi * np.clip(1 - radius / 7, 0, 1)  # spins point up at the edge of the core and down in its centre
     for turns in (1, -1, 2):
         spins = [np.sin(polar) * np.cos(turns * angle), np.sin(polar) * np.sin(turns * angle), np.cos(polar)]
         assert solver.observables(np.array(spins))["Q"] == pytest.approx(-turns, abs=1e-12)

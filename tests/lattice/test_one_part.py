@@ -1,6 +1,8 @@
-"""Gradients of lattices whose H is one part: a step is one flow, unless H depends on the time, and nothing joins steps.
+"""Gradients of lattices whose H is one part: a step is one flow, unless H depends on the time, and no flows of
+successive steps are merged.
 
-Spins turned about z and kicked momenta, drawn at random: along axes, along bonds, and of all pairs.
+The systems are random: spins that rotate about z and momenta that are kicked, along axes, along bonds, and of all
+pairs.
 """
 
 import random
@@ -18,7 +20,7 @@ KINDS = ("axes", "graph", "pairs")
 
 
 def drawn(kind, seed):
-    """A lattice of a kind, and the parameters of a run."""
+    """Return a random spec of a kind, and the parameters of a run."""
     source = random.Random(f"{kind} {seed}")
     spins = source.random() < 0.5
     fields, moved = ("x, y, z", "z") if spins else ("q, p", "q")
@@ -44,7 +46,7 @@ def drawn(kind, seed):
 
 
 def slope(integrator, x, bar, along, parameters, changed=""):
-    """The derivative of Σ bar·frames in a direction of the state, or of a parameter."""
+    """Return the derivative of Σ bar·frames in a direction of the state, or of a parameter."""
 
     def weighed(e):
         state, arguments = (
@@ -56,7 +58,7 @@ def slope(integrator, x, bar, along, parameters, changed=""):
 
 
 def cases():
-    """Kinds with seeds and profiles: one of each kind is not slow."""
+    """Return kinds with seeds and profiles; one case of each kind is not slow."""
     each = [
         (kind, seed, ("fast", "small")[(seed + place) % 2]) for place, kind in enumerate(KINDS) for seed in range(4)
     ]
@@ -73,14 +75,14 @@ def test_gradients_of_lattices_of_one_part_are_differences(kind, seed, profile):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_gradients_of_one_part_are_differences_where_fields_are_stored(kind, monkeypatch):
-    """Not found again by the inverse of a flow, which all these have."""
+    """Here the reverse pass reads stored fields, although all these flows have inverses that could recompute them."""
     monkeypatch.setattr(sweep_inverse, "_changes", lambda *_: {})
     text, parameters = drawn(kind, 1)
     assert "t_make_steps_with_tape(" in expect_gradients(phigen.spec.loads(text), parameters, 1, "fast")
 
 
 def expect_gradients(spec, parameters, seed, profile):
-    """Compare pullbacks in C with differences, and with NumPy; the C is returned."""
+    """Compare pullbacks in C with differences and with NumPy, and return the solver in C."""
     program = compile_spec(spec, adjoint=True, profile=profile).program
     assert len(program.step.parts) == 1
     assert len(program.step.schedule.flows) == 1 or spec.time

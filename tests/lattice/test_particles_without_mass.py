@@ -1,4 +1,6 @@
-"""Parameters at sites that may be 0: test particles, passive tracers, and the cancellation that they rest on."""
+"""Parameters at sites that may be 0: test particles and passive tracers, whose equations need quotients in which the
+parameter cancels.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,7 @@ runs:
 
 
 def accelerations(x, m):
-    """Accelerations (axes, bodies) by gravity of bodies at x."""
+    """Return the accelerations (axes, bodies) by gravity of bodies at x."""
     apart = x[:, None, :] - x[:, :, None]
     cubes = np.linalg.norm(apart, axis=0) ** 3
     np.fill_diagonal(cubes, np.inf)
@@ -64,7 +66,7 @@ def accelerations(x, m):
 
 
 def dragged(x, g):
-    """Velocities (axes, vortices) by vortices of circulations g at x."""
+    """Return the velocities (axes, vortices) that vortices of circulations g at x cause."""
     apart = x[:, :, None] - x[:, None, :]
     squares = (apart**2).sum(axis=0)
     np.fill_diagonal(squares, np.inf)

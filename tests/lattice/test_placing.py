@@ -1,4 +1,6 @@
-"""Graphs in a plane: sites as far apart as there are bonds between them, where that can be."""
+"""Layout of graphs in a plane: where possible, distances of sites are proportional to the numbers of bonds between
+them.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,7 @@ def test_a_square_grid_is_drawn_as_one_whatever_the_order_of_its_sites() -> None
     ("bonds", "sites"), [([[0, k] for k in range(1, 7)], 7), ([[0, 1], [2, 3], [3, 4]], 6), ([], 1), ([[0, 1]], 2)]
 )
 def test_no_two_sites_lie_on_one_another(bonds: list[list[int]], sites: int) -> None:
-    """A star, whose distances leave the plane open; graphs of several parts; one site."""
+    """Cases: a star, whose distances do not determine a layout; graphs of several components; one site."""
     positions = placed(np.array(bonds, dtype=np.int64).reshape(-1, 2), sites)
     assert positions is not None
     assert np.isfinite(positions).all()

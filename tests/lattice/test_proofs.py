@@ -1,4 +1,4 @@
-"""Statements about lattices of all sizes, against the expansion at some; planted errors."""
+"""Statements about lattices of all sizes, compared with the expansion at some sizes; planted errors are refuted."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ PERIODIC = spins("i", "periodic", "4")
 
 
 def verdicts(text: str) -> dict[str, str]:
-    """The verdicts on a lattice by statement."""
+    """Return the verdicts on a lattice, by statement."""
     return {s.name: s.verdict for s in examine(loads(text)).statements}
 
 
 def stated(text: str, name: str) -> str:
-    """The one statement of that name, as text."""
+    """Return the only statement with this name, as text."""
     (statement,) = (s for s in examine(loads(text)).statements if s.name == name)
     return str(statement)
 
@@ -141,7 +141,7 @@ def test_the_euler_operator_vanishes_on_differences_of_neighbours_and_constants(
 
 
 def random_bracket(seed: int) -> Cell:
-    """A quadratic bracket of two fields with neighbours, Poisson or not."""
+    """Return a cell with a random quadratic bracket of two fields with neighbours, Poisson or not."""
     draw = random.Random(seed)
     a, b = symbol("a"), symbol("b")
     right = {"a[i+1]": symbol("a[i+1]"), "b[i+1]": symbol("b[i+1]"), "b": b}

@@ -28,12 +28,12 @@ SIZES = {
 
 
 def expanded(name: str) -> Spec:
-    """A lattice written out."""
+    """Return a bundled lattice written out as an ordinary spec."""
     return expand(cell_from_spec(loads(LATTICES[name])), SIZES[name]).spec()
 
 
 def bundled(name: str) -> Spec:
-    """A bundled spec."""
+    """Return a bundled spec."""
     return load(resources.bundled()[name])
 
 
@@ -64,7 +64,7 @@ def test_specs_that_people_wrote_are_recognised_with_casimirs_invariants_and_run
     ("old", "new"),
     [
         ("x5*x1", "2*x5*x1"),  # one bond is stronger
-        ("y1: {z1: -x1}", "y1: {z1: x1}"),  # one spin turns the other way
+        ("y1: {z1: -x1}", "y1: {z1: x1}"),  # one spin rotates in the opposite direction
         ("    y3: {z3: -x3}\n", ""),  # one bracket is missing
     ],
 )
@@ -101,4 +101,4 @@ def test_who_compiles_a_lattice_recognised_lattice_is_told() -> None:
     assert "phigen show --lattice chain.yaml" in str(caught[0].message)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        compile_spec(bundled("volterra5"), scheme="splitting")  # a small one, not worth the words
+        compile_spec(bundled("volterra5"), scheme="splitting")  # too small for a warning

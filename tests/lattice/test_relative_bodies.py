@@ -148,7 +148,7 @@ def test_orbits_are_those_of_the_equations_of_motion(change: str, momenta: bool,
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize(("composition", "order"), [("saba-8-2", 2), ("blanes-moan", 4), ("blanes-moan", 6)])
 def test_the_order_is_that_of_the_composition(change: str, composition: str, order: int) -> None:
-    m = 20 * MASSES + [0, 0.01, 0, 0, 0, 0.01]  # so that the small part is not very small
+    m = 20 * MASSES + [0, 0.01, 0, 0, 0, 0.01]  # large masses, so that the small part of H is not negligible
     m[0] = 1
     x = orbits(eccentricity=0.2)
     expected = reference(x, m, 8.0)
@@ -268,8 +268,8 @@ def test_a_swarm_costs_in_proportion_to_its_particles() -> None:
         return min(times)
 
     try:
-        CDLL("libgomp.so.1").omp_set_num_threads(1)  # the time of a waiting thread counts too
-        assert seconds(4000) < 24 * seconds(400)  # all pairs would take a hundred times as long
+        CDLL("libgomp.so.1").omp_set_num_threads(1)  # waiting threads would add processor time
+        assert seconds(4000) < 24 * seconds(400)  # a sum over all pairs would take a hundred times as long
     finally:
         CDLL("libgomp.so.1").omp_set_num_threads(2)
 
@@ -377,7 +377,7 @@ def test_masses_of_runs_are_refused_at_their_place(masses: str, momenta: bool, m
 def test_a_collision_is_an_error_and_a_hyperbola_is_not(change: str, target: str) -> None:
     m, x = np.array([1, 1e-3, 0.0]), orbits(3, 2)
     fast = x.copy()
-    fast[2:, 2] *= 3  # leaves on a hyperbola
+    fast[2:, 2] *= 3  # escapes on a hyperbola
     run = solver(text(change, "xy"), target).integrate(fast, h=0.05, steps=200, stride=200, m=m)
     np.testing.assert_allclose(run.x[-1], reference(fast, m, 10.0), rtol=0, atol=1e-8)
     met = x.copy()

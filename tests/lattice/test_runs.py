@@ -1,4 +1,6 @@
-"""Runs of lattices: ends, rows and sections between steps, retries, runs that go on; against the ordinary spec."""
+"""Runs of lattices: ends, rows and sections between steps, retries and resumed runs, compared with the ordinary
+spec.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +62,7 @@ def rotors():
 
 @pytest.fixture(scope="module")
 def written_out(rotors):
-    """The same lattice as an ordinary system, with its start."""
+    """Return the lattice as an ordinary system, with its start."""
     spec = rotors.spec
     cell, start = cell_from_spec(spec), start_of(spec, spec.runs["mix"])
     expansion = expand(cell, start.sizes, ())
@@ -142,7 +144,7 @@ def test_steps_that_fail_are_made_in_parts_at_the_right_times(monkeypatch):
 
 def test_a_crossing_in_the_last_part_of_a_step_is_found(rotors):
     crossings = rotors.run("both").crossings.t
-    assert 1.5 < crossings[0] < 1.56  # the end is a part of the step from 1.5 on
+    assert 1.5 < crossings[0] < 1.56  # the run ends within the step that starts at 1.5
     assert list(rotors.run("both", until=1.56).crossings.t) == pytest.approx([crossings[0]], rel=1e-12)
     assert not len(rotors.run("both", until=1.52).crossings)
 
@@ -208,7 +210,7 @@ def test_processes_refuse_parts_of_steps():
 
 @pytest.fixture
 def cli():
-    """Runs a command line in this process."""
+    """Return a function that runs a command line in this process."""
     return lambda *args: CliRunner().invoke(group, [str(a) for a in args], prog_name="phigen")
 
 

@@ -1,4 +1,6 @@
-"""Sizes that are no multiples of the periods of colours: the terms on a seam are parts of their own."""
+"""Lattice sizes that are not multiples of the periods of the colouring: the terms across the boundary seam are separate
+parts.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +25,8 @@ from phigen.spec import loads
 H = 0.1
 
 SPINS = "coordinates: [x, y, z]\npoisson: {lie_algebra: {name: so(3)}}\n"
-#: Brackets with the next site, and with that after it, of three colours; bonds of spins that do not commute, with
-#: the time and a parameter at sites; both along two axes; damping by colours.
+#: Specs: brackets with the next site and the one after it, with three colours; bonds of spins that do not commute, with
+#: time dependence and a parameter at sites; both kinds of coupling along two axes; damping by colours.
 TEXTS = {
     "volterra": 'coordinates: [a]\npoisson: {brackets: {a: {"a[i+1]": "a*a[i+1]"}}}\nhamiltonian: a\n',
     "bogoyavlensky": (
@@ -39,7 +41,7 @@ TEXTS = {
     "layer": SPINS + "hamiltonian: 0.7*(x*y[i+1] - y*x[i+1]) - z*z[i+1] + 0.3*x*z[j+1] - y*y[j+1]\n",
     "damped": SPINS + "parameters: {k: 0.2}\nhamiltonian: -x*x[i+1] - y*y[i+1] - z*z[i+1]\ndamping: k\n",
 }
-#: With one and two sites left over; with one seam, with the other, with both and their corner.
+#: Sizes with one and two remaining sites; with one seam, with the other one, and with both and their corner.
 SIZES = {
     "volterra": [(3,), (7,)],
     "bogoyavlensky": [(13,), (14,)],
@@ -48,7 +50,7 @@ SIZES = {
     "layer": [(3, 5)],
 }
 CASES = [(name, sizes) for name, listed in SIZES.items() for sizes in listed]
-#: The C is the same for all sizes with a seam: of each lattice the largest, which has all seams.
+#: Cases in C, which is the same for all sizes with a seam: for each lattice the largest size, which has all seams.
 IN_C = slow_but([("bogoyavlensky", (14,))], [(name, listed[-1]) for name, listed in SIZES.items()])
 
 
@@ -63,14 +65,14 @@ def text(name: str, run: tuple[int, ...], profile: str) -> str:
 def solver(
     name: str, run: tuple[int, ...], target: str = "numpy", profile: str = "fast", *, adjoint: bool = False
 ) -> LatticeSolver:
-    """A solver for runs of some size, and hence with a seam or without."""
+    """Return a solver for runs of a size, which decides whether there is a seam."""
     solver = phigen.compile(loads(text(name, run, profile)), target=target, tangent=not adjoint, adjoint=adjoint)
     assert isinstance(solver, LatticeSolver)
     return solver
 
 
 def odd(name: str) -> tuple[int, ...]:
-    """Sizes that colours do not fit, and no more colours."""
+    """Return sizes that are not multiples of the periods of the colouring, without additional colours."""
     return (13, 7) if name in ("sheet", "layer") else (7,)
 
 

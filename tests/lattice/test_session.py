@@ -1,4 +1,4 @@
-"""Lattices in the hands of the caller: steps, kicks and states put in place, branches, pickles."""
+"""Sessions of lattices: steps, kicks, assigned states, copies, and pickles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from phigen.errors import StepError
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice_course import LatticeCourse
 
-#: A splitting whose steps are joined, one in time, the series with noise, and a splitting with noise.
+#: Sources of lattices by name: a splitting with merged flows, one with time dependence, the series with noise, and a
+#: splitting with noise.
 CASES = {"xxz": sweeps, "coloured": timed, "bath": forcing, "langevin": forcing}
 
 

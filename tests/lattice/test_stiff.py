@@ -1,4 +1,6 @@
-"""Steps so large that sweeps do not contract: Newton's method, by elimination in C for chains, by Krylov spaces."""
+"""Steps so large that fixed-point sweeps do not converge: Newton's method, by elimination in C for chains, otherwise by
+Krylov spaces.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,7 @@ TEXTS = {
     "swarm": f"order: 2\nlattice: {{pairs: all}}\nparameters: {{m: {{value: 1, at: sites}}}}\n{CANONICAL}"
     'hamiltonian: {sites: p**2/(2*m), pairs: "100*m[a]*m[b]*(q[a]-q[b])**2/(1 + (q[a]-q[b])**2)"}',
 }
-#: Waves that do not interact: one correction solves a stage as well as it can, and a second one finds no more.
+#: Linear waves: one Newton correction solves a stage to round-off, and a second one does not improve it.
 LINEAR = f"order: 2\nlattice: {{axes: [i]}}\n{CANONICAL}hamiltonian: p**2/2 + 200*(q[i+1]-q)**2 + q*q[i+2] + p*p[i+1]/3"
 PLANE = f"order: 2\nlattice: {{axes: [i, j]}}\n{CANONICAL}hamiltonian: p**2/2 + 200*((q[i+1]-q)**2 + (q[j+1]-q)**2)"
 DRIVER = r"""
@@ -64,9 +66,9 @@ int main(void)
     return 0;
 }
 """
-#: An equation without a solution where h is large: y = a + h²/4 exp(y).
+#: A lattice whose step has no solution for large h: y = a + h²/4 exp(y).
 BURSTING = f"order: 2\nlattice: {{axes: [i, j]}}\n{CANONICAL}hamiltonian: p**2/2 - exp(q) + q*q[i+1]*q[j+1]/9"
-#: Few sites, whose matrix is a full one, and many.
+#: Sizes: few sites, whose matrix is full, and many sites.
 SIZES = {
     "ring": [(5,), (31,)],
     "chain": [(4,), (23,)],
@@ -85,7 +87,7 @@ def compiled(name: str) -> Compilation:
 
 
 def bonds(name: str, sites: int) -> dict[str, np.ndarray]:
-    """A ring with chords."""
+    """Return the bonds of a ring with chords."""
     if name != "net":
         return {}
     ring = np.arange(sites)
@@ -121,7 +123,9 @@ def test_steps_that_sweeps_cannot_make_are_those_of_the_ordinary_system(name: st
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "sizes"), CASES)
 def test_cotangents_go_back_through_such_steps(name: str, sizes: tuple[int, ...]) -> None:
-    """By elimination with the transpose of the matrix, or by Krylov spaces: as tangent vectors go forward."""
+    """Cotangents use elimination with the transposed matrix, or Krylov spaces, as tangent vectors use those of the
+    matrix.
+    """
     solver = lattice_solver_of(compiled(name), "c")
     x, more, random = start(name, sizes), bonds(name, sizes[0]), np.random.default_rng(4)
     bar, along = random.normal(size=(2, *x.shape))
@@ -155,9 +159,11 @@ def test_equations_without_a_solution_are_told(target: str, profile: str) -> Non
     ("profile", "axes", "h", "left"), [("fast", "i", 0.2, 1e-13), ("small", "i", 0.05, 1e-5), ("fast", "ij", 0.1, 1e-5)]
 )
 def test_one_correction_solves_a_linear_stage(profile: str, axes: str, h: float, left: float, tmp_path: Path) -> None:
-    """On a ring, by elimination, and by a Krylov space; in a plane by one of the matrix times inverses of its blocks.
+    """On a ring the correction is solved by elimination and by a Krylov space; in a plane by a Krylov space of the
+    matrix with a block-diagonal preconditioner.
 
-    A wrong matrix would solve stages too, by more corrections; and so would a space of the matrix itself in the plane.
+    With a wrong matrix, stages would be solved too, by more corrections; and so would they in the plane without the
+    preconditioner.
     """
     text, sizes = (LINEAR, "40") if axes == "i" else (PLANE, "19,21")
     program = compile_spec(specs.loads(f"phigen: 1\nname: linear\nadjoint: true\n{text}\n"), profile=profile).program
@@ -171,7 +177,9 @@ def test_one_correction_solves_a_linear_stage(profile: str, axes: str, h: float,
 
 @pytest.mark.parametrize("adjoint", ["false", "true"])
 def test_functions_of_lanes_are_there_if_loops_over_sites_call_them(adjoint: str) -> None:
-    """The derivative of a stage along y, which alone needs that of φ unless there is a transpose, calls no such one."""
+    """Unless there is a transpose, only the derivative of a stage along y needs the derivative of φ, and it does not
+    call the lane version.
+    """
     spec = specs.loads(f"{LATTICES['spin_graph']}scheme: series\nadjoint: {adjoint}\n")
     text = emit(compile_spec(spec).program, "c", "phigen")["spin_graph.c"]
     names = re.findall(r"^static inline double (\w+_(?:lane|near))\(", text, re.M)

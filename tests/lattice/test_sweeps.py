@@ -1,4 +1,6 @@
-"""Lattices by sweeps over sites, compared with the ordinary system of a few sites: field, H, steps, orders, π."""
+"""Sweeps over the sites of lattices, compared with the ordinary system of a few sites: field, H, steps, orders, Poisson
+maps.
+"""
 
 from __future__ import annotations
 
@@ -58,7 +60,7 @@ TEXTS = {
     "parameters: {k: 0.5, m: {value: 1.2, at: sites, positive: true}}\n"
     "poisson: {canonical: {q: [x, y], p: [px, py]}}\nhamiltonian: {sites: (px**2 + py**2)/(2*m) + (x**2 + y**2)/2, "
     'pairs: "k/sqrt(1/4 + (x[a] - x[b])**2 + (y[a] - y[b])**2)"}',
-    # exchange, Dzyaloshinskii–Moriya, anisotropy: parts of all sites, and of those of one colour
+    # exchange, Dzyaloshinskii–Moriya coupling, anisotropy: parts of all sites, and parts of the sites of one colour
     "magnet": "lattice: {graph: bonds}\nparameters: {J: {value: 1.2, at: bonds}, D: 0.4, B: {value: 0.2, at: sites}}"
     f"{SPINS}hamiltonian: {{sites: -B*z + x**2/5, "
     'bonds: "-J*(x[a]*x[b] + y[a]*y[b] + z[a]*z[b]) + D*(x[a]*y[b] - y[a]*x[b])"}',
@@ -67,12 +69,12 @@ TEXTS = {
     "web": "lattice: {graph: eats}\ncoordinates: [x]\n"
     "parameters: {A: {value: 1, at: bonds}, k: {value: 1, at: sites}}\n"
     'poisson: {bonds: {"x[a]": {"x[b]": "A*x[a]*x[b]"}}}\nhamiltonian: {sites: x - k*log(x)}',
-    # brackets along bonds that change nothing of what they read: no colours
+    # brackets along bonds that update no field which they read: no colours
     "network": "lattice: {graph: bonds}\ncoordinates: [q, p]\nparameters: {W: {value: 1, at: bonds}}\n"
     'poisson: {bonds: {"q[a]": {"p[b]": W}}}\nhamiltonian: {sites: p**2/2 + q**4/4}',
     "volterra": "lattice: {axes: [i], boundary: periodic}\ncoordinates: [a]\n"
     'poisson: {brackets: {a: {"a[i+1]": "a*a[i+1]"}}}\nhamiltonian: a',
-    # What does not split.
+    # Systems for which no splitting exists.
     "twisted": "lattice: {axes: [i], boundary: open}\nbirealisation: cayley\nparameters: {B: {value: 0.2, at: sites}}"
     f'{SPINS}hamiltonian: "-(x*x[i+1] + y*y[i+1] + z*z[i+1]) + B*x*y[i+1]*z[i+2]"',
     "dragged": "lattice: {axes: [i, j], boundary: [periodic, open]}\nparameters: {g: 0.3}\n"
@@ -88,17 +90,17 @@ TEXTS = {
     "poisson: {brackets: {x: {y: 1/G}}}\nhamiltonian: {sites: G*(x**2 + 2*y**2), "
     'pairs: "-G[a]*G[b]*log(1 + (x[a] - x[b])**2 + (y[a] - y[b])**2)/2"}',
 }
-#: Neighbours of neighbours, along the axis that flows follow one another by.
+#: A lattice with second neighbours along the axis of the wavefront blocking.
 BEYOND = "phigen: 1\nname: beyond\norder: 2\nlattice: {axes: [i, j, k], boundary: periodic}\n"
 BEYOND += f'{CANONICAL}hamiltonian: "p**2/2 + q**2/2 - q*q[i+2]/3 - q*q[j+1]/4 - q*q[k+1]/5"\n'
-#: What is integrated by the series.
+#: Lattices that are integrated by the scheme series.
 SERIES = ("twisted", "dragged", "pond", "stretched", "tangle", "vortices")
 
-#: Open ends, a plane, pairs, graphs with and without brackets along bonds, colours, the series.
+#: Quick cases: open ends, a plane, pairs, graphs with and without brackets along bonds, colours, the series.
 pytestmark = pytest.mark.few(
     "fput", "sheet", "charges", "magnet", "web", "volterra", "twisted", "dragged", "tangle", of=TEXTS
 )
-#: Of graphs: a triangle with two tails, a double bond, and a site of its own.
+#: Bonds of the graphs: a triangle with two tails, a double bond, and an isolated site.
 BONDS = np.array([[0, 1], [1, 2], [2, 0], [2, 3], [4, 3], [3, 4], [4, 5]])
 SIZES = {"sheet": (4, 5), "cube": (3, 4, 3), "volterra": (6,), "toda": (5,), "dragged": (4, 5), "stretched": (5,)}
 FEW = {
@@ -203,7 +205,7 @@ def test_steps_are_those_of_the_ordinary_splitting_with_the_same_parts(name: str
 
 
 @pytest.mark.thin(2)
-@pytest.mark.parametrize("name", sorted({*SERIES} - {"stretched"}))  # whose π ordinary systems follow paths for
+@pytest.mark.parametrize("name", sorted({*SERIES} - {"stretched"}))  # for its π the ordinary system follows paths
 def test_steps_of_the_series_are_those_of_the_ordinary_system(name: str) -> None:
     x = start(name, FEW.get(name, (5,)))
     integrator, parameters = solver(name, 4, "numpy"), disorder(name, x)
@@ -236,7 +238,7 @@ def test_order_is_that_of_the_method(name: str, order: int) -> None:
     x, integrator = start(name), solver(name, order, "c")
     parameters, span = disorder(name, x), 0.8
     far = integrator.integrate(x, span / 512, 512, 512, **parameters).x[-1]
-    counts = (8, 16) if order < 8 else (4, 8)  # beyond, the error is that of rounding
+    counts = (8, 16) if order < 8 else (4, 8)  # with more steps the error is due to rounding
     errors = [np.abs(integrator.integrate(x, span / n, n, n, **parameters).x[-1] - far).max() for n in counts]
     assert np.log2(errors[0] / errors[1]) > order - 0.35
 
@@ -246,7 +248,7 @@ def module_of(name: str) -> Any:
 
 
 def jacobian(module: Any, x: np.ndarray, h: float, parameters: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """The step and its derivative."""
+    """Return the state after a step, and the derivative of the step."""
     _, sites = module._started(x, parameters)
     rows = module._coefficients(sites, h)
     columns = []
@@ -258,7 +260,9 @@ def jacobian(module: Any, x: np.ndarray, h: float, parameters: dict[str, Any]) -
 
 
 def _slope(curve: Any) -> np.ndarray:
-    """The derivative at 0: by a complex step, or by differences where functions take real numbers only."""
+    """Return the derivative of a curve at 0: by a complex step, or by differences if functions take real
+    numbers only.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("error", np.exceptions.ComplexWarning)
         try:
@@ -268,12 +272,12 @@ def _slope(curve: Any) -> np.ndarray:
             return sum(w * (curve(k * 4e-3) - curve(-k * 4e-3)) for k, w in weights.items()).reshape(-1) / 4e-3
 
 
-#: Those whose steps take no complex numbers.
+#: Lattices whose steps do not accept complex numbers.
 REAL_ONLY = ("ablowitz_ladik", "magnet", "oscillators", "web", "network")
 
 
 def poisson_defect(name: str, module: Any) -> float:
-    """The largest entry of DΦ π DΦᵀ − π∘Φ on the ordinary system."""
+    """Return the largest entry of DΦ π DΦᵀ − π∘Φ for the ordinary system."""
     x = start(name, FEW.get(name))
     parameters, whole = disorder(name, x), expansion(name, x.shape[1:])
     after, derivative = jacobian(module, x, 0.2, parameters)
@@ -295,7 +299,7 @@ def test_neighbours_moved_at_once_where_brackets_couple_them_are_noticed(name: s
         coloured = module._Coloured.__init__
         module._Coloured.__init__ = lambda sites, *of: (coloured(sites, *of), sites.colours.__imul__(0))[0]
     else:
-        module.COLOURS = 1  # every sweep moves all sites
+        module.COLOURS = 1  # planted error: every sweep updates all sites at once
     assert poisson_defect(name, module) > 1e-4
 
 
@@ -341,7 +345,9 @@ def test_large_angles_are_turned_exactly_too() -> None:
 
 
 def test_atoms_that_fly_apart_have_no_force_between_them_and_an_energy() -> None:
-    """exp(-800) is 0, and out of reach of the functions in lanes: steps fell over it, energies were no numbers."""
+    """exp(−800) is 0, and outside of the range of the lane version of exp: steps failed there, and energies
+    were NaN.
+    """
     morse = '"p**2/2 + (1 - exp(-(q[i+1] - q)))**2"'
     text = f"lattice: {{axes: [i], boundary: open}}\n{CANONICAL}hamiltonian: {morse}\nscheme: splitting\norder: 2\n"
     compilation = compile_text(text)
@@ -350,7 +356,7 @@ def test_atoms_that_fly_apart_have_no_force_between_them_and_an_energy() -> None
     for seen in ("density", "vector_field"):
         np.testing.assert_allclose(getattr(solver, seen)(x), getattr(other, seen)(x), rtol=1e-13, atol=1e-14)
     runs = [s.integrate(x, 0.1, 20) for s in (solver, other)]
-    np.testing.assert_allclose(runs[0].x, runs[1].x, rtol=0, atol=1e-11)  # differences of 800 are rounded
+    np.testing.assert_allclose(runs[0].x, runs[1].x, rtol=0, atol=1e-11)  # distances of 800 have rounding errors
     np.testing.assert_allclose(runs[0].energy, runs[1].energy, rtol=1e-11)
 
 
@@ -398,7 +404,9 @@ def test_long_rows_in_pieces_make_the_same_steps() -> None:
 
 @pytest.mark.parametrize(("name", "sizes"), [("xxz", (104,)), ("volterra", (48,)), ("beyond", (10, 4, 8))])
 def test_flows_that_are_made_at_once_make_the_steps_of_flow_after_flow(name: str, sizes: tuple[int, ...]) -> None:
-    """Copies of a lattice side by side, too large for that, move as it does alone, with any number of threads."""
+    """Wavefront blocking applies to a large lattice. Its state consists of copies of a small one, which therefore moves
+    as it does alone, with any number of threads.
+    """
     order = 2 if name == "beyond" else 4
     integrator = lattice_solver_of(compile_spec(specs.loads(BEYOND)), "c") if order == 2 else solver(name, order, "c")
     x = np.abs(0.5 + 0.3 * np.random.default_rng(2).normal(size=(len(integrator.interface.coordinates), *sizes)))
@@ -424,7 +432,7 @@ def test_compensated_sums_keep_lengths_of_spins_and_the_bits_of_runs_in_pieces()
     np.testing.assert_allclose(integrator.step(x, 0.05), solver("xxz", 2).step(x, 0.05), rtol=0, atol=1e-15)
 
 
-#: Systems whose steps end with all their flows done, of one part and with noise; and one whose last flow is open.
+#: Systems whose steps have no open last flow, with one part and with noise; and one with an open last flow.
 COMPENSATED = {
     "rotors": """
 lattice: {axes: [i]}
@@ -566,7 +574,7 @@ def test_an_ensemble_has_disorder_of_its_own() -> None:
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_members_of_a_lattice_have_numbers_and_steps_of_their_own(target: str) -> None:
-    """All start from one state; frames are those of `integrate`."""
+    """All members start from one state; their frames are those of `integrate`."""
     x, integrator = start("fput"), solver("fput", target=target)
     h, name = np.array([0.1, 0.05, 0.02]), "a"
     strengths = np.array([0.5, 1.0, 2.0])
@@ -695,7 +703,7 @@ def test_what_has_no_step_is_refused(text: str, said: str) -> None:
 
 
 def with_default(value: str, target: str = "numpy") -> LatticeSolver:
-    """A chain whose parameter e has that default, with a run of nine sites."""
+    """Return a solver of a chain whose parameter e has this default, with a run of nine sites."""
     run = "runs: {nine: {sizes: [9], initial: {q: 1, p: 0}, step: 0.1, steps: 2}}"
     text = TEXTS["dnls"].replace("value: 0.1", f"value: {value}")
     spec = specs.loads(f"phigen: 1\nname: disordered\n{text}\nadjoint: true\n{run}\n")

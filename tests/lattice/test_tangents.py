@@ -46,13 +46,13 @@ def solver(name: str, target: str) -> LatticeSolver:
 
 
 def derivative(name: str, target: str, x: np.ndarray, parameters: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """A step, and its matrix: the columns are where it carries the unit vectors."""
+    """Return the state after a step and the matrix of its derivative, whose columns are the images of unit vectors."""
     units = np.eye(x.size).reshape(-1, *x.shape)
     after, carried = solver(name, target).step_tangent(x, H, units, parameters=parameters)
     return after, carried.reshape(x.size, x.size).T
 
 
-#: Where C is looked at: open ends, colours, a graph of colours, pairs, the series on all of these.
+#: Lattices that are tested in C: open ends, colours, a graph with colours, pairs, and the series on all of these.
 IN_C = ("xxz_open", "sheet", "charges", "magnet", "volterra", "dragged", "tangle", "vortices")
 pytestmark = pytest.mark.few("fput", "sheet", "charges", "magnet", of=TEXTS)
 
@@ -138,7 +138,7 @@ noise: {w: {hamiltonian: T*q**2/2}}
 
 
 def test_tangent_vectors_go_with_time_forces_and_noise() -> None:
-    """The increments of the noise belong to the step: they are the same in both targets, and for all states."""
+    """The increments of the noise are the same in both targets, and for all states."""
     compilation = compile_spec(specs.loads(PUSHED), tangent=True)
     x, draws = start("fput", (6,)), {"t0": 0.3, "seed": 3, "step0": 5}
     vectors, h, e = np.random.default_rng(0).normal(size=(2, 2, 6)), 0.1, 1e-5
@@ -151,7 +151,9 @@ def test_tangent_vectors_go_with_time_forces_and_noise() -> None:
 
 
 class Midpoint(LatticeSolver):
-    """Steps of the implicit midpoint rule for quadratic fields: they keep lengths of spins, but are no Poisson maps."""
+    """Steps of the implicit midpoint rule for quadratic fields: they conserve the lengths of spins, but are not Poisson
+    maps.
+    """
 
     def step(self, x: Any, h: float, **_: Any) -> np.ndarray:
         y = x
@@ -169,14 +171,14 @@ class Midpoint(LatticeSolver):
 
 
 class Backwards(LatticeSolver):
-    """The derivative has the sign of the step wrong."""
+    """Solver with a planted error: its derivative is that of a step of opposite sign."""
 
     def step_tangent(self, x: Any, h: float, vectors: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
         return self.step(x, h), super().step_tangent(x, -h, vectors, **more)[1]
 
 
 class Rounded(LatticeSolver):
-    """The derivative is off by little more than rounding."""
+    """Solver with a planted error: its derivative has an error slightly larger than rounding."""
 
     def step_tangent(self, *of: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
         after, carried = super().step_tangent(*of, **more)

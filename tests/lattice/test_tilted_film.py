@@ -9,7 +9,7 @@ from systems import spec_of
 from phigen.api import lattice_solver_of
 from phigen.compiler import compile_spec
 
-#: Components before sites, as states of lattices have them.
+#: Shape of states: the components first, then the sites.
 SHAPE = (3, 3, 4)
 
 
@@ -24,7 +24,7 @@ def spins():
 
 
 def brackets(x):
-    """The matrix π of {x, y} = z and cyclic at each site."""
+    """Return the matrix π of {x, y} = z and its cyclic permutations at each site."""
     x, y, z = x.reshape(3, -1)
     zero = np.zeros_like(x)
     entries = np.array([[zero, z, -y], [-z, zero, x], [y, -x, zero]])
@@ -32,7 +32,7 @@ def brackets(x):
 
 
 def field(x):
-    """ẋ = ∇H × x reversed: the equations of motion written by hand, with J = 1, K = 0.5, a = 0.6, B = 0.1."""
+    """Return ẋ = ∇H × x, the equations of motion written by hand, with J = 1, K = 0.5, a = 0.6, B = 0.1."""
     axis = np.array([np.sin(0.6), 0, np.cos(0.6)])[:, None, None]
     neighbours = sum(np.roll(x, shift, along) for shift in (1, -1) for along in (1, 2))
     slope = -neighbours - 2 * 0.5 * (axis * x).sum(axis=0) * axis - 0.1 * np.array([0, 0, 1])[:, None, None]

@@ -32,7 +32,7 @@ from phigen.symbolic.verdict import PROVED
 SPINS = "coordinates: [x, y, z]\npoisson: {lie_algebra: {name: so(3)}}\ncasimirs: {C: x**2 + y**2 + z**2}\n"
 CANONICAL = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
 TEXTS = {
-    # all parts depend on the time, which advances by itself; a phase at each site
+    # all parts depend on the time, which advances separately; a phase at each site
     "driven": "lattice: {axes: [i], boundary: open}\nparameters: {w: 1.7, f: {value: 0.3*i, at: sites}}\n"
     f'{SPINS}hamiltonian: "-(x*x[i+1] + y*y[i+1] + z*z[i+1]) - cos(w*t + f)*z - 0.3*(x + y)*t"',
     # the time advances with the kinetic energy
@@ -63,7 +63,7 @@ def solver(name: str, order: int = 2, target: str = "numpy") -> LatticeSolver:
 
 
 def given(name: str) -> tuple[np.ndarray, dict[str, Any]]:
-    """A state, and all parameters, with the bonds."""
+    """Return a state, and all parameters including the bonds."""
     spec, sizes, random = compiled(name).spec, SIZES.get(name, (4,)), np.random.default_rng(1)
     lengths = {"sites": sizes, "bonds": (len(BONDS),), "all": ()}
     values = {p.name: random.uniform(0.5, 1.5, lengths[p.at]) for p in spec.parameters}
@@ -72,7 +72,7 @@ def given(name: str) -> tuple[np.ndarray, dict[str, Any]]:
 
 
 def expanded(name: str) -> tuple[Spec, dict[str, Any]]:
-    """The ordinary spec, and its values at T0."""
+    """Return the ordinary spec, and its values at T0."""
     cell, (x, values) = compiled(name).cell, given(name)
     assert cell is not None
     whole = expand(cell, x.shape[1:], values.get("bonds", np.empty((0, 2))).tolist())
@@ -84,7 +84,7 @@ def expanded(name: str) -> tuple[Spec, dict[str, Any]]:
 def test_energy_and_field_are_those_of_the_expansion(name: str) -> None:
     spec, here = expanded(name)
     x, values = given(name)
-    system = system_from_spec(specs.loads(spec_text(spec)))  # as phigen show --expand prints it
+    system = system_from_spec(specs.loads(spec_text(spec)))  # the text that phigen show --expand prints
     np.testing.assert_allclose(
         solver(name).hamiltonian(x, T0, parameters=values), evaluate([spec.hamiltonian], here)[0]
     )
@@ -147,7 +147,9 @@ def test_states_at_times_are_steps_from_the_nearest_frame_at_its_time(target: st
     states = run.at(times)
     assert states.shape == (5, *x.shape)
     np.testing.assert_allclose(states[[0, 3]], run.x[[0, -1]], rtol=0, atol=0)
-    np.testing.assert_allclose(states[1], every.x[3], rtol=0, atol=1e-13)  # a step back from the frame at 0.4
+    np.testing.assert_allclose(
+        states[1], every.x[3], rtol=0, atol=1e-13
+    )  # a step of negative size from the frame at 0.4
     np.testing.assert_allclose(states[2], integrator.step(run.x[2], 0.03, t0=T0 + 0.8, **asked), rtol=0, atol=1e-14)
     after = integrator.step(integrator.step(run.x[1], h, t0=T0 + 0.4, **asked), 0.07, t0=T0 + 0.5, **asked)
     np.testing.assert_allclose(states[4], after, rtol=0, atol=1e-14)
