@@ -1,7 +1,7 @@
 // Pictures of the live panel for ordinary systems: the motion in space or in a plane, on the surface or curve to which
 // a conserved quantity restricts it.
 
-// The unit for errors of a quantity: its value or, if this is nearly 0, the magnitude of its terms.
+// The unit for errors of a quantity: the value at the start or, if this is nearly 0, the magnitude of the terms.
 function unitOf(quantity, x) {
   const value = Math.abs(quantity(x));
   let terms = 0;
@@ -46,8 +46,8 @@ function makeView(panel) {
   const spaces = sides.map((side) => inSpace(at(side), view, () => panel.draw(), reset));
   let bounds, net;
 
-  // The race of a new solver and RK4, with the errors of conserved quantities. Throws the errors of the solver for
-  // values that it does not accept.
+  // A comparison (class Race) of a new solver with RK4, with the errors of conserved quantities. Throws an error of the
+  // solver if the solver refuses the settings.
   function begin({ Solver, rateAt }, given) {
     const solver = new Solver({ x0: given.start, t0: data.t0, params: given.params });
     const field = (x, t) => {
@@ -66,14 +66,14 @@ function makeView(panel) {
     return new Race(solver, { h: given.h, parts: given.parts, field, groups, remember: (runner) => remember(runner, field, given.h) });
   }
 
-  // Append the state of a runner to its trail, with the slope multiplied by the step.
+  // Append the state of one method's run to its trail, with the derivative ẋ multiplied by the step size.
   function remember(runner, field, h) {
     const slope = field(runner.x, runner.t).x.map((v) => v * h);
     (runner.trail ??= []).push({ x: runner.x, slope });
     if (runner.trail.length > MOST) runner.trail.shift();
   }
 
-  // A race of some steps, with the least and the largest coordinates of the solver.
+  // A trial run of some steps: the comparison with RK4, and the least and largest value of each coordinate of the solver.
   function bounded(given, steps, milliseconds) {
     let low, high;
     const trial = tried(given, steps, milliseconds, ({ x }) => {
@@ -179,7 +179,7 @@ function makeView(panel) {
     write(end(v, v.high), left - 5, 10, "right", "top");
   }
 
-  // The trail of a runner as points on the screen; of the last step, only the part that was shown so far.
+  // The trail of one method's run as points on the screen; of the last step, only the part that was shown so far.
   function trailOf(runner, axes, place) {
     const points = [], { trail } = runner, { waiting } = panel, parts = 6;
     for (let k = 1; k < trail.length; k++) {

@@ -60,8 +60,8 @@ function makeView(panel) {
   const countOf = (sizes) => sizes.reduce((product, n) => product * n, 1);
   let low, high, table, ground;
 
-  // The race of a new solver and RK4, with the errors of conserved quantities. Throws the errors of the solver for
-  // values that it does not accept.
+  // A comparison (class Race) of a new solver with RK4, with the errors of conserved quantities. Throws an error of the
+  // solver if the solver refuses the settings.
   function begin({ Solver }, given) {
     const sizes = sizesOf(given), count = countOf(sizes), params = { ...given.params };
     for (const [name, values] of Object.entries(data.arrays)) {
@@ -73,7 +73,7 @@ function makeView(panel) {
     return new Race(solver, { h: given.h, parts: given.parts, field, groups, remember: (runner) => remember(runner, solver, chosen, sizes) });
   }
 
-  // The function for the energy error, relative to |H| at the start or, if this is nearly 0, to the sum of the
+  // A function that returns the energy error, relative to |H| at the start or, if |H| is nearly 0, to the sum of the
   // magnitudes of the energies of all sites.
   function energyError(solver) {
     const energy = solver.hamiltonian(), sites = solver.density().reduce((sum, v) => sum + Math.abs(v), 0);
@@ -81,8 +81,8 @@ function makeView(panel) {
     return (x) => Math.abs(solver.hamiltonian(x) - energy) / unit;
   }
 
-  // The function for the largest error of some Casimirs. For Casimirs of sites it is the error of the worst site;
-  // errors of sums are relative to the magnitudes of their terms.
+  // A function that returns the largest error of some Casimirs. For Casimirs of sites this is the error of the worst
+  // site; for Casimirs that are sums, errors are relative to the magnitudes of the terms.
   function offCasimirs(solver, chosen) {
     const first = solver.casimirs(), { count } = solver.sites, kinds = solver.constructor.CASIMIR_KINDS;
     const units = kinds.map((_, k) => first.subarray(k * count, (k + 1) * count).reduce((sum, v) => sum + Math.abs(v), 0) || 1);
@@ -101,8 +101,8 @@ function makeView(panel) {
     };
   }
 
-  // The function for the largest error of some invariants. Each is an observable; the next observable is the sum of the
-  // magnitudes of its terms.
+  // A function that returns the largest error of some invariants. Each invariant is an observable of the solver, and the
+  // observable after it is the sum of the magnitudes of its terms.
   function offInvariants(solver, chosen) {
     const first = Float64Array.from(solver.observables());
     const unit = (k) => (Math.abs(first[k]) > 1e-3 * first[k + 1] ? Math.abs(first[k]) : first[k + 1]) || 1;
@@ -141,7 +141,8 @@ function makeView(panel) {
 
   // -- choice of speed and colours
 
-  // The race after the first steps, with the least and largest value to draw, and the relative change in each step.
+  // A trial run of some steps: the comparison with RK4, the least and largest value to draw, and the change in each step
+  // relative to the range of the values.
   function surveyed(given, steps, milliseconds) {
     const chosen = data.groups[given.group], sizes = sizesOf(given), changes = [];
     let last, least = Infinity, most = -Infinity;
@@ -183,7 +184,8 @@ function makeView(panel) {
     table = null;
   }
 
-  // Settings for the search of a step: planes and cubes have fewer sites, which move similarly.
+  // Settings for the search of the initial step. Planes and cubes get fewer sites, whose motion is similar, so that the
+  // search is fast.
   function rehearsed(given) {
     const counts = data.sizes.map(countOf), few = counts.findLastIndex((count) => count <= 600);
     return data.picture === "plane" && few >= 0 ? { ...given, sites: Math.min(few, given.sites) } : given;
@@ -203,7 +205,7 @@ function makeView(panel) {
     return table;
   }
 
-  // Set the pixels of values; that of a site has the index place(site).
+  // Set the colours of pixels by the values of sites; the pixel of a site has the index place(site).
   function paint(pixels, values, place, all, direction) {
     const count = direction ? values.length / 3 : values.length;
     for (let site = 0; site < count; site++) {
@@ -216,8 +218,8 @@ function makeView(panel) {
     }
   }
 
-  // The picture of a runner. A diagram is kept while colours and stride are the same, so that only new columns are
-  // painted.
+  // The picture of the run of one method. A diagram is reused while colours and stride are the same, so that only new
+  // columns are painted.
   function pictureOf(runner, width, height, all) {
     const { kept } = runner;
     const fresh = runner.picture?.all === all && runner.picture.stride === kept.stride && data.picture === "diagram";
@@ -230,7 +232,7 @@ function makeView(panel) {
     return runner.picture;
   }
 
-  // Clear the canvas of a side, and return the rectangle for the picture; names of axes and colours are outside.
+  // Clear the canvas of one method, and return the rectangle of the picture, without axis names and the colour scale.
   function frame(k) {
     const canvas = at(sides[k]), pen = canvas.getContext("2d"), scale = window.devicePixelRatio || 1;
     canvas.width = canvas.clientWidth * scale;

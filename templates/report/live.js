@@ -8,7 +8,7 @@ if (document.getElementById("live-panel")) {
   const swatches = [...document.querySelectorAll("#live-panel .swatch")];
   const made = {};
   const solverOf = (order) => (made[order] ??= liveSolvers[order]());
-  const ahead = 100; // number of steps per click with reduced motion
+  const ahead = 100; // number of steps for each click, if the reader's system requests reduced motion
   // The values of sliders that select from a list.
   const lists = { order: data.orders, sites: (data.sizes ?? []).map((_, k) => k) };
   let settings, standard, race, changed = false, playing = false, waiting = 1, before = 0, seen = true;

@@ -93,7 +93,7 @@ class Race {
   }
 }
 
-// The time of one step of a runner in milliseconds, the shortest of several rounds; 0 if the step fails.
+// The time of one step of one method in milliseconds, the shortest of several rounds; 0 if the step fails.
 function millisecondsOf(runner, round) {
   let least = Infinity;
   try {

@@ -18,8 +18,8 @@ function makeStart({ data, begin, view, shortened, milliseconds = MILLISECONDS, 
   const partsOf = (given) => (given.compare === "step" ? 1 : (measured[alike(given)] ??= costOf(begin({ ...given, parts: 1 }))));
   const remember = (given, parts) => { measured[alike(given)] = parts; };
 
-  // The race after the given number of steps, or after as many as `limit` milliseconds allow. watch(runner) is called
-  // for each state of the solver.
+  // The comparison with RK4 after the given number of steps, or after as many as `limit` milliseconds allow.
+  // watch(runner) is called for each state of phigen's solver.
   function tried(given, steps, limit, watch = () => {}) {
     const trial = begin(given), { ours } = trial, end = performance.now() + limit;
     watch(ours);
