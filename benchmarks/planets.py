@@ -98,7 +98,7 @@ def planets() -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.floa
 
 
 def energy(masses: NDArray[np.float64], q: NDArray[np.float64], v: NDArray[np.float64], gm: float) -> float:
-    """Return the energy of all bodies."""
+    """Return the total energy of the bodies, in masses of the Sun times (astronomical units per day)²."""
     i, j = np.triu_indices(len(masses), 1)
     distances = np.linalg.norm(q[i] - q[j], axis=1)
     return float((masses @ (v**2).sum(axis=1)) / 2 - gm * (masses[i] * masses[j] / distances).sum())

@@ -31,8 +31,8 @@ _SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the st
 def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
     """Return the warning about the energy error of a run of an ordinary system; "" if there is none.
 
-    With forces or a time-dependent H, the error is that of the energy balance. There is no warning if the integral in
-    the balance is too inaccurate.
+    If forces act or H depends on the time, the error is that of the energy balance, H minus the work done. There is no
+    warning if the integral for the work is too inaccurate.
     """
     energy = summary.energy
     uncertain = summary.is_balance and not summary.off < energy.error / 2
@@ -64,7 +64,8 @@ def compares_with_rk4(compilation: Compilation, target: str, energy: Drift, step
 
 
 def rk4_warning(compilation: Compilation, problem: Problem, solver: Solver, energy: Drift) -> str:
-    """Return the warning that RK4 with the same processor time has a smaller energy error; "" if its error is larger.
+    """Return the warning that RK4 with the same processor time has less than half of the energy error; "" if it has
+    more.
 
     The caller checks `compares_with_rk4` first.
     """

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 def command(console: Console, what: str, folder: Path, suffix: str, names: tuple[str, ...], as_json: bool) -> None:
     """Draw the figures of the paper (arXiv:2303.15883), and print measured numbers beside those of the paper.
 
-    Files DIR/NAME.svg are overwritten. This needs matplotlib and a C compiler, and takes half a minute: the rigid body
-    makes 10^8 steps with each of three methods.
+    Files DIR/NAME.svg are overwritten. The command needs matplotlib and a C compiler. It takes half a minute, since the
+    rigid body makes 10^8 steps with each of three methods.
     """
     from phigen.drawing.palette import require_matplotlib, save
     from phigen.paper.plates import PLATES

@@ -92,11 +92,11 @@ def command(
 ) -> None:
     """Copy solvers into the folder DEST of another project, and check them there later.
 
-    The files NAME.h, NAME.c, NAME.py are those of `phigen build`. DEST/phigen-vendor.json records the spec,
-    options and version of each. Without SPEC, the solvers in DEST are generated again.
+    The files NAME.h, NAME.c, NAME.py are those of `phigen build`. For each solver, DEST/phigen-vendor.json records
+    the spec, the options and the version of phigen. Without SPEC, the solvers in DEST are generated again.
 
-    --check tests that the files are unmodified, and agree with their specs and this version of phigen. Without SPEC, it
-    tests all files of DEST. If a spec is missing, phigen says that its changes cannot be checked.
+    --check tests that the files are unmodified, and agree with their specs and this version of phigen. Without SPEC,
+    --check tests all files of DEST. If a spec is missing, a message says that changes of this spec cannot be checked.
     """
     *spec_files, last = paths
     folder = Path(last)
