@@ -29,7 +29,7 @@ from phigen.geometry.trace_casimirs import trace_casimirs
 from phigen.spec.model import NambuForm, PoissonForm, ProductForm, PullbackForm
 from phigen.symbolic.expression import Expression, call, gradient, number, power, product, substitute, symbol, total
 
-#: Largest degree of the polynomials among which Casimirs are searched.
+#: Largest degree of the polynomials in the search for Casimirs.
 DEGREE = 4
 
 

@@ -18,7 +18,7 @@ DEGREE = 2
 #: Points (a, a + b, a + 2b, …) at which Taylor polynomials are tried, as pairs (a, b). Many functions have rational
 #: values at the first two points.
 _BASES = ((0, 0), (1, 0), (2, 1))
-#: Largest number of lines that are tried in search of one on which the function has values.
+#: Largest number of lines that are tried until the function has values on one of them.
 _LINES = 8
 
 

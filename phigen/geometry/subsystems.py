@@ -14,7 +14,7 @@ from phigen.symbolic.expression import ZERO
 def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> System:
     """Return a system with H = 0 in the given coordinates, with π by ``form`` and with the parameters of ``system``.
 
-    It has no Casimirs and invariants, which are not searched. Raises the errors of `structure`.
+    Its Casimirs and invariants are left empty, without a search. Raises the errors of `structure`.
     """
     matrix, shape = structure(form, coordinates)
     return replace(

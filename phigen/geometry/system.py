@@ -228,7 +228,7 @@ def build_system(
     forces: SpecForces | None = None,
     noise: Mapping[str, SpecNoise] | None = None,
 ) -> System:
-    """Return a `System` from its parts; its shape is recognised, and further Casimirs are searched."""
+    """Return a `System` from its parts: the shape of π is recognised, and further Casimirs are searched for."""
     locations = locations or {}
     declared = dict(casimirs or {})
     try:

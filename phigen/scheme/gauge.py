@@ -31,10 +31,10 @@ MAX_TERM_RATIO = 1.3
 #: Index i of the term S_i of the generating function whose error h^i π∇S_i the gauge makes small.
 GUIDE = 3
 
-#: Largest number of operations of π∇S_3, as estimated by `guide_operations`, for which the solver searches a gauge. The
-#: search evaluates π∇S_3 at 32 states for 7 values of λ, up to four times for each λ. At this limit it takes some ten
-#: million operations, a hundredth of a second, at the start of each trajectory. The systems of the corpus need at most
-#: 2,600 operations.
+#: Largest number of operations of π∇S_3, as estimated by `guide_operations`, for which the solver searches for a gauge.
+#: The search evaluates π∇S_3 at 32 states for 7 values of λ, up to four times for each λ. At this limit it takes some
+#: ten million operations, a hundredth of a second, at the start of each trajectory. The systems of the corpus need at
+#: most 2,600 operations.
 MOST_GUIDE_OPERATIONS = 10_000
 
 
@@ -155,7 +155,8 @@ def choose(
 
 
 def unaffordable(system: System) -> str:
-    """Return the reason why the solver does not search the multiple λ in H − λC; "" if the search is cheap enough."""
+    """Return the reason why the solver does not search for the multiple λ in H − λC; "" if the search is cheap
+    enough."""
     try:
         operations = guide_operations(system)
     except OverflowError as error:

@@ -248,7 +248,7 @@ class Program:
 
     @property
     def searches_gauge(self) -> bool:
-        """Whether the solver searches the gauge of a trajectory on sample states, instead of computing it by a
+        """Whether the solver finds the gauge of a trajectory by a search over sample states, instead of by a
         formula."""
         return self.gauge is not None and self.offers("gauge-search")
 

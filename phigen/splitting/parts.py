@@ -107,7 +107,7 @@ def _lost_invariant_count(ring: Ring, parts: Sequence[Sequence[Term]], invariant
 def _candidates(
     system: System, conflicts: Conflicts, terms: list[Term], *, motions: bool, rigid: bool
 ) -> Iterator[list[Term]]:
-    """Yield lists of terms whose sum is H, among which the best division into parts is searched.
+    """Yield lists of terms whose sum is H; each list is a candidate for the best division of H into parts.
 
     The lists are, in this order: the terms as written; with squares of sums undivided; with motions as single terms;
     summed by blocks of π; with companions subtracted; and with groups of terms summed.

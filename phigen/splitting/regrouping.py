@@ -23,7 +23,8 @@ from phigen.splitting.terms import joined, monomial_terms
 from phigen.symbolic.expression import Expression, total
 from phigen.symbolic.tower import Poly
 
-#: Largest number of coordinates that are closed under brackets for which Casimirs of their brackets are searched.
+#: Largest number of coordinates that are closed under brackets for which a search for Casimirs of these brackets is
+#: made.
 MOST_COORDINATES = 8
 
 
