@@ -107,11 +107,11 @@ def _rotations(system: System, algebra: LieAlgebra) -> Group:
     """
     triples = [(r, s) for r in combinations(range(algebra.dimension), 3) if (s := _sign(algebra, r))]
     if len(triples) != 1:
-        count_text = "there are several" if triples else "there are none"
+        count_text = "several such triples" if triples else "no such triple"
         raise refused(
             system,
             f"reconstruct: quaternion needs three coordinates with the brackets of so(3), {{a, b}} = ±c and cyclic, "
-            f"and all others together an ideal; {count_text} in {algebra.name}",
+            f"such that the other coordinates form an ideal; {algebra.name} has {count_text}",
             "reconstruct: matrix works for every algebra with known matrices, with scheme: series or splitting",
         )
     rotation, sign = triples[0]

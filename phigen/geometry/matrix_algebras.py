@@ -45,7 +45,9 @@ def algebra_of_sparse_matrices(
     span = Span(field, converted)
     if span.dependent:
         which = span.dependent[0] + 1
-        raise SpecError([Diagnostic(f"lie_algebra matrices: E{which} is a linear combination of those before it")])
+        raise SpecError(
+            [Diagnostic(f"lie_algebra matrices: E{which} is a linear combination of the matrices before it")]
+        )
     constants = {}
     for i, j in combinations(range(len(matrices)), 2):
         commutator = product(converted[i], converted[j])

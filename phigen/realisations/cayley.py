@@ -60,7 +60,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     terms, explanation = closed_product(dual.algebra)
     n, size = system.dimension, dual.algebra.dimension
     if any(i < n <= b for i, _, b, _ in terms):  # p_b, b ≥ a, is p_z of the extension
-        raise refuse(f"birealisation {KIND} does not restrict to this affine π", "try exponential")
+        raise refuse(f"birealisation {KIND} is not defined for this affine π", "try exponential")
     x = [symbol(c) for c in system.coordinates]
     increment = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
     quadratic: list[dict[Powers, Expression]] = [{} for _ in range(size)]

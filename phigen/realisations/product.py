@@ -51,7 +51,9 @@ def assembled(
     for part, realisation in zip(parts, realisations, strict=True):
         if realisation.path:
             names = ", ".join(part.coordinates)
-            raise refuse(f"birealisation {KIND}: no closed form is known for the block ({names})", "try karasev")
+            raise refuse(
+                f"birealisation {KIND}: no closed form is known for the block ({names})", "karasev follows paths"
+            )
 
     def joined(name: str) -> tuple[Expression, ...]:
         values = {c: e for r in realisations for c, e in zip(r.coordinates, getattr(r, name), strict=True)}

@@ -38,7 +38,7 @@ def expect_element(system: System, realisation: BiRealisation) -> None:
     """Raise `SpecError` if phigen does not know the group element of the steps of this bi-realisation."""
     if realisation.kind not in KINDS or not realisation.exact:
         message = f"reconstruct: the bi-realisation {realisation.kind} has no group element that phigen knows"
-        raise refused(system, message, "exponential and cayley have one")
+        raise refused(system, message, "birealisation: exponential, or cayley")
 
 
 def stage_attitude(
@@ -73,13 +73,15 @@ def gauss_attitude(
     series = "scheme: series or splitting"
     if not points.realisation.exact:
         raise refused(
-            system, "reconstruct: steps to truncation have no group element", f"structure: exact, or {series}"
+            system,
+            "reconstruct: with structure: to truncation there is no group element",
+            f"structure: exact, or {series}",
         )
     if group.matrices:
         hint = f"{series}; on so(3) and se(3) also quaternion"
-        raise refused(system, "reconstruct: Gauss steps have a quaternion, not a matrix", hint)
+        raise refused(system, "reconstruct: Gauss steps offer a quaternion, not a matrix", hint)
     if system.forces and any(not z.is_zero for z in system.forces.covector):
-        message = "reconstruct: with covector forces the group element of a Gauss step is not that of the body"
+        message = "reconstruct: with covector forces, the group element of a Gauss step does not rotate the body"
         raise refused(system, message, series)
     element_less_one = group_element(points, group)
     if element_less_one is None:

@@ -195,7 +195,7 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
     modified = modified_kick(system, small_flow, large_flow)
     if modified is None:
         message = f"scheme splitting: composition {method.name} needs B and {{B, {{B, A}}}} in coordinates that commute"
-        hint = "coordinates_from: jacobi has such a B, and composition: wisdom-holman-17 takes any"
+        hint = "use coordinates_from: jacobi, where B is of this kind, or composition: wisdom-holman-17, for every B"
         raise SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
     return replace(choice, splitting=SplitHamiltonian((modified, large_flow), kick=0, small=0))
 
@@ -203,7 +203,7 @@ def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMet
 def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) -> SpecError:
     """Return the error for a composition for near-integrable systems, if no part of H is known to be small."""
     count = len(splitting.flows)
-    situation = "none is known to be small" if count == 2 else f"here {'is one' if count == 1 else f'are {count}'}"
+    situation = "none is known to be small" if count == 2 else f"this H has {count} part{'s' * (count > 1)}"
     message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {situation}"
     hint = "small: true of a parameter declares that the terms with this factor are small"
     return SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
@@ -282,11 +282,11 @@ def _not_applicable(
     """Return the error for a Nyström method if H has no two parts T and V with {V, {V, {V, T}}} = 0."""
     count = len(splitting.flows)
     if count != 2:
-        reason = f"H = T + V, of two parts; here there {'is one' if count == 1 else f'are {count}'}"
+        reason = f"H = T + V, of two parts; this H has {count} part{'s' * (count > 1)}"
     elif kicks_of():
         reason = "a flow of V + κ{V, {V, T}} in closed form, which phigen does not find"
     else:
         reason = "{V, {V, {V, T}}} = 0 with one of the two parts as V, which does not hold here"
-    hint = "composition: auto chooses the best that applies; phigen show --scheme splitting shows the parts"
+    hint = "composition: auto chooses the best one that applies; phigen show --scheme splitting shows the parts"
     place = system.locations.get(("composition",))
     return SpecError([Diagnostic(f"scheme splitting: composition {composition} needs {reason}", place, hint)])

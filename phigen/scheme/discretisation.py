@@ -201,7 +201,7 @@ def _forced(
     """Return the discretisation with forces, p = h(∇H + ζ). It has order 2 by symmetry, and higher orders by
     compositions."""
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
-        reason = f"forces: a vector needs a bi-realisation in closed form; {realisation.kind} follows paths"
+        reason = f"forces: a vector force needs a bi-realisation in closed form, but {realisation.kind} follows paths"
         place = system.locations.get(("forces", "vector"))
         raise SpecError([Diagnostic(reason, place, "use a covector force, or choose another birealisation")])
     lowest = 2 if series.symmetric else 1

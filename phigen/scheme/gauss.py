@@ -51,7 +51,7 @@ def expect_offered(spec: Spec) -> None:
 
 def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
     """Yield each option of a spec that Gauss methods do not offer, as the path of its key, a message and a hint."""
-    extras, series = spec.extras, "scheme: series has it"
+    extras, series = spec.extras, "scheme: series computes it"
     if spec.lattice:
         yield ("lattice",), "not for lattices", "scheme: auto, splitting or series"
     if spec.noise:
@@ -59,9 +59,9 @@ def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
     if extras.modified_hamiltonian:
         yield ("modified_hamiltonian",), "the modified Hamiltonian is not computed", series
     if spec.composition not in ("auto", "none"):
-        yield ("composition",), "steps are not composed", f"order: up to {2 * MOST_STAGES}, in one step"
+        yield ("composition",), "compositions are not offered", f"order: up to {2 * MOST_STAGES}, in one step"
     if spec.solver.tolerance is not None:
-        yield ("solver", "tolerance"), "it solves to round-off", "remove tolerance"
+        yield ("solver", "tolerance"), "the stages are solved to round-off", "remove tolerance"
 
 
 def plan_gauss(spec: Spec) -> Order:
@@ -101,11 +101,14 @@ def _other_coordinates(system: System) -> str:
     """Return the beginning of a hint: linear combinations of the coordinates may have an exact Poisson map. Returns ""
     if this is unlikely by the form of π."""
     if isinstance(system.shape, LiePoisson | Affine):
-        return "a basis with fewer structure constants, as those of lie_algebra, may have one; otherwise "
+        return (
+            "in a basis with fewer structure constants, such as those of lie_algebra: NAME, such a map may be known; "
+            "otherwise "
+        )
     entries = [entry for row in system.poisson for entry in row]
     terms = coordinate_terms(system.coordinates, entries)
     if terms is not None and all(sum(powers) == 2 for monomials in terms for powers in monomials):
-        return "take coordinates with brackets {x_i, x_j} = c x_i x_j, if linear combinations have them; otherwise "
+        return "use linear combinations of the coordinates with {x_i, x_j} = c x_i x_j, if there are any; otherwise "
     return ""
 
 

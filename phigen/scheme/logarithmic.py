@@ -82,15 +82,15 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
         return None
     message = ""
     if not isinstance(spec.monitor, str):
-        message = "monitor: an expression makes K = g(H + e), which does not split; scheme: splitting offers log"
+        message = "monitor: with an expression g, K = g(H + e) does not split; scheme: splitting offers monitor: log"
     elif spec.time:
         message = "monitor: not together with time: e = -H(x0) would not be constant"
     elif system.forces:
         message = "monitor: log is not offered with forces: e = -H(x0) would not be constant"
     elif len(flows) != 2:
-        message = f"monitor: log needs H = A + B of two parts with elementary flows; here there are {len(flows)}"
+        message = f"monitor: log needs H = A + B of two parts with elementary flows; this H has {len(flows)}"
     elif not isinstance(spec.gauge, str):
-        message = "monitor: log is not offered with a gauge: the parts of H would not be those of the motion"
+        message = "monitor: log is not offered with a gauge, which would change the parts of H"
     if message:
         hint = EXTENDED_SYSTEM_HINT if spec.time else "scheme: series allows an expression for g"
         raise SpecError([spec.diagnostic(("monitor",), message, hint)])

@@ -66,13 +66,16 @@ def monitor_of(spec: Spec) -> Expression | None:
     """
     if spec.monitor is None:
         return None
-    obstacles = {"time:": spec.time, "lattice:": spec.lattice}
-    for key, value in obstacles.items():
-        if value:
-            message = f"monitor: not together with {key} e = -H(x0) would not be constant, or nothing would adapt"
+    obstacles = {
+        "time: e = -H(x0) would not be constant": spec.time,
+        "lattice: the fastest site would determine the steps of all": spec.lattice,
+    }
+    for obstacle, is_present in obstacles.items():
+        if is_present:
+            message = f"monitor: not together with {obstacle}"
             raise SpecError([spec.diagnostic(("monitor",), message, EXTENDED_SYSTEM_HINT if spec.time else "")])
     if spec.forces and not isinstance(spec.gauge, str):
-        message = "monitor: with forces no Casimirs are subtracted from K, as there are none"
+        message = "gauge: with a monitor and forces no Casimirs are subtracted, since steps are not those of K"
         raise SpecError([spec.diagnostic(("gauge",), message, "gauge: none")])
     if isinstance(spec.monitor, str):
         hint = "scheme: splitting, or dt/dtau as an expression in the coordinates"

@@ -53,7 +53,7 @@ def _flow(system: System, source: Source) -> Flow:
     noise_system = replace(system.frozen, hamiltonian=source.hamiltonian, noise=())
     reason = f"scheme: splitting needs the flow of the noise {source.name} in closed form, which phigen does not find"
     place = system.locations.get(("noise", source.name))
-    refused = SpecError([Diagnostic(reason, place, "scheme: series applies to it")])
+    refused = SpecError([Diagnostic(reason, place, "scheme: series needs no flow of the noise")])
     try:
         flows = split(noise_system).flows
     except SpecError:

@@ -212,11 +212,13 @@ def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic |
     """
     for flow in flows if monitor else ():
         if flow.exponentials:
-            message = "monitor: log: the flow of {} takes a matrix exponential, whose time must not depend on the state"
+            message = (
+                "monitor: log makes the time of a flow depend on the state, but that of {} uses a matrix exponential"
+            )
             diagnostic = Diagnostic(
                 message.format(shortened(flow.hamiltonian)),
                 system.locations.get(("monitor",)) or system.locations.get(("hamiltonian",)),
-                "scheme: series takes a monitor with every H",
+                "scheme: series offers an expression as monitor for every H",
             )
             raise SpecError([diagnostic])
 
@@ -227,10 +229,10 @@ def _expect_correctable(system: System, spec: Spec, method: Corrected) -> None:
     Most of them need the state after each single step, which exists only at the end of a run.
     """
     refused = {
-        "time": (bool(system.time), "the corrector would need its own times"),
-        "noise": (bool(system.noise), "the corrector would undo random increments"),
-        "forces": (system.forces is not None, "the corrector would undo dissipation"),
-        "monitor": (spec.monitor is not None, "the corrector takes equal steps of the physical time"),
+        "time": (bool(system.time), "the flows of a corrector would need times of their own"),
+        "noise": (bool(system.noise), "the inverse of a corrector cannot reverse noise"),
+        "forces": (system.forces is not None, "the inverse of a corrector would reverse dissipation"),
+        "monitor": (spec.monitor is not None, "a corrector requires steps that are equal in the physical time"),
         "reconstruct": (bool(spec.reconstruct), "attitudes are those of single steps"),
     }
     for key, (is_present, reason) in refused.items():

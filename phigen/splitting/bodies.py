@@ -82,7 +82,7 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
     body_of = {c: i for axis in axes for i, c in enumerate(axis)}
     momenta = [[conjugate(ring, c) for c in axis] for axis in axes]
     if missing := [c for axis in axes for c in axis if conjugate(ring, c) is None]:
-        reason = f"{ring.coordinates[missing[0]]} has no canonical momentum p with {{q, p}} = 1, as velocities are none"
+        reason = f"{ring.coordinates[missing[0]]} has no momentum p with {{q, p}} = 1; a velocity is not a momentum"
         raise _NoBodiesError(f"{reason}; poisson: {{canonical: {{q: […], p: […]}}}} has them")
     coefficients = ring.terms(ring.tower.combine(t.element for t in terms), ring.state)
     used_monomials: set[Monomial] = set()
@@ -103,7 +103,7 @@ def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[T
         if weights[0] == 0 or any(weight != weights[0] for weight in weights):
             raise _NoBodiesError(f"the body at {name} has no kinetic energy p**2/(2*m)")
         if i and not any((i, j) in strengths for j in range(i)):
-            raise _NoBodiesError(f"the body at {name} is not attracted by those before it")
+            raise _NoBodiesError(f"the body at {name} is not attracted by any body before it")
         used_monomials.update(squares)
         masses.append(power(ring.expression(2 * weights[0]), -1))
     positions, conjugates = (

@@ -178,7 +178,7 @@ def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, metho
         return solution
     moving = {c for c, e in zip(ring.coordinates, solution.increments, strict=True) if not e.is_zero}
     if any(e.op == "sign" and not moving.isdisjoint(symbols_of(e)) for e in topological(solution.increments)):
-        return "it moves across a kink, as that of abs(q) at q = 0"
+        return "the flow crosses a kink, such as that of abs(q) at q = 0"
     return Flow(g, tuple(_as_written(ring, g, solution)), solution.manner, exponentials=solution.exponentials)
 
 

@@ -27,7 +27,7 @@ from phigen.symbolic.readable import shortened
 Field = tuple[Expression, ...]
 
 _DAMPING_HINT = (
-    "that of a spin has one where H is linear or quadratic along an axis in it; scheme: series applies to every H"
+    "damping of a spin has a flow if H is linear in it, or quadratic along an axis; scheme: series applies to every H"
 )
 
 

@@ -126,7 +126,7 @@ def test_where_the_condition_fails_by_one_term_the_alternation_is_taken(text):
 
 def test_three_parts_and_orders_that_a_name_lacks_are_refused():
     lattice = "coordinates: [x, y, z]\npoisson: {log_canonical: [[0,1,-1],[-1,0,1],[1,-1,0]]}\nhamiltonian: x + y + z\n"
-    with pytest.raises(SpecError, match=r"needs H = T \+ V, of two parts; here there are 3"):
+    with pytest.raises(SpecError, match=r"needs H = T \+ V, of two parts; this H has 3"):
         composition_of(lattice, 6, "force-gradient")
     with pytest.raises(SpecError, match="here there is one"):
         composition_of(PLANE + "hamiltonian: p**2/2\n", 6, "force-gradient")
