@@ -103,7 +103,7 @@ class _SortedAxes:
 
     @property
     def c(self) -> Expression:
-        """The constant c = β_h x_m² − β_m x_h²."""
+        """The constant c = β_h x_m² − β_m x_h², where x is the momentum and l, m, h are the axes."""
         _, of_m, of_h = self.betas
         return of_h * self.x[1] ** 2 - of_m * self.x[2] ** 2
 

@@ -156,7 +156,8 @@ def _temperature(
 
 def _ratio(numerator: Expression, denominator: Expression) -> Expression:
     """Return the quotient of two expressions, with common factors cancelled."""
-    for _ in range(2):  # the ring of round 2 knows the squares of roots from round 1
+    # Two rounds: the first one replaces squares of roots, so that the second one finds the common factors.
+    for _ in range(2):
         tower = Tower(symbols_of(numerator, denominator), [numerator, denominator])
         a, b = (tower.simplified(e) for e in tower.convert_all([numerator, denominator]))
         common = a.gcd(b)

@@ -16,8 +16,7 @@ _ALWAYS = {"exp": POSITIVE, "cosh": POSITIVE, "abs": NOT_NEGATIVE, "pi": POSITIV
 
 
 def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequence[Mapping[str, float]]) -> Statement:
-    """Return the statement that ``e`` is positive, except where it is not defined or, if only its form decides, where
-    it is 0.
+    """Return the statement that ``e`` is positive wherever it has a value other than 0.
 
     The statement is refuted if ``e`` is not positive at one of the ``starts`` of runs. It is proved if the form of
     ``e`` shows the sign, given that the symbols ``positive`` are positive. Otherwise it is checked at the starts.

@@ -69,11 +69,11 @@ def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expressi
 
 
 def _parts(algebra: LieAlgebra) -> list[list[int]]:
-    """Return ideals, given by the indices of basis elements, that commute with each other and whose sum acts as the
-    algebra.
+    """Return ideals of the algebra that commute with each other, as lists of indices of the basis elements that span
+    them.
 
-    Ideals may share central elements, such as the last one of a central extension. Basis elements that commute with all
-    others are left out, since M_p x has no component along them.
+    Together they contain all basis elements with nonzero brackets. All other basis elements are left out, since M_p x
+    has no component along them. Ideals may share central elements, such as the last one of a central extension.
     """
     touching = {m for ij in algebra.constants for m in ij}
     inner = {ij: {k: c for k, c in row.items() if k in touching} for ij, row in sorted(algebra.constants.items())}
@@ -170,7 +170,7 @@ def _nilpotent(tower: Tower, matrix: Sequence[Vector], x: Vector) -> EvenPart | 
     power = times(matrix, x)
     for k in range(len(matrix)):
         power = times(matrix, power)
-        if k % 2 == 0:  # N^{k/2+1} x
+        if k % 2 == 0:  # power is N^{k/2+1} x with N = M²
             if _vanish(tower, power):
                 break
             terms.append([number((-1) ** (k // 2) * coefficient(0, k // 2)) * v for v in power])

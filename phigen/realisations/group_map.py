@@ -93,7 +93,10 @@ def _dense(representation: Representation) -> list[Matrix]:
 
 
 def _matrix(system: System, representation: Representation, tau: Expression | Sequence[Sequence[Expression]]) -> Matrix:
-    """Return τ as a matrix of expressions in the components of p."""
+    """Return the map τ of the spec as a matrix of expressions in the components of p.
+
+    A function of the symbol `MATRIX` is evaluated at P = Σ p_i E_i. Raises `SpecError` for a matrix of the wrong size.
+    """
     size = representation.size
     if not isinstance(tau, Expression):
         if len(tau) != size or any(len(row) != size for row in tau):

@@ -1,1 +1,1 @@
-"""The one-step map of a method as a staged straight-line program."""
+"""One-step maps: how the step of each method becomes a program of functions without loops or branches."""

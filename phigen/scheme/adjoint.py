@@ -148,8 +148,8 @@ def completed(
 ) -> Adjoint:
     """Return the transpose of a step from the transposed kernels ``steps`` of the step itself.
 
-    The transposes of ``prepare`` and ``refresh`` are added. These two kernels must be built before, with the full table
-    of coefficients.
+    The transposes of ``prepare``, which computes the coefficients before the steps, and of ``refresh``, which computes
+    those that are new in each step, are added. Both kernels must be built before, with the full table of coefficients.
     """
     differentiated = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):

@@ -42,7 +42,10 @@ class Alternation:
 
 
 def _partitioned(name: str, order: int, halves: tuple[str, str]) -> Alternation:
-    """Return a method from the first halves of a_1, … and b_1, …; the middle values follow from Σa = Σb = 1."""
+    """Return a method from the first halves of its coefficients a_1, … and b_1, … for two parts.
+
+    The coefficients are symmetric; the middle values follow from Σa = Σb = 1.
+    """
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     a = [*a, 1 - 2 * sum(a, Fraction(0)), *reversed(a)]
     remainder = Fraction(1, 2) - sum(b, Fraction(0))
@@ -109,7 +112,7 @@ class Schedule:
 
     @property
     def rows(self) -> int:
-        """The number of rows of ``times`` in one stage."""
+        """The number of rows of ``times`` that belong to one stage."""
         of_step = len(self.times) - len(self.begin) - len(self.end)
         return (of_step - 1) // self.stages if self.stages else 0
 

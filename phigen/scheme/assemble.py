@@ -181,7 +181,10 @@ def _path(
 
 
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
-    """Return the kernel that computes all coefficients. It must be built last, when their table is full."""
+    """Return the kernel that computes all values that depend on parameters and step size only, the coefficients.
+
+    It must be built last, when the table of coefficients is full.
+    """
     return Kernel(
         "prepare",
         "everything that depends on parameters and step size only",

@@ -50,7 +50,7 @@ class ScheduledMethod:
     carrier: int | None = None
 
     def schedule(self) -> Schedule:
-        """Return the flows of a step."""
+        """Return the order and the durations of the flows in a step of the method."""
         count, method = len(self.splitting.flows), self.method
         if self.carrier is None:
             if isinstance(method, Nystrom | Corrected):

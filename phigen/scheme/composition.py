@@ -63,7 +63,8 @@ _SOFRONIOU_SPALETTA_10 = (
 
 @dataclass(frozen=True)
 class Composition:
-    """A named composition: the fractions γ_1 … γ_s of the step, and its order."""
+    """A symmetric composition with its name and order; ``fractions`` are the γ_1 … γ_s, the parts of the step for its
+    stages."""
 
     name: str
     order: int

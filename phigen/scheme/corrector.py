@@ -68,7 +68,7 @@ def _pairs(count: int) -> tuple[tuple[Fraction, Fraction], ...]:
 
 
 def _kernel_series(count: int) -> list[Fraction]:
-    """Return the coefficients of z^0, z^2, … of (z/2)/sinh(z/2)."""
+    """Return the first ``count`` coefficients, those of z^0, z^2, …, of the power series of (z/2)/sinh(z/2)."""
     sinh = [Fraction(1, 4**k * factorial(2 * k + 1)) for k in range(count)]
     f = [Fraction(1)]
     for k in range(1, count):

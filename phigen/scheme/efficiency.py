@@ -35,7 +35,7 @@ NEWTON_ENTRY = 8.0
 #: the vector field, and of an elementary function in it. Then the nanoseconds of the remaining work of a step, and of a
 #: change to the frame of the next step. With up to four stages the operations take half of the time.
 STAGE_OPERATION, STAGE_FUNCTION, GAUSS_STEP, CHANGE_OF_FRAME = 3.0, 70.0, 130.0, 30.0
-#: Number of additions that take the time of a division.
+#: Time of a division, in units of an addition.
 DIVISION = 4
 #: Number of Gauss stages that fill a SIMD vector: eight doubles.
 LANES = 8

@@ -61,7 +61,7 @@ class Gauge:
 
     @property
     def multiples(self) -> tuple[str, ...]:
-        """The symbols of the free λ."""
+        """The symbols of the multiples λ of those Casimirs for which the solver chooses λ."""
         return tuple(Symbol(GAUGE, name) for name in self.free)
 
     @property

@@ -1,22 +1,22 @@
-"""Splitting methods for near-integrable systems, H = A + εB with exact flows of A and of B.
+"""Splitting methods for near-integrable systems H = A + εB, with exact flows of A and of B.
 
-A step is e^{a_1 hA} e^{b_1 hεB} … e^{b_s hεB} e^{a_{s+1} hA}, symmetric. Its error is a sum of terms ε^k h^m; a
-method of generalised order (8, 6, 4) has none below εh^8, ε²h^6 and ε³h^4, per unit of time. With c_i = a_1 + … +
-a_i, and B transported along A to c_i, whose Taylor coefficients are free in a Lie algebra, the conditions are as
-follows.
+A step is e^{a_1 hA} e^{b_1 hεB} … e^{b_s hεB} e^{a_{s+1} hA} with symmetric coefficients. Its error per unit of time is
+a sum of terms ε^k h^m. A method has the generalised order (8, 6, 4) if the terms of order ε, ε² and ε³ begin at εh^8,
+ε²h^6 and ε³h^4. Let c_i = a_1 + … + a_i. The order conditions follow from the flows of B at the times c_i along the
+flow of A:
 
-- of order ε: Σ b_i c_i^k = 1/(k + 1), those of a quadrature;
-- of order ε²: Σ_{i<j} b_i b_j (c_i^k c_j^l − c_i^l c_j^k) = (1/(k + 1) − 1/(l + 1))/(k + l + 2) for k < l, at
-  h^{k+l+2}.
+- of order ε: Σ b_i c_i^k = 1/(k + 1), as for a quadrature with the nodes c_i and the weights b_i;
+- of order ε²: Σ_{i<j} b_i b_j (c_i^k c_j^l − c_i^l c_j^k) = (1/(k + 1) − 1/(l + 1))/(k + l + 2) for k < l, which
+  removes errors at h^{k+l+2}.
 
-J. Laskar, P. Robutel, High order symplectic integrators for perturbed Hamiltonian systems, Celestial Mechanics and
-Dynamical Astronomy 80 (2001): Gauss's quadrature, (2s, 2). R. I. McLachlan, Composition methods in the presence of
-small parameters, BIT 35 (1995): (8, 4). S. Blanes, F. Casas, A. Farrés, J. Laskar, J. Makazaga, A. Murua, New
-families of symplectic splitting methods for numerical integration in dynamical astronomy, Applied Numerical
-Mathematics 68 (2013): (8, 6, 4) and (10, 6, 4). J. Wisdom, M. Holman, J. Touma, Symplectic correctors, Fields Institute
-Communications 10 (1996), and H. Rein, D. Tamayo, G. Brown, High-order symplectic integrators for planetary dynamics and
-their implementation in REBOUND, Monthly Notices of the Royal Astronomical Society 489 (2019): a kernel that is modified
-by {B, {B, A}}.
+Sources of the methods. Generalised order (2s, 2), by Gauss's quadrature: J. Laskar, P. Robutel, High order symplectic
+integrators for perturbed Hamiltonian systems, Celestial Mechanics and Dynamical Astronomy 80 (2001). Order (8, 4): R.
+I. McLachlan, Composition methods in the presence of small parameters, BIT 35 (1995). Orders (8, 6, 4) and (10, 6, 4):
+S. Blanes, F. Casas, A. Farrés, J. Laskar, J. Makazaga, A. Murua, New families of symplectic splitting methods for
+numerical integration in dynamical astronomy, Applied Numerical Mathematics 68 (2013). Correctors: J. Wisdom, M. Holman,
+J. Touma, Symplectic correctors, Fields Institute Communications 10 (1996). Steps that are modified by {B, {B, A}}: H.
+Rein, D. Tamayo, G. Brown, High-order symplectic integrators for planetary dynamics and their implementation in REBOUND,
+Monthly Notices of the Royal Astronomical Society 489 (2019).
 """
 
 from __future__ import annotations

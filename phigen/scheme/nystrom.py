@@ -152,7 +152,8 @@ _NYSTROM_18 = """
     -0.534650939236408517841131206699073656
 """
 
-#: All Nyström methods.
+#: All splitting methods of Nyström type: name, order, the part with which a step begins, times, norm of the leading
+#: error, multiples.
 METHODS = (
     _method("blanes-moan-rkn", 4, "V", _SRKN6B, 3.76e-5),
     _method("blanes-moan-rkn", 6, "T", _SRKN14A, 2.03e-7),

@@ -46,10 +46,10 @@ def restricted(sites: Sites, fields: Sequence[str], kernel: Kernel, selection: t
 
 
 def site_block(step: Sweeps, fields: Sequence[str], relax: Kernel) -> Kernel:
-    """Return the kernel of the derivatives of ``relax``, the right-hand side of y = …, with respect to y at the same
-    site.
+    """Return the kernel of the derivatives of ``relax`` with respect to y at the same site of a lattice.
 
-    Its output is a matrix over the fields, row by row.
+    ``relax`` is the right-hand side of the implicit equation y = … of a stage. The output is a matrix over the fields,
+    row by row.
     """
     places = step.sites.places
     at_site = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}

@@ -261,7 +261,7 @@ class Newton(_Staged):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once."""
+        """All kernels of the step, each once, which a target prints as functions."""
         factors = (self.factors.factorise, self.factors.substitute) if self.factors else ()
         kernels = (self.prepare, self.refresh, self.linearise, self.eliminate, self.eliminate_transposed, self.invert)
         return _present((*kernels, *factors, *self.transposed))
@@ -286,7 +286,7 @@ class Explicit(_Staged):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once."""
+        """All kernels of the step, each once, which a target prints as functions."""
         return _present((self.prepare, self.refresh, self.increment, self.tangent, *self.transposed))
 
 
@@ -350,7 +350,7 @@ class Path(_Staged):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once."""
+        """All kernels of the step, each once, which a target prints as functions."""
         lanes = (self.lanes.curvature, self.lanes.along_mean, self.lanes.invert) if self.lanes else ()
         varied = (self.curvature,) if not self.lanes else ()
         kernels = (self.prepare, self.refresh, self.generate, self.eliminate)
@@ -452,7 +452,7 @@ class Gauss(_Staged):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once."""
+        """All kernels of the step, each once, which a target prints as functions."""
         varied = (self.tangent.slope, self.tangent.change) if self.tangent else ()
         reduced = (self.reduced.slope, self.reduced.follow) if self.reduced else ()
         return _present((self.prepare, self.slope, *reduced, self.change, self.frame, *varied, *self.transposed))
@@ -506,7 +506,7 @@ class Splitting(_Scheduled):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once."""
+        """All kernels of the step, each once, which a target prints as functions."""
         return _present((self.prepare, self.refresh, *self.flows, *self.tangents, *self.transposed))
 
 
@@ -550,7 +550,7 @@ class Sites:
     least: tuple[int, ...] = ()
     ends: Mapping[str, tuple[str, str]] = field(
         default_factory=dict
-    )  # symbols of kernels of bonds or pairs: field and end
+    )  # for bonds and pairs: symbol of kernels → (field, end of the bond)
     at_bonds: tuple[str, ...] = ()  # names of the parameters with a value at each bond
     increments: tuple[str, ...] = ()  # symbols of the noise increments of a site in one part of a step
     derived: tuple[Symbol, ...] = ()  # symbols of values at sites, computed from parameters
@@ -621,7 +621,7 @@ class Partners:
 
     @property
     def gathers(self) -> tuple[Gather, ...]:
-        """All groups of sums, including empty groups."""
+        """All groups of sums over bonds or pairs; a group that a lattice does not need is empty."""
         return (self.energy, self.field, self.varied, self.observed, *(gather for _, gather in self.of_parts))
 
 
@@ -641,7 +641,7 @@ class PartRates:
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once."""
+        """The kernels of the densities and of their derivatives, each once."""
         return (*self.energies, *self.slopes)
 
 
@@ -694,7 +694,7 @@ class Equation:
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once."""
+        """All kernels of the equation, each once."""
         return self.relax, self.advance, self.slope, *self.tangents
 
 
@@ -812,7 +812,7 @@ class Sweeps(_Scheduled):
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
-        """All kernels, each once."""
+        """All kernels of the step, each once, which a target prints as functions."""
         swept = [sweep for part in self.parts for sweep in part]
         swept += [sweep.tangent for sweep in swept if sweep.tangent]
         swept_kernels = [sweep.kernel for sweep in swept]

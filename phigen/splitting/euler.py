@@ -63,7 +63,8 @@ class EulerMotion:
         return self._placed(names, rates)
 
     def increments(self, names: Sequence[str]) -> list[Expression]:
-        """Return the increments of all coordinates ``names`` over the time of the flow."""
+        """Return the increments of all coordinates ``names`` in the flow over the time `TIME`; others than those of the
+        body get 0."""
         return self._placed(names, self.addition(symbol(TIME)).changes())
 
     def addition(self, time: Expression) -> Addition:
@@ -118,7 +119,7 @@ class Addition:
         roots = [sqrt(c**2 + e * square) for e in gaps_below]
         # On the separatrix (R = 0) C > 0 and C equals a root, but rounding may make C negative.
         sigma = self._at_lowest([call("choose", self.r, c, root) for root in roots], roots)
-        versine = 8 * z * power(1 + z, -2)  # 1 − C
+        versine = 8 * z * power(1 + z, -2)  # 1 − C without cancellation
         losses = self._at_lowest([versine] * 3, [d * square / (1 + r) for d, r in zip(gaps_above, roots, strict=True)])
         divisor = c**2 - low * square
         # The difference σ_j σ_k − D, without cancellation: for large D from 1 − σ_j and 1 − σ_k, which are then small.

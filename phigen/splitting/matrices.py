@@ -41,7 +41,7 @@ class MatrixExponential:
 
     @property
     def size(self) -> int:
-        """The number of rows."""
+        """The number of rows of the matrix."""
         return next(n for n in range(1, 1 + len(self.rates)) if n * n == len(self.rates))
 
     @property

@@ -89,11 +89,11 @@ class RelativeMotions:
         return f"{len(self.kepler)} relative positions moved along conic sections, the centre of mass shifted"
 
     def field(self, names: Sequence[str]) -> list[Expression]:
-        """Return the rates of all coordinates ``names``."""
+        """Return the rates of all coordinates ``names`` in the motion of A."""
         return self._spread(names, [motion.rates() for motion in self.kepler], self.drift)
 
     def increments(self, names: Sequence[str]) -> list[Expression]:
-        """Return the increments of all coordinates ``names`` over the time of the flow."""
+        """Return the increments of all coordinates ``names`` in the flow of A over the time `TIME`."""
         shift = [symbol(TIME) * e for e in self.drift]
         return self._spread(names, [motion.changes() for motion in self.kepler], shift)
 

@@ -45,7 +45,7 @@ def _quadratic(ring: Ring, name: str, rate: Poly, moving: Collection[int]) -> So
     padded: dict[int, Poly] = dict.fromkeys((2, 1, 0), tower.zero) | terms
     a, b, c = (padded[k] for k in (2, 1, 0))
     half = tower.constant(Fraction(1, 2))
-    turning = tower.combine([a * c, tower.constant(Fraction(-1, 4)) * b * b])  # −w²
+    turning = tower.combine([a * c, tower.constant(Fraction(-1, 4)) * b * b])  # −w² with the w of tanh(wt)/w
     t, z = symbol(TIME), tower.variable(name)
     s = ring.expression(tower.combine([turning * tower.variable(TIME) ** 2]))
     speed, cosine = t * call("sinroot", s), call("cosroot", s)

@@ -59,7 +59,7 @@ class _Sphere:
         if not self._moves(rates, [[b] for b in beta], [()]):
             return None
         b = [self.ring.expression(e) for e in beta]
-        angle = -(self.t**2 / 4) * (self.square * dot(b, b))  # −(θ/2)²
+        angle = -(self.t**2 / 4) * (self.square * dot(b, b))  # −(θ/2)² of the boost parameter θ = t|x||β|
         scale = self.t / 2 * call("sinroot", angle) / call("cosroot", angle) * self.square
         return self._mirrored([scale * e for e in b])
 
@@ -86,7 +86,7 @@ class _Sphere:
 
     def _drawn(self, v: Sequence[Expression], strength: Expression) -> list[Expression]:
         projection = dot(v, self.x) / dot(v, v)
-        part = [projection * e for e in v]  # x_v
+        part = [projection * e for e in v]  # the component of x along v
         pull = call("tanh", self.t / 2 * strength * self.square)
         reflected = [c - 2 * e for c, e in zip(self.x, part, strict=True)]
         radius = sqrt(self.square)
