@@ -120,10 +120,11 @@ class _SortedAxes:
     def point(
         self, q: Expression, unit: Expression, square: Expression, s: Expression, c: Expression, d: Expression
     ) -> tuple[Expression, Expression]:
-        """Return the point in the plane whose polar angle is χ, with its second coordinate divided by L.
+        """Return the point in the plane whose polar angle is χ, a part of the angle θ; its second coordinate is divided
+        by L.
 
-        The arguments are Q, 1, T², S, C and D. If ``unit`` and ``square`` are 1 and T² times a common factor, the point
-        is multiplied by this factor, which does not change χ.
+        The formula is that of this module; the arguments are its Q, 1, T², S, C and D. If ``unit`` and ``square`` are 1
+        and T² times a common factor, the point is multiplied by this factor, which does not change χ.
         """
         of_l, of_m, _ = self.betas
         ratio = self.c * self.inverse

@@ -19,9 +19,9 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     """Return the one-sided bi-realisation of a canonical π; ``choice.side``, q or p, names the coordinates that α
     leaves as they are.
 
-    With side q: α = (q, p + a), β = (q + b, p). With side p: α = (q − b, p), β = (q, p − a). It is not symmetric, so a
-    method of order k needs S_1 … S_k. Coordinates that are Casimirs do not change. Raises `SpecError` unless all other
-    coordinates form canonical pairs.
+    With side q: α = (q, p + a), β = (q + b, p), where (a, b) is the covector at (q, p). With side p: α = (q − b, p), β
+    = (q, p − a). It is not symmetric, so a method of order k needs S_1 … S_k. Coordinates that are Casimirs do not
+    change. Raises `SpecError` unless all other coordinates form canonical pairs.
     """
     shape = system.shape
     if not isinstance(shape, Canonical):

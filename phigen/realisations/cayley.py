@@ -86,8 +86,10 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def closed_representation(algebra: LieAlgebra) -> Representation | None:
-    """Return a faithful representation of the whole algebra in which P E_i P lies in the algebra; None if none is
-    known."""
+    """Return a faithful representation of the whole algebra in which P E_i P lies in the algebra for all P = Σ p_a E_a.
+
+    Returns None if no such representation is known.
+    """
     declared = [algebra.representation] if algebra.representation else []
     if not declared and len(indecomposable_parts(algebra)) > 1:
         return None
@@ -95,7 +97,10 @@ def closed_representation(algebra: LieAlgebra) -> Representation | None:
 
 
 def trilinear(algebra: LieAlgebra, representation: Representation) -> Trilinear | None:
-    """Return the form ⟨x, coordinates of P E_i P⟩ in a representation, or None if P E_i P leaves the algebra."""
+    """Return the form ⟨x, coordinates of P E_i P⟩ with P = Σ p_a E_a, or None if P E_i P leaves the algebra.
+
+    The matrices E_a are those of the ``representation``.
+    """
     form = _product(algebra, representation)
     return None if isinstance(form, _Escape) else form
 
@@ -112,7 +117,8 @@ def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) 
 
 
 def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
-    """Return the form ⟨x, coordinates of P E_i P⟩ in the first representation where P E_i P lies in the algebra.
+    """Return the form ⟨x, coordinates of P E_i P⟩ in the first representation where P E_i P lies in the algebra, P = Σ
+    p_a E_a.
 
     The second result describes this representation. Raises `SpecError`, with the representations that were tried, if
     there is none.
@@ -167,7 +173,8 @@ def _refusal(algebra: LieAlgebra, representation: Representation, escape: _Escap
 
 
 def _product(algebra: LieAlgebra, representation: Representation) -> Trilinear | _Escape:
-    """Return the form ⟨x, coordinates of P E_i P⟩, or the first product that leaves the algebra."""
+    """Return the form ⟨x, coordinates of P E_i P⟩ with P = Σ p_a E_a, or the first product of matrices that leaves the
+    algebra."""
     field = Field(v for m in representation.matrices for v in m.values())
     matrices: list[Sparse] = [
         {position: field.convert(v) for position, v in m.items()} for m in representation.matrices

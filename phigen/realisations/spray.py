@@ -170,12 +170,15 @@ def _maps(system: System, displacement: Sequence[Expression]) -> tuple[tuple[Exp
 
 
 def moser_steps(spray: Spray, degree: int) -> list[Step]:
-    """Return the factors of the map ψ₀ of Moser's trick, as many as α needs up to a degree in p."""
+    """Return the factors of ψ₀, the map of Moser's trick with ψ₀*Ω₀ = ω, as many as α needs up to a degree in p."""
     return straighten(spray.space, centred_form(spray, degree + 1), degree + 1)
 
 
 def alpha_series(spray: Spray, degree: int) -> list[GradedFunction]:
-    """Return, for each coordinate, the component of α = τ∘Φ^{−½}∘ψ₀ as parts by degree in p, up to ``degree``."""
+    """Return, for each coordinate, the component of α = τ∘Φ^{−½}∘ψ₀ as parts by degree in p, up to ``degree``.
+
+    Φ is the flow of the spray, τ(x, p) = x, and ψ₀ is the map of Moser's trick with ψ₀*Ω₀ = ω.
+    """
     space, result = spray.space, []
     steps = moser_steps(spray, degree)
     for x in space.variables[: space.size]:

@@ -91,7 +91,7 @@ class Gauge:
         return "K" if self.monitor else "H"
 
     def timed(self, hamiltonian: Expression) -> Expression:
-        """Return H or, with a monitor, K = g(H + e)."""
+        """Return H or, with a monitor g, K = g(H + e), where e is the energy level −H(x₀) of a trajectory."""
         return self.monitor * (hamiltonian + symbol(LEVEL)) if self.monitor else hamiltonian
 
     def pace(self, system: System) -> Expression:

@@ -1,9 +1,9 @@
 """Multiples λ of Casimirs that make the group elements of a Gauss step slower, so that its fixed-point sweeps converge
 faster.
 
-H and H − Σ λ_c C_c have the same flow in the coordinates. But the group element G moves with the velocity ∇H in the
-first case and ∇H − Σ λ_c ∇C_c in the second. For quadratic H and C_c the second derivatives are constant. The λ_c are
-chosen such that the matrix of second derivatives of H − Σ λ_c C_c has the least norm.
+H and H − Σ λ_c C_c have the same flow in the coordinates x. But a Gauss step moves x by the action of a group element,
+whose velocity is ∇H in the first case and ∇H − Σ λ_c ∇C_c in the second. For quadratic H and C_c the second derivatives
+are constant. The λ_c are chosen such that the matrix of second derivatives of H − Σ λ_c C_c has the least norm.
 """
 
 from __future__ import annotations

@@ -120,5 +120,5 @@ def _followed(rate: Expression, row: Mapping[str, Expression], integrals: Mappin
     """
     (start,) = substitute([rate], {z: ZERO for z in symbols_of(rate) if kind_of(z) == OFFSET})
     terms = [symbol(TIME) * start, *(slope * integrals[z] for z, slope in row.items())]
-    # multiplied by the step size last: the times of stages are exact numbers, their products with it are rounded
+    # The times of stages are exact numbers, so the product with the step size comes last and is rounded only once.
     return symbol(LENGTH) * total(terms)

@@ -141,9 +141,9 @@ def graph_form(
 def forced_form(
     system: System, monitor: Expression, static: Sequence[str], inputs: Sequence[str] = ()
 ) -> GeneratingFunction:
-    """Return p = τg(∇H + ζ) and its derivatives, for a system with the monitor g and forces, in place of ∇S_h.
+    """Return p = τg(∇H + ζ) and its derivatives, in place of ∇S_h, for a system with the monitor g and forces.
 
-    p is not a gradient, and does not depend on the energy level e.
+    τ is the step size in the time of the monitor. p is not a gradient, and does not depend on the energy level e.
     """
     assert system.forces is not None
     rate = symbol(STEP) * monitor

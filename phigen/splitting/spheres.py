@@ -70,7 +70,7 @@ class _Sphere:
         """
         zero, n = self.ring.tower.zero, range(self.size)
         a = [[zero if i == j else zero - rates[i].get(self._monomial(j, j, j), zero) for j in n] for i in n]
-        for i in n[1:]:  # the field determines the diagonal of A up to g only, so a[0][0] is 0
+        for i in n[1:]:  # a number added to the diagonal has no effect, so a[0][0] is 0
             a[i][i] = rates[0].get(self._monomial(0, i, i), zero)
         if any(a[i][j] != a[j][i] for i in n for j in n) or not self._moves(rates, a, [(j,) for j in n]):
             return None
