@@ -97,7 +97,8 @@ class _SortedAxes:
 
     @property
     def betas(self) -> tuple[Expression, Expression, Expression]:
-        """The constants β_l = w_h − w_m, β_m = w_l − w_h and β_h = w_m − w_l."""
+        """The differences β_l = w_h − w_m, β_m = w_l − w_h and β_h = w_m − w_l of the inverse moments w, for the axes
+        l, m, h."""
         low, middle, high = self.weights
         return high - middle, low - high, middle - low
 
@@ -114,7 +115,7 @@ class _SortedAxes:
 
     @property
     def linear(self) -> tuple[Expression, Expression]:
-        """The factors of t and of the elliptic integral in the angle θ: w_l and −β_h n."""
+        """The factors of the time t and of the elliptic integral in the angle θ of the rotation: w_l and −β_h n."""
         return self.weights[0], -(self.betas[2] * self.n)
 
     def point(
@@ -145,9 +146,11 @@ def identities() -> Iterator[tuple[str, Expression]]:
 
 
 def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression for M, the shortest rotation that takes x' to x.
+    """Yield pairs of a label and an expression for M, the shortest rotation that takes x' to x, as a quaternion of any
+    length.
 
-    All expressions vanish if M x' = x and if, up to the length of the quaternion M, Ṁ = M(ω − θ̇x')/2 for any ω.
+    All expressions vanish if M x' = x and if, up to the length of M, Ṁ = M(ω − θ̇x')/2 for any angular velocity ω, with
+    the θ̇ of this module.
     """
     x, omega = ([symbol(Symbol("attitude", kind, i)) for i in range(3)] for kind in ("x", "ω"))
     end = [symbol(Symbol("attitude", "end", i)) for i in range(2)]
@@ -164,7 +167,8 @@ def _shortest_rotation() -> Iterator[tuple[str, Expression]]:
 
 
 def _angle(order: Sequence[int]) -> Iterator[tuple[str, Expression]]:
-    """Yield a label and an expression that vanishes if the formula for θ has the time derivative θ̇ of this module.
+    """Yield a label and an expression that vanishes if the angle θ of this module has the time derivative that this
+    module states.
 
     ``order`` has the indices of the axes l, m, h with the smallest, the middle and the largest E_i.
     """

@@ -85,7 +85,7 @@ def noise_statements(system: System) -> Iterator[Statement]:
     """Yield the statements about noise: whether its sources commute, which gives the strong order, and a stationary
     density.
 
-    The density exp(−H/θ) is stated only if it is proved to be stationary.
+    That the density exp(−H/θ) is stationary for some temperature θ is stated only if it is proved.
     """
     if not system.noise:
         return
@@ -126,7 +126,8 @@ def _commutation(system: System) -> Statement:
 def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
     """Return a label, and an expression that is 0 if and only if the flows of the noise sources i and j commute.
 
-    The expression is the sum of the squares of the components of π∇{σ_i g_i, σ_j g_j}.
+    The expression is the sum of the squares of the components of π∇{σ_i g_i, σ_j g_j}, where g_i is the Hamiltonian of
+    source i and σ_i its amplitude.
     """
     first, second = system.noise[i], system.noise[j]
     field = hamiltonian_vector_field(system.poisson, second.impulse(system.coordinates))
@@ -141,8 +142,8 @@ def _temperature(
     """Return a temperature T for which the density exp(−H/T) may be stationary, from one sample point; None if there is
     none.
 
-    At this point the component of 2T(πζ + f) + Σ σ²(XH)X along ∇H is 0. ``slope`` is ∇H, ``diffusive_rate`` is πζ + f,
-    and ``spread`` is Σ σ²(XH)X, where X = π∇g for each source.
+    ``slope`` is ∇H, ``diffusive_rate`` is the field πζ + f of the forces, and ``spread`` is Σ σ²(XH)X over the sources
+    of noise with amplitude σ and field X. At the sample point the component of 2T(πζ + f) + Σ σ²(XH)X along ∇H is 0.
     """
     loss = total(a * b for a, b in zip(slope, diffusive_rate, strict=True))
     gained = total(a * b for a, b in zip(slope, spread, strict=True))

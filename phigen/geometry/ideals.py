@@ -54,7 +54,7 @@ def _centroid(algebra: LieAlgebra) -> list[Any]:
     for i in range(n):
         for j in range(n):
             rows: list[dict[int, Scalar]] = [{} for _ in range(n)]
-            for k, c in constants[i][j].items():  # T[E_i, E_j]; the unknown number m·n + k is the entry T_mk
+            for k, c in constants[i][j].items():  # T[E_i, E_j] for an unknown matrix T; unknown m·n + k is T_mk
                 for m in range(n):
                     rows[m][m * n + k] = rows[m].get(m * n + k, field.zero) + c
             for a in range(n):  # minus [TE_i, E_j] = Σ_a T_ai [E_a, E_j]

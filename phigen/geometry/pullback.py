@@ -111,7 +111,7 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
 
 
 def _of_affine_map(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression, ...] | None:
-    """Return x = J⁻¹(y − ψ(0)) if the Jacobian matrix J of ψ is constant; else None."""
+    """Return the inverse of y = ψ(x) if its Jacobian matrix J is constant: x = J⁻¹(y − ψ(0)); else None."""
     columns = [[_simplified(e) for e in derivatives(form.map, c)] for c in coordinates]
     if any(s in coordinates for s in symbols_of(*(e for column in columns for e in column))):
         return None

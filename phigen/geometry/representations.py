@@ -137,7 +137,8 @@ def _pairing(form: dict[int, Scalar], vector: dict[int, Scalar], field: Field) -
 
 
 def _two_step(algebra: LieAlgebra, adjoint: list[Sparse], field: Field) -> Iterator[Representation]:
-    """Yield the matrices (½ad_X X; 0 0) for X in g, on the space g ⊕ R; they represent g if [[g, g], g] = 0."""
+    """Yield the matrices (½ad_X X; 0 0) for X in the Lie algebra g, on the space g ⊕ R; they represent g if [[g, g], g]
+    = 0."""
     derived = [set(row) for row in algebra.constants.values()]
     touched = sorted({k for row in derived for k in row})
     if any(adjoint[k] for k in touched) and not _is_two_step(algebra, adjoint, field):

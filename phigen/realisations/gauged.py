@@ -81,9 +81,10 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _motion(c: str, g: Expression, u: Expression, positive: Collection[str]) -> _Motion | None:
-    """Return the components of α − x, β − x and β − α for the coordinate ``c``: the flow of g for the times −½u and ½u.
+    """Return the components of α − x, β − x and β − α for the coordinate ``c``.
 
-    Returns None if phigen knows no formula for the flow.
+    They are the increments of c along ẋ = g(x) for the times −½u and ½u, and the difference. Returns None if phigen
+    knows no formula for this flow.
     """
     if u.is_zero:
         return _Motion(ZERO, ZERO, ZERO)

@@ -112,7 +112,8 @@ def _matrix(system: System, representation: Representation, tau: Expression | Se
 
 
 def _expect_tangent(system: System, representation: Representation, tau: Matrix) -> None:
-    """Raise `SpecError` unless τ(0) = 1 and ∂τ/∂p_j = E_j at p = 0."""
+    """Raise `SpecError` unless the map τ of the spec satisfies τ(0) = 1 and ∂τ/∂p_j = E_j at p = 0, with the matrices
+    E_j."""
     size, zero = representation.size, dict.fromkeys(covector_names(system.coordinates), ZERO)
     try:
         at_zero = [substitute(row, zero) for row in tau]
@@ -135,7 +136,8 @@ def _expect_equal(a: Matrix, b: Matrix, message: str, system: System) -> None:
 
 
 class _Trivialised:
-    """Solver of the linear equations for R⁻¹ and L⁻¹, the inverse trivialised derivatives of τ.
+    """Solver of the linear equations for R⁻¹ and L⁻¹, where R and L are the right and left trivialised derivatives of
+    the map τ.
 
     It eliminates in the field of rational functions of p and of the functions of p that occur in τ.
     """
@@ -150,7 +152,7 @@ class _Trivialised:
         self._columns = [[self._field.convert(e) for row in m for e in row] for m in slopes]
 
     def solved(self, *, left: bool) -> list[list[Expression]]:
-        """Return R⁻¹ if ``left``, else L⁻¹, as a matrix by rows.
+        """Return R⁻¹ if ``left``, else L⁻¹, as a matrix by rows; R and L are the trivialised derivatives of the map τ.
 
         Column i has the coefficients with which the ∂τ/∂p_j add up to E_i τ or, for L⁻¹, to τ E_i.
         """

@@ -54,8 +54,8 @@ def series(system: System, degree: int) -> list[Expression]:
     """Return α(x, p) as a series that is correct up to a degree in p; terms of higher degree in the result must not be
     used.
 
-    α is defined by: the path that starts at α has the mean x. So α = x − Σ_{j=1}^{degree} (D^j x)(α)/(j+1)!, which is
-    solved by repeated substitution.
+    α is defined by: the path ṁ = π(m)p that starts at α has the mean x. So α = x − Σ_{j=1}^{degree} (D^j x)(α)/(j+1)!,
+    where D is the derivative along πp. This equation is solved by repeated substitution.
     """
     coordinates = system.coordinates
     x: list[Expression] = [symbol(c) for c in coordinates]

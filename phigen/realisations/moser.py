@@ -22,17 +22,18 @@ from phigen.realisations.cotangent import Components, Cotangent, GradedForm, Gra
 
 @dataclass(frozen=True)
 class Step:
-    """A factor exp(Y) of ψ, where the field Y raises weights by ``weight``."""
+    """A factor exp(Y) of the map ψ of Moser's trick, where the vector field Y raises weights by ``weight``."""
 
     weight: int
     field: Components
 
 
 def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
-    """Return the factors exp(Y) of a map ψ such that ψ*Ω = ω up to the weight ``top``.
+    """Return the factors exp(Y) of a map ψ with ψ*Ω = ω up to the weight ``top``, for a 2-form Ω and the canonical form
+    ω.
 
-    They are in the order in which functions are pulled back. ``forms`` has the parts of Ω by weight: ω at weight 1, and
-    parts of odd weight. Parts that vanish give no factor.
+    The factors are in the order in which functions are pulled back. ``forms`` has the parts of Ω by weight: ω at weight
+    1, and parts of odd weight. Parts that vanish give no factor.
     """
     steps = []
     for weight in range(3, top + 1, 2):
@@ -47,7 +48,8 @@ def straighten(space: Cotangent, forms: GradedForm, top: int) -> list[Step]:
 
 
 def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> GradedForm:
-    """Return exp(Y)*Ω up to the weight ``top``, for a factor exp(Y) of ψ and the form Ω."""
+    """Return exp(Y)*Ω up to the weight ``top``: the 2-form Ω, given by ``forms``, pulled back by one factor ``step`` of
+    Moser's trick."""
     result: GradedForm = {}
     for weight, form in forms.items():
         term = form
@@ -62,7 +64,7 @@ def _transported(space: Cotangent, forms: GradedForm, step: Step, top: int) -> G
 
 
 def pulled_back(space: Cotangent, f: GradedFunction, steps: Sequence[Step], top: int) -> GradedFunction:
-    """Return ψ*f up to the weight ``top``, for a function f and the factors exp(Y) of ψ.
+    """Return the function f pulled back by a map ψ up to the weight ``top``; ``steps`` are the factors exp(Y) of ψ.
 
     Each exp(Y) acts on functions by the Lie series of Y.
     """

@@ -59,10 +59,11 @@ def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> 
 
 
 def is_composed(system: System, realisation: BiRealisation) -> bool:
-    """Whether α and β are the maps of ``realisation.inner``, transformed by ψ to the coordinates of the spec, with a
-    proved inverse ψ⁻¹.
+    """Whether α and β are the maps of ``realisation.inner``, transformed from the coordinates y = ψ(x) to those of the
+    spec.
 
-    Then the axioms for α and β follow from the axioms in the other coordinates, since T*ψ is symplectic.
+    The inverse ψ⁻¹ is proved too. Then the axioms for α and β follow from the axioms in the coordinates y, since the
+    lift of ψ to (x, p) is symplectic.
     """
     if realisation.inner is None or not isinstance(system.form, PullbackForm):
         return False

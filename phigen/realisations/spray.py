@@ -71,7 +71,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 def _half_flows(system: System, spray: Spray) -> BiRealisation | None:
     """Return the bi-realisation α = τ∘Φ^{−½}, β = τ∘Φ^{½}; None unless L_X² ω = 0 and the flow Φ has a closed form.
 
-    X is the field of the spray, and τ(x, p) = x.
+    X is the field of the spray, Φ its flow, ω the canonical 2-form, and τ(x, p) = x.
     """
     space = spray.space
     if not space.vanishes(centred_form(spray, 3)[3]):

@@ -123,9 +123,10 @@ def lie_series(spray: Spray, f: Poly, length: int, most_terms: int = MOST_TERMS)
 
 
 def centred_form(spray: Spray, top: int) -> GradedForm:
-    """Return the parts of Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to the weight ``top``, for the flow Φ of the spray X.
+    """Return the parts of the 2-form Ω₀ = ∫_{−½}^{½} Φˢ*ω ds up to the weight ``top``, for the flow Φ of the spray X.
 
-    The part of weight k + 1 is L_Xᵏ ω / ((k+1)! 2ᵏ) for even k; there are no parts of even weight.
+    ω is the canonical form. The part of weight k + 1 is L_Xᵏ ω / ((k+1)! 2ᵏ) for even k; there are no parts of even
+    weight.
     """
     space, form = spray.space, spray.space.canonical()
     result = {1: form}

@@ -80,8 +80,8 @@ def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression])
 def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
     """Return the kernel of the cotangents of the coefficients of a Newton step, at its point y.
 
-    Its inputs are λ, the cotangent of x' (``increment_bar``), and −μ with μ = J⁻ᵀ Mᵀ λ (``displacement_bar``); see the
-    formulas of this module.
+    Its inputs are λ, the cotangent of the new state x' (``increment_bar``), and −μ with μ = J⁻ᵀ Mᵀ λ
+    (``displacement_bar``). J is the Newton matrix, and M the derivative of the increment x' − x with respect to y.
     """
     displacement, increment, *_ = linearise.outputs
     kernel = replace(linearise, inputs={**linearise.inputs, TABLE: coefficients.table})

@@ -37,7 +37,8 @@ class Alternation:
 
     @property
     def stages(self) -> int:
-        """The number s of stages; each stage is χ* followed by χ, with the fractions α_2k−1 and α_2k of the step."""
+        """The number of stages of a step; each stage consists of one composition of the flows of all parts in reverse
+        order, and one in order."""
         return len(self.fractions) // 2
 
 

@@ -97,7 +97,7 @@ def _unsuited(system: System, splitting: SplitHamiltonian, small: int) -> bool:
 
 
 def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
-    """Return the parts of an H that depends on the time, each of which can be the V of a Nyström method.
+    """Return the parts of an H = T + V that depends on the time, each of which can be the V of a Nyström method.
 
     With the conjugate e of the time, T + e takes the place of T. So T must not depend on the time, and V must commute
     with ∂V/∂t.
@@ -121,7 +121,7 @@ def with_carrier(choice: ScheduledMethod, time: str) -> ScheduledMethod:
     if isinstance(choice.method, Nystrom):
         return replace(choice, carrier=1 - (choice.splitting.kick or 0))
     if isinstance(choice.method, NearIntegrable):
-        return replace(choice, carrier=0)  # the time advances with part 0, A, which does not depend on it
+        return replace(choice, carrier=0)  # the time advances with the large part, number 0
     if not is_dated(flows[-1], time):
         return replace(choice, carrier=len(flows) - 1)
     undated = [flow for flow in flows if not is_dated(flow, time)]
@@ -184,7 +184,8 @@ def _near_integrable(splitting: SplitHamiltonian, order: Order, method: NearInte
 
 
 def _with_modified_kick(system: System, choice: ScheduledMethod) -> ScheduledMethod:
-    """Return the method with the flow of B + κ{B, {B, A}} in place of that of B, if the method requires it.
+    """Return the method for H = A + εB with the flow of B + κ{B, {B, A}} in place of the flow of B, if the method
+    requires it.
 
     Raises `SpecError` if there is no such flow.
     """
@@ -210,7 +211,8 @@ def _nothing_small(system: Host, splitting: SplitHamiltonian, composition: str) 
 
 
 def chosen(splitting: SplitHamiltonian, order: Order, method: Nystrom, kick: Kick) -> ScheduledMethod:
-    """Return the Nyström method with T and V in the order of its step, and the reason of the choice as text."""
+    """Return the Nyström method for H = T + V, with T and V in the order of its step, and the reason of the choice as
+    text."""
     return ScheduledMethod(order, method, _arranged(splitting, method, kick), _why(method))
 
 
@@ -251,7 +253,7 @@ def _cost(flow: Flow) -> int:
 
 
 def _arranged(splitting: SplitHamiltonian, method: Nystrom, kick: Kick) -> SplitHamiltonian:
-    """Return the parts T and V in the order in which a step of the Nyström method applies them."""
+    """Return the parts T and V of H in the order in which a step of the Nyström method applies their flows."""
     drift, kick_flow = splitting.flows[1 - kick.part], splitting.flows[kick.part]
     kicking = kick.modified if method.multiples and kick.modified else kick_flow
     return SplitHamiltonian((kicking, drift), 0) if method.kicks_first else SplitHamiltonian((drift, kicking), 1)

@@ -34,11 +34,11 @@ SPACING = Fraction("0.418330013267037773994000")
 
 
 def corrector(order: int, *, balanced: bool = False) -> tuple[Fraction, ...]:
-    """Return the durations, in steps, of the flows A, B, A, …, A at the end of a run: the corrector C after minus half
-    a flow of A.
+    """Return the durations, in steps, of the flows of A and B by turns at the end of a run, for H = A + εB.
 
-    A run starts with the same flows in reverse order and with the opposite sign. At order 1 there is no C. A
-    ``balanced`` C has twice as many flows, and causes no error ε²h³.
+    They are the flows of the corrector C after minus half a flow of A. A run starts with the same flows in reverse
+    order and with the opposite sign. At order 1 there is no C. A ``balanced`` C has twice as many flows, and causes no
+    error ε²h³.
     """
     times, pairs = [-Fraction(1, 2)], _pairs((order - 1) // 2)
     if balanced:
@@ -49,9 +49,9 @@ def corrector(order: int, *, balanced: bool = False) -> tuple[Fraction, ...]:
 
 
 def schedule(end: Sequence[Fraction]) -> Schedule:
-    """Return the schedule of a method with a corrector: a step is one flow of B and one flow of A.
+    """Return the schedule of a method with a corrector for H = A + εB: a step is one flow of B and one flow of A.
 
-    The flows with the durations ``end``, of the corrector, follow a run of steps; their inverse comes before the run.
+    ``end`` has the durations of the flows of the corrector after a run of steps; the inverse flows come before the run.
     """
     times = (Fraction(1), Fraction(1), *(-t for t in reversed(end)), *end)
     parts = [B if k % 2 else A for k in range(len(end))]

@@ -73,8 +73,8 @@ def generating_function(
 ) -> GeneratingFunction:
     """Return ∇S_h and Hess S_h in their cheapest form. Raises `LimitError` if every form is too large.
 
-    With a ``monitor`` g, ``series`` is that of K = g(H + e); if there are also forces, p = τg(∇H + ζ) is returned
-    instead.
+    With a ``monitor`` g, ``series`` is that of K = g(H + e), where e is the energy level. If there are also forces, p =
+    τg(∇H + ζ) takes the place of ∇S_h, where τ is the step size and ζ the covector force.
     """
     if monitor and system.forces:
         return forced_form(system, monitor, series.static)

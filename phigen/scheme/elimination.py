@@ -67,7 +67,8 @@ class Factors:
 
     @property
     def values(self) -> tuple[Expression, ...]:
-        """All numbers that `solved` reads: reciprocal pivots, multipliers and entries of U."""
+        """All numbers that `solved` reads: the reciprocal pivots, the multipliers, and the entries of the upper
+        triangular factor."""
         return (*self.reciprocals, *self.lower.values(), *self.upper.values())
 
     def named(self, kind: str) -> Factors:

@@ -100,10 +100,11 @@ class Gauge:
         return self.monitor if self.monitor and system.forces else ONE
 
     def applied(self, system: System) -> System:
-        """Return the system that is discretised: H is replaced by H − Σ λ_c C_c or, with a monitor, by K − Σ λ_c C_c.
+        """Return the system that is discretised: H is replaced by H − Σ λ_c C_c or, with a monitor g, by g(H + e) − Σ
+        λ_c C_c.
 
-        With a monitor g and forces, H remains, and the vector force f is replaced by gf; later p = τg(∇H + ζ) is
-        derived from H.
+        With a monitor g and forces, H remains, and the vector force f is replaced by gf; later the covector of a step
+        is derived from H, as τg(∇H + ζ).
         """
         if self.monitor and system.forces:
             vector = tuple(self.monitor * f for f in system.forces.vector)
@@ -259,7 +260,7 @@ def _state_terms(series: PolynomialSeries, system: System) -> int:
 
 
 def free_gauge(system: System, gauged: Gauged) -> FreeGauge | None:
-    """Return the kernels with which the solver chooses the multiples λ; None if no λ is free.
+    """Return the kernels with which the solver chooses the multiples λ of Casimirs C; None if it chooses none.
 
     One kernel computes the error vector π∇S_3. The other computes the scalar products of ∇H and the ∇C, which set the
     scale of λ in the search.

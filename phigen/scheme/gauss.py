@@ -212,8 +212,8 @@ def _lifted_step(step: Gauss, lifted: tuple[Kernel, Kernel, Lift], coefficients:
 
 
 def _monitor(system: System, gauge: Gauge, elapsed: Kernel | None, spec: Spec) -> Monitor | None:
-    """Return the record of a monitored solver, with the kernels of dt/dτ and of the physical time; None without a
-    monitor."""
+    """Return the record of a monitored solver with the kernels of dt/dτ and of the physical time t of a step; None
+    without a monitor."""
     if gauge.monitor is None:
         return None
     level = level_adjoint(system) if spec.extras.adjoint else None

@@ -137,7 +137,7 @@ def transposed_elimination_kernel(linearised: Kernel) -> Kernel:
 
 
 def _patterns(linearised: Kernel) -> tuple[Pattern, Pattern]:
-    """Return the entries that may be nonzero in the Newton matrix, and in the derivative of the increment β − α."""
+    """Return the entries that may be nonzero in the Newton matrix, and in the derivative of the increment of a step."""
     _, _, jacobian, slope = linearised.outputs
     return _pattern(jacobian.values), _pattern(slope.values)
 

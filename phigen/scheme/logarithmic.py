@@ -37,7 +37,8 @@ class Logarithmic:
     negative: Expression
 
     def outputs(self, flow: Flow) -> tuple[Expression, ...]:
-        """Return the expressions that the kernel of a flow of K computes, for the flow of the corresponding part of H.
+        """Return the expressions that the kernel of a flow of K = log(A + e) − log(−B) computes, for the flow of A or
+        of B.
 
         These are the increments of the coordinates, the physical time of the flow, and the square root of A + e or of
         −B. The square root is NaN where the step is not defined, so that the step fails.
@@ -47,15 +48,15 @@ class Logarithmic:
         return (*increments, ZERO if self._is_negative(flow) else time, power(argument, Fraction(1, 2)))
 
     def time(self, flow: Flow) -> Expression:
-        """Return the time τ/(A + e) or τ/(−B) over which the flow of a part of H equals the flow of a part of K over
-        τ."""
+        """Return the time over which the flow of A or B equals a flow of K = log(A + e) − log(−B) over τ: τ/(A + e) or
+        τ/(−B)."""
         return symbol(TIME) * power(self._argument(flow), -1)
 
     def _argument(self, flow: Flow) -> Expression:
         return -flow.hamiltonian if self._is_negative(flow) else flow.hamiltonian + symbol(LEVEL)
 
     def monitor(self, system: System) -> Monitor:
-        """Return the record of the monitor for the program, with dt/dτ = 1/(−B)."""
+        """Return the record of the monitor for the program, with dt/dτ = 1/(−B), where B is the negative part of H."""
         return Monitor(rate_kernel(system, power(-self.negative, -1)), None)
 
     def _is_negative(self, flow: Flow) -> bool:
@@ -68,7 +69,8 @@ class Logarithmic:
 
 
 def fact_of(negative: str) -> str:
-    """Return the line about the monitor ``log`` in the header of generated files; ``negative`` is B as text."""
+    """Return the line about the monitor ``log`` in the header of generated files; ``negative`` is the negative part of
+    H as text."""
     return f"monitor: log, steps are equal in tau; K = log(A + e) - log(-B) with B = {negative}"
 
 

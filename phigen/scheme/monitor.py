@@ -28,7 +28,10 @@ EXTENDED_SYSTEM_HINT = (
 
 
 def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | None:
-    """Return the kernel of ∂S_τ/∂e at the point y of a step, the physical time of the step; None without a monitor."""
+    """Return the kernel of the physical time of a monitored step: ∂S_τ/∂e at the solution y of its implicit equation.
+
+    S_τ is the generating function, and e the energy level. Returns None without a monitor.
+    """
     if generating.elapsed is None:
         return None
     (value,) = generating.coefficients.hoist([generating.elapsed])
@@ -41,7 +44,8 @@ def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | N
 
 
 def rate_kernel(system: System, monitor: Expression) -> Kernel:
-    """Return the kernel of dt/dτ = g at a state; ``monitor`` is g as an expression."""
+    """Return the kernel of dt/dτ = g at a state, where τ is the time of the monitor; ``monitor`` is g as an
+    expression."""
     return Kernel(
         "monitor",
         "dt/dtau, which has to be positive",

@@ -93,7 +93,8 @@ class Corrected(NearIntegrable):
     multiple: Fraction = Fraction(0)
 
     def schedule(self) -> Schedule:
-        """Return the flows of a step, and those at the start and the end of a run; part 0 is B, part 1 is A."""
+        """Return the flows of a step, and those at the start and the end of a run; for H = A + εB, part 0 is B and part
+        1 is A."""
         flows = schedule(self.corrector)
         if not self.multiple:
             return flows
@@ -101,7 +102,8 @@ class Corrected(NearIntegrable):
 
 
 def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[Fraction]) -> NearIntegrable:
-    """Return the method with the fractions ``a`` and ``b`` for the flows of A and of εB; both lists sum to 1."""
+    """Return the method for H = A + εB with the fractions ``a`` and ``b`` for the flows of A and of εB; both lists sum
+    to 1."""
     times = [t for pair in zip(a, b, strict=False) for t in pair]
     alpha = [times[0]]
     for t in times[1:]:
@@ -112,8 +114,10 @@ def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[
 def _method_from_halves(
     name: str, generalised: tuple[int, ...], stages: int, halves: tuple[str, str]
 ) -> NearIntegrable:
-    """Return the method with ``stages`` flows of εB from the first halves of a and b, which include the middle
-    values."""
+    """Return the method for H = A + εB with ``stages`` flows of εB, from the first halves of the fractions a and b.
+
+    The halves include the middle values.
+    """
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     return _method(name, generalised, _mirrored(a, stages + 1), _mirrored(b, stages))
 
@@ -129,7 +133,8 @@ def _mirrored(half: list[Fraction], count: int) -> list[Fraction]:
 
 
 def _quadrature(stages: int) -> NearIntegrable:
-    """Return the method of Laskar and Robutel with ``stages`` flows of εB, at the nodes of Gauss's quadrature."""
+    """Return the method of Laskar and Robutel for H = A + εB with ``stages`` flows of εB, at the nodes of Gauss's
+    quadrature."""
     nodes = [Fraction(0), *gauss_nodes(stages), Fraction(1)]
     a = [next_node - node for node, next_node in pairwise(nodes)]
     b = [_weight(nodes[1:-1], i) for i in range(stages)]
@@ -149,7 +154,8 @@ def _weight(nodes: list[Fraction], i: int) -> Fraction:
 
 
 def _modified(order: int) -> Corrected:
-    """Return the method with the corrector of an odd ``order`` in h, and B − h²{B, {B, A}}/24 in place of B.
+    """Return the method for H = A + εB with a corrector of an odd ``order`` in h, and B − h²{B, {B, A}}/24 in place of
+    B.
 
     Its errors begin at ε h^(order + 1) and ε² h^4.
     """
@@ -165,7 +171,7 @@ def _modified(order: int) -> Corrected:
 
 
 def _wisdom_holman(order: int) -> Corrected:
-    """Return the method with the corrector of an odd ``order`` in h; at order 1 there is no corrector.
+    """Return the method for H = A + εB with a corrector of an odd ``order`` in h; at order 1 there is no corrector.
 
     Its errors begin at ε h^(order + 1) and ε² h^2.
     """

@@ -53,10 +53,9 @@ class Nystrom:
 
 
 def _method(name: str, order: int, first: str, half: str, error: float, multiples: str = "") -> Nystrom:
-    """Return a symmetric method from the first half of its times and of the multiples of its kicks, with the middle
-    values.
+    """Return a symmetric method for H = T + V from the first half of its times and of the multiples of its kicks.
 
-    ``first`` is T or V, the part with which a step begins.
+    The halves include the middle values. ``first`` is T or V, the part with which a step begins.
     """
     times = [Fraction(v) for v in half.split()]
     kicks = [Fraction(v) for v in multiples.split()]

@@ -39,7 +39,8 @@ class _NoBodiesError(Exception):
 
 
 def split_bodies(system: System, change: str) -> SplitHamiltonian:
-    """Return H as the sum of the parts A and B, in the relative coordinates called ``change`` in specs.
+    """Return H as the sum of Kepler motions A and a remainder B, in the relative coordinates called ``change`` in
+    specs.
 
     Raises `SpecError`, located at the key `KEY` of the spec, if H is not that of attracting bodies.
     """
@@ -180,7 +181,8 @@ def _flow(ring: Ring, terms: Sequence[Term]) -> Flow:
 def _remainder(
     system: System, ring: Ring, remainder: Expression, terms: Sequence[Term], positions: frozenset[int], *, moving: bool
 ) -> Flow | None:
-    """Return the flow of B, which consists of ``remainder`` and the further ``terms``; None if B is 0.
+    """Return the flow of the part B of H = A + B, which consists of ``remainder`` and the further ``terms``; None if B
+    is 0.
 
     ``moving`` says that the remainder contains momenta. Raises `_NoBodiesError` if the terms of B do not commute.
     """

@@ -174,8 +174,10 @@ def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Express
 def _ends(
     x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Expression, gaps: Vector
 ) -> list[Expression]:
-    """Return the increments of the x_i from σ_i, S and D (``divisor``), and from the differences ``gaps`` = σ_j σ_k −
-    D."""
+    """Return the increments of the x_i from the quantities σ_i, S and D (``divisor``) of the addition theorem.
+
+    ``gaps`` are the differences σ_j σ_k − D.
+    """
     inverse = power(divisor, -1)
     return [
         (x[i] * gap + factors[i] * x[j] * x[k] * (s * sigma[i])) * inverse
@@ -184,7 +186,7 @@ def _ends(
 
 
 def moved(x: Vector, factors: Vector, sigma: Vector, s: Expression, divisor: Expression) -> list[Expression]:
-    """Return the x_i after the flow from σ_i, S and D (``divisor``)."""
+    """Return the x_i after the flow from the quantities σ_i, S and D (``divisor``) of the addition theorem."""
     gaps = [sigma[j] * sigma[k] - divisor for j, k in CYCLIC]
     return [a + b for a, b in zip(x, _ends(x, factors, sigma, s, divisor, gaps), strict=True)]
 
@@ -215,7 +217,10 @@ def identities() -> Iterator[tuple[str, Expression]]:
 
 
 def _function_identities() -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression that vanishes if S(κ), with dκ/dt = (1 + z)D/4, satisfies dS/dt = CD."""
+    """Yield pairs of a label and an expression for the functions S(κ), C(κ) and D of this module.
+
+    All expressions vanish if dκ/dt = (1 + z)D/4 with z = Pκ² implies dS/dt = CD.
+    """
     name, p, r = Symbol("body", "κ"), symbol(Symbol("body", "P")), symbol(Symbol("body", "R"))
     kappa = symbol(name)
     s, c, _ = functions_of(kappa, p, r)

@@ -77,7 +77,7 @@ def _powers(ring: Ring, a: Matrix) -> list[Matrix]:
 
 
 def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]]) -> Solution | None:
-    """Return the solution Σ t^k A^k w/k! if a power of A vanishes, else None.
+    """Return the solution Σ t^k A^k w/k! of ẇ = Aw if a power of A vanishes, else None.
 
     ``powers`` are A, A², …, and ``images`` are Aw, A²w, …
     """
@@ -94,7 +94,10 @@ def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[P
 
 
 def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
-    """Return the solution if A^{a+1} = dA^a for some d, else None; ``images`` are Aw, A²w, …"""
+    """Return the solution of ẇ = Aw if A^{a+1} = dA^a for some d, else None.
+
+    ``powers`` are A, A², …, and ``images`` are Aw, A²w, …
+    """
     d = _ratio(ring, powers[a], powers[a - 1], powers[0])
     if d is None:
         return None
@@ -115,7 +118,10 @@ def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 
 
 def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
-    """Return the solution if A^{a+2} = −cA^a for some c, else None; ``images`` are Aw, A²w, …"""
+    """Return the solution of ẇ = Aw if A^{a+2} = −cA^a for some c, else None.
+
+    ``powers`` are A, A², …, and ``images`` are Aw, A²w, …
+    """
     c = None if len(powers) < a + 2 else _ratio(ring, powers[a + 1], powers[a - 1], powers[1])
     if c is None:
         return None
@@ -134,8 +140,8 @@ def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 def _without_quotients(
     ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], c: Poly, a: int
 ) -> Solution | None:
-    """Return the solution for A^{a+2} = −cA^a by entire functions of s = ct², without dividing by c; None if there is
-    none.
+    """Return the solution of ẇ = Aw with A^{a+2} = −cA^a by entire functions of s = ct², without dividing by c; None if
+    there is none.
 
     sin and 1 − cos of the angle √s are computed from functions of half the angle.
     """
@@ -150,7 +156,7 @@ def _without_quotients(
 
 
 def _solution_of_scaled_matrix(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Expression) -> Solution:
-    """Return the solution for A³ = −cA by entire functions of ``s`` = ct².
+    """Return the solution of ẇ = Aw with A³ = −cA by entire functions of ``s`` = ct².
 
     A is written as fM with a factor f that does not depend on the state, and f multiplies the time. M²w is computed as
     M times Mw where that needs fewer operations than the entries of M², as for cross products.
@@ -175,10 +181,10 @@ def _static_factor(ring: Ring, a: Matrix) -> Poly:
 def _circular(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """Return the solution for A^{a+2} = −e²A^a with θ = te, the ``angle``, by sin and cos.
+    """Return the solution of ẇ = Aw with A^{a+2} = −e²A^a, by sin and cos of θ = te, the ``angle``.
 
-    The matrix is sin(θ)A/e + (1 − cos θ)A²/e² for a = 1, and tA + (1 − cos θ)A²/e² + (θ − sin θ)A³/e³ for a = 2.
-    ``first`` is Aw, ``units`` are the quotients of A^k w and e^k.
+    The matrix exp(tA) − 1 is sin(θ)A/e + (1 − cos θ)A²/e² for a = 1, and tA + (1 − cos θ)A²/e² + (θ − sin θ)A³/e³ for a
+    = 2. ``first`` is Aw, ``units`` are the quotients of A^k w and e^k.
     """
     sine, versine = call("sin", angle), call("versin", angle)
     if a == 1:
@@ -191,9 +197,9 @@ def _circular(
 def _hyperbolic(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """Return the solution for A^{a+2} = e²A^a by sinh and cosh; cosh θ − 1 is written as 2 sinh²(θ/2).
+    """Return the solution of ẇ = Aw with A^{a+2} = e²A^a, by sinh and cosh of θ = te, the ``angle``.
 
-    ``angle`` is θ = te, ``first`` is Aw, and ``units`` are the quotients of A^k w and e^k.
+    cosh θ − 1 is written as 2 sinh²(θ/2). ``first`` is Aw, ``units`` are the quotients of A^k w and e^k.
     """
     s, c = call("sinh", angle / 2), call("cosh", angle / 2)
     if a == 1:

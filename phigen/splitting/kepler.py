@@ -125,12 +125,13 @@ class _Orbit:
         return self.inverse_mass**2 * total((a * d - b * c) ** 2 for (a, b), (c, d) in pairs)
 
     def end(self, c: Expression, s: Expression) -> tuple[Expression, Expression, Expression]:
-        """Return G1, G2 and the distance r = |q'| after the flow, from the values C and S of the formulas."""
+        """Return G1, G2 and the distance r = |q'| after the flow, from C and S; these are defined by the formulas of
+        this module."""
         g1, g2 = 2 * s * c, 2 * s**2
         return g1, g2, self.distance + (self.moment * g1 + (self.mu - self.beta * self.distance) * g2)
 
     def changes(self, c: Expression, s: Expression) -> tuple[list[Expression], list[Expression]]:
-        """Return the changes q' − q and p' − p in the flow, from the values C and S of the formulas."""
+        """Return the changes q' − q and p' − p in the flow, from C and S, which the formulas of this module define."""
         g1, g2, r = self.end(c, s)
         inverse, inverse_end = power(self.distance, -1), power(r, -1)
         along = self.inverse_mass * (self.distance * g1 + self.moment * g2)

@@ -62,8 +62,8 @@ def kicks(system: System, splitting: SplitHamiltonian) -> tuple[Kick, ...]:
 def modified_kick(system: System, kick: Flow, other: Flow) -> Flow | None:
     """Return the flow of V + κ{V, {V, T}} if V and {V, {V, T}} are functions of commuting coordinates, else None.
 
-    V is the Hamiltonian of ``kick``, T that of ``other``. Unlike `kicks`, this function does not expand {V, {V, T}},
-    which has too many monomials for nine bodies.
+    V is the Hamiltonian of ``kick``, T that of ``other``, and κ is the symbol `KICK`. Unlike `kicks`, this function
+    does not expand {V, {V, T}}, which has too many monomials for nine bodies.
     """
     v = kick.hamiltonian
     modified_potential = v + symbol(KICK) * bracket(system, v, bracket(system, v, other.hamiltonian))
@@ -125,7 +125,7 @@ def _bracket(ring: Ring, f: Poly, g: Poly) -> Poly:
 
 
 def _modified(ring: Ring, plain: Flow, v: Poly, gradient: Poly) -> Flow | None:
-    """Return the flow of V + κ{V, {V, T}}, or None if there is none or the bracket is 0.
+    """Return the flow of V + κ{V, {V, T}} for H = T + V; None if there is none or if {V, {V, T}} = 0.
 
     ``plain`` is the flow of V, and ``gradient`` is {V, {V, T}}.
     """

@@ -87,7 +87,7 @@ class StaticSolution:
 
 
 def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
-    """Return exp(tA)w − w for the coordinates of a linear motion, if A can be computed before the steps; else None."""
+    """Return the solution exp(tA)w − w of linear equations ẇ = Aw, if A can be computed before the steps; else None."""
     rows = _static_rows(ring, motion)
     if rows is None:
         return None

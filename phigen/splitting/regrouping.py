@@ -29,9 +29,10 @@ MOST_COORDINATES = 8
 
 
 def with_companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> Iterator[list[Term]]:
-    """Yield lists of terms in which λC is subtracted and added as a separate term, for each companion C.
+    """Yield lists of terms in which a multiple λC is subtracted from terms, and added again as a separate term.
 
-    λ takes each value that cancels a monomial of H.
+    C is each of the companions, functions that do not affect the other terms. λ takes each value that cancels a
+    monomial of H.
     """
     ring = conflicts.ring
     for companion in _companions(system, conflicts, terms):

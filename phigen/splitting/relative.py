@@ -89,11 +89,15 @@ class RelativeMotions:
         return f"{len(self.kepler)} relative positions moved along conic sections, the centre of mass shifted"
 
     def field(self, names: Sequence[str]) -> list[Expression]:
-        """Return the rates of all coordinates ``names`` in the motion of A."""
+        """Return the rates of all coordinates ``names`` in the motion of A, the sum of Kepler motions and the motion of
+        the centre of mass."""
         return self._spread(names, [motion.rates() for motion in self.kepler], self.drift)
 
     def increments(self, names: Sequence[str]) -> list[Expression]:
-        """Return the increments of all coordinates ``names`` in the flow of A over the time `TIME`."""
+        """Return the increments of all coordinates ``names`` in the flow of A over the time `TIME`.
+
+        A is the sum of the Kepler motions and of the motion of the centre of mass.
+        """
         shift = [symbol(TIME) * e for e in self.drift]
         return self._spread(names, [motion.changes() for motion in self.kepler], shift)
 
@@ -143,7 +147,8 @@ class RelativeMotions:
 
 
 def jacobi(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
-    """Return the motion of A in Jacobi coordinates, and B as an expression in Cartesian coordinates."""
+    """Return the division H = A + B in Jacobi coordinates: the motion of A, and B as an expression in Cartesian
+    coordinates."""
     masses = bodies.masses
     q, p = (list(map(_vector, names)) for names in (bodies.positions, bodies.momenta))
     mass = list(accumulate(masses, add))
@@ -187,8 +192,10 @@ def _independent(masses: Sequence[Expression], mass: Sequence[Expression]) -> It
 
 
 def democratic_heliocentric(bodies: AttractingBodies) -> tuple[RelativeMotions, Expression]:
-    """Return the motion of A in democratic heliocentric coordinates, and B as an expression in Cartesian
-    coordinates."""
+    """Return the division H = A + B in democratic heliocentric coordinates: the motion of A, and B as an expression.
+
+    B is an expression in Cartesian coordinates.
+    """
     axes, masses = range(bodies.axes), bodies.masses
     q, p = (list(map(_vector, names)) for names in (bodies.positions, bodies.momenta))
     inverse = power(total(masses), -1)
@@ -241,7 +248,7 @@ def _spread_from_star(bodies: AttractingBodies, shares: Sequence[Expression]) ->
     """Return the changes of Cartesian coordinates as linear forms of the changes of democratic heliocentric
     coordinates.
 
-    ``shares`` are the m_i/M; body 0 is the star.
+    ``shares`` are the masses divided by the total mass; body 0 is the star.
     """
     axes, spread, planets = bodies.axes, dict[str, Expression](), range(1, len(shares))
     of_q, of_p = ([changes_of(kind, i, axes) for i in planets] for kind in "QP")
@@ -256,9 +263,9 @@ def _spread_from_star(bodies: AttractingBodies, shares: Sequence[Expression]) ->
 
 
 def changes_of(kind: str, body: int, axes: int) -> list[Expression]:
-    """Return the symbols of a change, one for each axis.
+    """Return the symbols of the change of a vector, one for each axis.
 
-    ``kind`` says of what: Q_i or P_i of the ``body`` i, or the centre of mass R.
+    The vector is named by ``kind``: the relative position Q or momentum P of the ``body``, or the centre of mass R.
     """
     return [symbol(name) for name in _names(kind, body, axes)]
 

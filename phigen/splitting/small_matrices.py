@@ -28,7 +28,7 @@ Matrix = Sequence[Sequence[Poly]]
 
 
 def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
-    """Return the increments of the coordinates of a linear motion, or None if A has more than `MOST_ROWS` rows."""
+    """Return the solution exp(tA)w − w of linear equations ẇ = Aw, or None if A has more than `MOST_ROWS` rows."""
     rows = len(motion.basis)
     if rows > MOST_ROWS:
         return None
@@ -67,7 +67,10 @@ def _of_two_rows(ring: Ring, motion: LinearMotion) -> Solution:
 
 
 def _relation(ring: Ring, a: Matrix) -> Iterator[Poly]:
-    """Yield the coefficients c_0 … c_{n−1} in Aⁿ = Σ c_j A^j, by the method of Faddeev and Leverrier."""
+    """Yield the coefficients c_0 … c_{n−1} in the relation Aⁿ = Σ c_j A^j of an n×n matrix A.
+
+    They are computed by the method of Faddeev and Leverrier.
+    """
     n = range(len(a))
     zero, traces = ring.tower.zero, list[Poly]()
     power = [[zero] * len(a) for _ in n]

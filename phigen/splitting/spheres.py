@@ -104,7 +104,7 @@ class _Sphere:
         return [2 * (c * projection - d) for c, d in zip(y, e, strict=True)]
 
     def _shifts(self, a: Sequence[Sequence[Poly]]) -> Iterator[Poly]:
-        """Yield candidates for the number g in A = M + g, where M has rank 1."""
+        """Yield candidates for the number g such that the given matrix A is M + g with a matrix M of rank 1."""
         yield from (a[i][i] for i in range(self.size))
         for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1)) if self.size == 3 else ():
             quotient, remainder = divmod(a[i][j] * a[i][k], a[j][k]) if a[j][k] != 0 else (0, 1)
@@ -124,8 +124,10 @@ class _Sphere:
     def _moves(
         self, rates: Sequence[dict[Monomial, Poly]], beta: Sequence[Sequence[Poly]], factors: Sequence[tuple[int, ...]]
     ) -> bool:
-        """Whether the field ``rates`` is (β·x)x − |x|²β with β_i = Σ_j beta[i][j] times the product of the coordinates
-        ``factors[j]``."""
+        """Whether the vector field ``rates`` is (β·x)x − |x|²β for a given β.
+
+        β_i is the sum over j of ``beta[i][j]`` times the product of the coordinates ``factors[j]``.
+        """
         ring, n = self.ring, range(self.size)
         product = [
             ring.tower.combine(c * ring.monomial(self._monomial(*f)) for c, f in zip(row, factors, strict=True))

@@ -82,7 +82,8 @@ def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> St
 
 
 def _kick_statements(system: System, splitting: SplitHamiltonian, plain: Sequence[Expression]) -> Iterator[Statement]:
-    """Yield the statement {V, {V, {V, T}}} = 0 and, for modified kicks, that the flow of V is that of V + κ{V, {V, T}}.
+    """Yield the statement {V, {V, {V, T}}} = 0 for H = T + V and, for modified kicks, that V + κ{V, {V, T}} is their
+    Hamiltonian.
 
     ``plain`` are the Hamiltonians of the two parts at κ = 0.
     """
@@ -193,7 +194,11 @@ def _motion_residuals(system: System, flow: Flow, motion: Motion) -> Iterator[tu
 
 
 def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
-    """Yield pairs of a label and an expression; all expressions vanish if Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t."""
+    """Yield pairs of a label and an expression; all expressions vanish if a flow Φ_t is the exact flow of its vector
+    field X.
+
+    They are the components of Φ_0 − 1 and of dΦ_t/dt − X∘Φ_t.
+    """
     names = system.coordinates
     slopes = {name: slope for e in flow.exponentials for name, slope in e.slopes().items()}
     start = substitute(flow.increment, {TIME: ZERO, **dict.fromkeys(slopes, ZERO)})
