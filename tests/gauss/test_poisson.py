@@ -228,7 +228,7 @@ HIDDEN = (
 #: A solvable Lie algebra without a star algebra that is known.
 SOLVABLE = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: y + z, z: z}}}\nhamiltonian: x**2 + y\nscheme: gauss\n"
 REFUSED = {
-    "hidden logarithms": (HIDDEN, "no exact Poisson map is known", "take coordinates with brackets"),
+    "hidden logarithms": (HIDDEN, "no exact Poisson map is known", "use linear combinations"),
     "solvable": (SOLVABLE, "no exact Poisson map is known", "a basis with fewer structure constants"),
     "structure": (f"{CURVED}scheme: gauss\n", "no exact Poisson map is known", "to truncation"),
     "noise": (f"{BODY}noise: {{w: {{hamiltonian: x1}}}}\nscheme: gauss\n", "not with noise", "series"),
@@ -245,7 +245,7 @@ REFUSED = {
         "covector",
         "series",
     ),
-    "composition": (f"{BODY}composition: suzuki\nscheme: gauss\n", "not composed", "order"),
+    "composition": (f"{BODY}composition: suzuki\nscheme: gauss\n", "compositions are not offered", "order"),
     "terms": (f"{BODY}terms: 3\nscheme: gauss\n", "belongs to scheme: series", "remove"),
     "birealisation": (f"{BODY}birealisation: cayley\nscheme: gauss\n", "belongs to scheme: series", "remove"),
     "tolerance": (f"{BODY}solver: {{tolerance: 1e-9}}\nscheme: gauss\n", "round-off", "remove"),

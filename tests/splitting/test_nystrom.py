@@ -128,7 +128,7 @@ def test_three_parts_and_orders_that_a_name_lacks_are_refused():
     lattice = "coordinates: [x, y, z]\npoisson: {log_canonical: [[0,1,-1],[-1,0,1],[1,-1,0]]}\nhamiltonian: x + y + z\n"
     with pytest.raises(SpecError, match=r"needs H = T \+ V, of two parts; this H has 3"):
         composition_of(lattice, 6, "force-gradient")
-    with pytest.raises(SpecError, match="here there is one"):
+    with pytest.raises(SpecError, match="this H has 1 part"):
         composition_of(PLANE + "hamiltonian: p**2/2\n", 6, "force-gradient")
     with pytest.raises(SpecError, match="composition force-gradient offers the orders 4, 6, 8, not 10") as caught:
         composition_of(PLANE + "hamiltonian: p**2/2 + cos(q)\n", 10, "force-gradient")
