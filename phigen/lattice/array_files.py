@@ -53,7 +53,7 @@ def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
         return _array(path, shape)
     table = _table(path)
     if table.names not in ((), (name,)):
-        raise ValueError(f"its columns are {', '.join(table.names)}; it may have one of the name {name}, or no names")
+        raise ValueError(f"its columns are {', '.join(table.names)}; expected one column {name}, or no names")
     rows = table.rows.reshape(-1) if len(shape) == 1 and 1 in table.rows.shape else table.rows
     _expect_shape(rows.shape, shape)
     if not np.isfinite(rows).all():

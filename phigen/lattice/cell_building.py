@@ -112,7 +112,7 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
     return [
         spec.diagnostic(
             ("runs", m.run, "sizes"),
-            f"sizes: {m}, as the colours of the splitting need",
+            f"sizes: {m}, which the colours of the splitting require",
             f"for example {m.fitting}; scheme: series works for every size",
         )
         for m in wrong_sizes
@@ -169,15 +169,15 @@ def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
     declared = {("damping",): spec.forces.damping is not None, ("forces", "covector"): bool(spec.forces.covector)}
     for path, is_declared in {**declared, ("noise",): bool(spec.noise)}.items():
         if is_declared and cell.bond_bracket:
-            message = f"{path[-1]}: not with brackets along bonds"
-            yield spec.diagnostic(path, message, "forces: {vector: …} moves sites by themselves")
+            message = f"{path[-1]}: not offered together with brackets along bonds"
+            yield spec.diagnostic(path, message, "forces: {vector: …} can be combined with brackets along bonds")
 
 
 def _noise_beyond(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
     """Yield an error for each source of noise whose Hamiltonian names neighbours."""
     for name, source in spec.noise.items():
         if any(offset != cell.origin for _, offset in cell.places(source.hamiltonian).values()):
-            message = f"noise: {name} is that of a site, so its Hamiltonian names no neighbours"
+            message = f"noise: {name} acts at single sites, so its Hamiltonian must not name neighbours"
             hint = "each site has increments of its own, for a function of its own coordinates"
             yield spec.diagnostic(("noise", name, "hamiltonian"), message, hint)
 

@@ -40,15 +40,15 @@ def expect_applicable(cell: Cell, spec: Spec) -> None:
             "monitor: on lattices it is offered for pairs only; here the fastest site would determine the steps of all"
         )
     elif spec.monitor != LOGARITHMIC:
-        message, hint = "monitor: an expression makes K = g(H + e), which does not split", "monitor: log"
+        message, hint = "monitor: with an expression g, K = g (H + e) has no splitting on lattices", "monitor: log"
     elif spec.scheme == "series":
         message, hint = "monitor: log needs H = A + B split in two", "scheme: splitting"
     elif cell.time or cell.forces or cell.noise:
         feature = "time" if cell.time else "forces" if cell.forces else "noise"
         message = f"monitor: log is not offered with {feature}: e = -H(x0) would not be constant"
     elif spec.extras.adjoint:
-        message = "monitor: gradients (adjoint) are not offered with it for lattices"
-        hint = "phigen show --expand 3 prints an ordinary spec of three sites, which has them"
+        message = "monitor: on lattices, gradients (adjoint) are not offered together with a monitor"
+        hint = "phigen show --expand 3 prints an ordinary spec of three sites, which offers gradients"
     if message:
         raise SpecError([spec.diagnostic(("monitor",), message, hint)])
 

@@ -87,9 +87,9 @@ def _of_site(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) 
     realisation = realise(system, choice)
     if realisation.path or not realisation.exact:
         shortcoming = "follows paths numerically" if realisation.path else "is approximate"
-        raise refuse(f"scheme series: on lattices α and β are in closed form; {realisation.kind} {shortcoming}")
+        raise refuse(f"scheme series: on lattices α and β must be in closed form; {realisation.kind} {shortcoming}")
     if not realisation.symmetric:
-        raise refuse(f"scheme series: on lattices the bi-realisation is symmetric; {realisation.kind} is not")
+        raise refuse(f"scheme series: on lattices the bi-realisation must be symmetric; {realisation.kind} is not")
     displacement, increment = (
         dict(zip(cell.fields, values, strict=True)) for values in (realisation.displacement, realisation.increment)
     )
@@ -98,10 +98,12 @@ def _of_site(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) 
 
 def _of_neighbours(cell: Cell, choice: BirealisationChoice) -> CellRealisation:
     if choice.kind not in ("auto", "constant", "log-canonical"):
-        raise refuse(f"birealisation {choice.kind} is not for brackets that couple neighbours", "birealisation: auto")
+        raise refuse(
+            f"birealisation {choice.kind} is not offered for brackets that couple neighbours", "birealisation: auto"
+        )
     coordinates = _logarithms(cell)
     if coordinates is None:
-        hint = "brackets that are constant, or become so for log f in place of some fields f"
+        hint = "brackets must be constant, if necessary with log f as a coordinate in place of some fields f"
         raise refuse("scheme series: no bi-realisation is known for these brackets, which couple neighbours", hint)
     logarithmic, constants = coordinates
     one_half, displacement, increment = number(Fraction(1, 2)), {}, {}

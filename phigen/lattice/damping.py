@@ -31,7 +31,9 @@ from phigen.symbolic.symbols import BEGINS, CHOSEN, Symbol
 
 Covector = Mapping[str, Expression]
 
-_HINT = "that of a spin has one where H is linear or quadratic along an axis in it; scheme: series applies to every H"
+_HINT = (
+    "for spins there is a flow if H is linear or quadratic in the spin, along an axis; scheme: series works for every H"
+)
 
 
 def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
@@ -120,7 +122,7 @@ def _colours(cell: Cell, colouring: Colouring, fixed_slopes: Covector) -> list[i
     if not neighbours:
         return [None] if colouring.count > 1 else [0]
     if any(colouring.at(0, offset) == 0 for offset in neighbours):
-        raise _TogetherError("neighbours are damped together, whatever the colours of sites")
+        raise _TogetherError("neighbours have one colour, so that they would be damped at the same time")
     return [*range(colouring.count)]
 
 

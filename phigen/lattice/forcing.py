@@ -110,10 +110,10 @@ def _flow(cell: Cell, colouring: Colouring, rates: Rates) -> CellFlow | str:
     nonzero_rates = {f: e for f, e in rates.items() if not e.is_zero}
     names = symbols_of(*nonzero_rates.values())
     if any(kind_of(n) == GATHERED for n in names):
-        return "it depends on what bonds or pairs add up"
+        return "it depends on sums over bonds or pairs"
     neighbour_fields = {base for base, offset in cell.places(*nonzero_rates.values()).values() if any(offset)}
     if neighbour_fields & set(nonzero_rates):
-        return f"it depends on {min(neighbour_fields & set(nonzero_rates))} of neighbours, which moves"
+        return f"it depends on {min(neighbour_fields & set(nonzero_rates))} of neighbours, which changes along the flow"
     ring = bracketless_ring(cell.fields, nonzero_rates.values())
     solution = solved(ring, ring.tower.convert_all([nonzero_rates.get(f, ZERO) for f in cell.fields]))
     if isinstance(solution, str):
@@ -184,7 +184,7 @@ def force_statements(cell: Cell) -> Iterator[Statement]:
     for name in cell.casimirs:
         rate = casimir_rate(cell, name)
         conserved = decide_zero(f"the forces keep {name}", [(f"d{name}/dt", rate)], positive, "for all sizes")
-        detail = f"the vector force changes {name}, a site adds {shortened(rate)} to its rate"
+        detail = f"the vector force changes {name}: each site adds {shortened(rate)} to d{name}/dt"
         yield conserved if conserved.holds else Statement(detail, PROVED)
     if cell.forces.damping is not None:
         yield Statement("the damping changes H at the rate −Σ λ |π∇H|²", PROVED, "since π is skew, for all sizes")
@@ -214,7 +214,7 @@ def noise_statements(cell: Cell) -> Iterator[Statement]:
             cell.name, cell.fields, (*cell.parameters, *gradient_parameters), MatrixForm(rows), energy,
             time=cell.time, forces=cell.forces, noise=cell.noise,
         )  # fmt: skip
-        box_text = "at every site, whatever H is"
+        box_text = "at every site, for any H"
     varying = [p.name for p in cell.parameters if p.at == "sites"]
     for statement in checks.noise_statements(system):
         theta = statement.name.partition("θ = ")[2]

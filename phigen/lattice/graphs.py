@@ -61,7 +61,9 @@ class GraphSearch(PartSearch):
         self._along_bonds = {(f.partition("[")[0], g.partition("[")[0]) for f, g in self.cell.bond_bracket}
         bonds = [s for s in summands_of(self.cell) if s.bond]
         if bonds and self._along_bonds:
-            raise NoPartError(bonds[0].expression, "brackets run along bonds, so no energies may")
+            raise NoPartError(
+                bonds[0].expression, "energies of bonds are not offered together with brackets along bonds"
+            )
 
     # --- commuting terms
 
@@ -117,7 +119,9 @@ class GraphSearch(PartSearch):
             moving = {"a": equation.rates.keys(), "b": equations[neighbour_place].rates.keys()}
             for base, offset in self.cell.places(*(e for s in equation.gathered for e in s.values.values())).values():
                 if base in moving[str(offset[0])]:
-                    raise NoPartError(terms[0].expression, f"the force along a bond depends on {base}, which moves")
+                    raise NoPartError(
+                        terms[0].expression, f"the force along a bond depends on {base}, which changes along the flow"
+                    )
             yield self._solved_motion(equation.rates, equation.forces, equation.gathered, 0, part)
 
 

@@ -329,7 +329,7 @@ def _tensor_of_graphs(cell: Cell) -> tuple[Statement, ...]:
     if skew.verdict == REFUTED:
         return (skew,)
     statements = ((graph_name, jacobi_identity(system)) for graph_name, system in _representative_systems(cell))
-    detail = f"{scope}, from those of at most two bonds" if cell.relation == "graph" else scope
+    detail = f"{scope}, by proofs for graphs of at most two bonds" if cell.relation == "graph" else scope
     return skew, _worst(JACOBI, detail, statements)
 
 

@@ -30,7 +30,9 @@ def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
     """Yield the statements on the bi-realisation, then the statements on a stage."""
     system, realisation = plan.realisation.site or _on_a_box(cell, plan.realisation)
     domain_text = (
-        "" if plan.realisation.site else f"on {system.dimension // len(cell.fields)} sites, as on all by translation"
+        ""
+        if plan.realisation.site
+        else f"on {system.dimension // len(cell.fields)} sites; by translation on all larger lattices"
     )
     for statement in axioms.check(system, realisation):
         detail = "; ".join(filter(None, [statement.detail, domain_text]))
@@ -46,7 +48,7 @@ def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
     alpha: dict[str, Expression] = {initial(f): symbol(f) + e for f, e in realisation.displacement.items()}
     substituted = substitute([realisation.middle[f] for f in cell.fields], alpha)
     residuals = [(f, w - symbol(f)) for f, w in zip(cell.fields, substituted, strict=True)]
-    yield decide_zero("y, as it is written, solves α(y, p) = x", residuals, positive)
+    yield decide_zero("the formula for y solves α(y, p) = x", residuals, positive)
     rates = derivatives(list(plan.increment.values()), TIME)
     noise_symbols = [n for n, (base, _) in cell.places(*rates).items() if base in cell.increments]
     slopes = substitute(rates, {TIME: ZERO, **dict.fromkeys(noise_symbols, ZERO)})

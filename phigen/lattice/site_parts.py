@@ -248,7 +248,7 @@ def splittings(
     if not any_found:
         assert refused is not None
         message = f"scheme splitting: the term {refused.expression} has no elementary flow on the lattice"
-        hint = "terms in coordinates that commute over the whole lattice split, and terms of one site with a flow"
+        hint = "a term needs coordinates that commute over the whole lattice, or a single site and an elementary flow"
         raise SpecError([Diagnostic(f"{message}: {refused.reason}", place, hint)])
 
 
@@ -491,7 +491,8 @@ class PartSearch:
         for f, o in self.cell.places(*rates.values()).values():
             if f in moving and any(o) and self._moves(f, self.colouring.at(colour, o), part):
                 raise NoPartError(
-                    part[0][0].expression, f"the equation of a site has {f} of its neighbours, which moves"
+                    part[0][0].expression,
+                    f"the equation of a site reads {f} of its neighbours, which changes along the flow",
                 )
 
     def _moves(self, field: str, colour: int, part: Sequence[tuple[Summand, int]]) -> bool:

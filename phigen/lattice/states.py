@@ -106,15 +106,15 @@ class _Reader:
 
     def _expect_masses(self, p: Parameter, values: Floats) -> None:
         """Raise `SpecError` if masses are not allowed in relative coordinates, such as a first body without mass."""
-        begin, form = f"with coordinates_from: {self.spec.coordinates_from}", self.spec.poisson
+        begin, form = f"with coordinates_from: {self.spec.coordinates_from},", self.spec.poisson
         if not values.flat[0] > 0:
-            message = f"{begin} the first body needs a mass, which is {values.flat[0]:g}"
+            message = f"{begin} the first body needs a positive mass, not {values.flat[0]:g}"
             raise self.arrays.refused(p.name, message)
         entries = [e for row in form.entries for e in row] if isinstance(form, MatrixForm) else []
         if (least := np.min(values)) < 0:
-            raise self._out_of_bound(p, values, f"{begin} masses are nonnegative")
+            raise self._out_of_bound(p, values, f"{begin} masses must be nonnegative")
         if least == 0 and p.name not in symbols_of(*entries):  # brackets of velocities contain the mass
-            raise self._out_of_bound(p, values, f"{begin} bodies with momenta have positive masses")
+            raise self._out_of_bound(p, values, f"{begin} bodies with momenta must have positive masses")
 
     def _out_of_bound(self, p: Parameter, values: Floats, rule: str) -> SpecError:
         """Return the error for values of a parameter that break the ``rule``; the message names the least value and its

@@ -204,7 +204,7 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     choice = planned(spec, SplitHamiltonian(flows), *requested, lambda: () if plain else _kicks(cell, parts))
     coloured = any(flow.by_colour for flow in flows)
     if coloured and noise:
-        message = "scheme splitting: noise is not offered where parts are those of one colour of a graph"
+        message = "scheme splitting: noise is not offered on graphs whose sites must be coloured"
         raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "scheme: series applies to it")])
     if cell.time:  # on a coloured graph, the time advances in the last flow
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)

@@ -375,7 +375,7 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (TEXTS["bath"].replace("hamiltonian: x,", 'hamiltonian: "x*x[i+1]",'), "names no neighbours"),
+        (TEXTS["bath"].replace("hamiltonian: x,", 'hamiltonian: "x*x[i+1]",'), "must not name neighbours"),
         (f"order: 4\n{TEXTS['bath']}", "steps are not composed"),
         ("scheme: splitting\n" + TEXTS["damped"].replace("damping: l", "damping: l*z"), "damping has no elementary"),
         # Systems that are refused for other reasons than colours, and one that no colouring separates.
@@ -383,10 +383,10 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
          'hamiltonian: "q*q[i+1] + (q**2 + p**2)**2"',
          "on the lattice: phigen cannot solve the equation of q"),
         (f"scheme: splitting\nlattice: {{axes: [i]}}\ndamping: 0.1\n{SPINS}"
-         'hamiltonian: "-x*x[i+1] - x*x[i+2] - z*z[i+3] - y*y[i+4]"', "neighbours are damped together"),
+         'hamiltonian: "-x*x[i+1] - x*x[i+2] - z*z[i+3] - y*y[i+4]"', "damped at the same time"),
         (TEXTS["free"].replace("hamiltonian: x,", "hamiltonian: x*y + z**3,"), "needs the flow of the noise x"),
         ("damping: 0.1\nlattice: {graph: b}\ncoordinates: [x]\npoisson: {bonds: {'x[a]': {'x[b]': 1}}}\n"
-         "hamiltonian: {sites: x**2}", "damping: not with brackets along bonds"),
+         "hamiltonian: {sites: x**2}", "damping: not offered together with brackets along bonds"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_combined_is_refused_where_it_stands(text: str, said: str) -> None:

@@ -232,7 +232,7 @@ REFUSED = {
         "hamiltonian: p**2/2 - 1/(1 + q**2)\nmonitor: log\n",
         "for pairs only",
     ),
-    "formula": (BODIES.replace("monitor: log", "monitor: x**2"), "does not split"),
+    "formula": (BODIES.replace("monitor: log", "monitor: x**2"), "has no splitting"),
     "series": (BODIES.replace("scheme: splitting", "scheme: series"), "split in two"),
     "adjoint": (BODIES + "adjoint: true\n", "gradients"),
     "damped": (BODIES + "damping: 0.1\n", "not offered with forces"),

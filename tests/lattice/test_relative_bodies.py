@@ -356,10 +356,10 @@ def test_bodies_are_verified_on_a_few_of_them_with_the_first(masses: str) -> Non
 @pytest.mark.parametrize(
     ("masses", "momenta", "message"),
     [
-        ("[0, 1]", False, "the first body needs a mass, which is 0"),
-        ("[-1, 1]", False, "the first body needs a mass, which is -1"),
-        ("[1, -1]", False, "masses are nonnegative, but -1 at site 1"),
-        ("[1, 0]", True, "bodies with momenta have positive masses, but 0 at site 1"),
+        ("[0, 1]", False, "the first body needs a positive mass, not 0"),
+        ("[-1, 1]", False, "the first body needs a positive mass, not -1"),
+        ("[1, -1]", False, "masses must be nonnegative, but -1 at site 1"),
+        ("[1, 0]", True, "bodies with momenta must have positive masses, but 0 at site 1"),
     ],
 )
 def test_masses_of_runs_are_refused_at_their_place(masses: str, momenta: bool, message: str) -> None:

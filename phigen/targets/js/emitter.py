@@ -40,8 +40,8 @@ def expect_offered(program: Program) -> None:
     offer.
     """
     if program.step.adjoint:
-        message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
-        raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
+        message = f"{program.name}: gradients (adjoint) are not offered in JavaScript"
+        raise SpecError([Diagnostic(message, hint="the targets c and numpy offer gradients")])
 
 
 def _lattice(program: Program, step: Sweeps) -> str:
