@@ -27,20 +27,20 @@ from phigen.gauss.star_algebra import StarAlgebra, Vector
 from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.symbolic.tower import rational
 
-#: Largest dimension of the Lie algebra: that of sp(6), whose algebra A has 36 dimensions, as many as MOST_UNKNOWNS
+#: Largest dimension of the Lie algebra: that of sp(6). Its star algebra has 36 dimensions, as many as MOST_UNKNOWNS
 #: allows.
 MOST_SIMPLE = 21
 
-#: Largest number of nonzero structure constants of A. The algebras of `named`, in permuted and scaled bases, have up to
-#: 1,700. so(5) in a dense basis has 4,000: with these, the tangent map of a stage takes 120,000 operations, more than
-#: programs may have.
+#: Largest number of nonzero structure constants of a star algebra. Those of the algebras that phigen knows by name have
+#: up to 1,700, in permuted and scaled bases. so(5) in a dense basis has 4,000: then the tangent map of a stage takes
+#: 120,000 operations, more than programs may have.
 MOST_TERMS = 2000
 
 
 def enveloping(lie: LieAlgebra) -> StarAlgebra | None:
-    """Return the algebra A of a simple Lie algebra, or of the sum of a simple and a one-dimensional Lie algebra.
+    """Return the star algebra of a simple Lie algebra, or of the sum of a simple and a one-dimensional Lie algebra.
 
-    Returns None if A does not exist, or if it exceeds MOST_UNKNOWNS or MOST_TERMS.
+    Returns None if it does not exist, or if it exceeds MOST_UNKNOWNS or MOST_TERMS.
     """
     field, m = lie.field, lie.dimension
     if not field.is_rational or m > MOST_SIMPLE:
@@ -92,10 +92,11 @@ def _kernel(a: fmpq_mat) -> list[list[fmpq]]:
 
 
 def _derived_and_centre(ad: Sequence[fmpq_mat], m: int) -> tuple[fmpq_mat, fmpq_mat, int] | None:
-    """Return a basis of g that is adapted to [g, g] and the centre: the basis as rows, its inverse, and dim [g, g].
+    """Return a basis of a Lie algebra g that is adapted to [g, g] and the centre: the basis as rows, its inverse, and
+    dim [g, g].
 
-    The rows span [g, g] first, then the centre. Returns None if [g, g] and the centre do not span g, or if the centre
-    has more than one dimension.
+    ``ad`` are the adjoint matrices of g, and ``m`` is dim g. The rows span [g, g] first, then the centre. Returns None
+    if [g, g] and the centre do not span g, or if the centre has more than one dimension.
     """
     brackets = fmpq_mat(m * m, m, [ad[i][k, j] for i in range(m) for j in range(m) for k in range(m)])
     reduced, rank = brackets.rref()
@@ -117,7 +118,8 @@ def _unit_rows(m: int) -> list[list[fmpq]]:
 def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: int, simple: int) -> fmpq_mat:
     """Return the adjoint matrix ad e_k of basis element ``k`` of [g, g], in the basis of [g, g].
 
-    ``basis`` and ``inverse`` are the adapted basis of g and its inverse, and ``simple`` is dim [g, g].
+    ``ad`` are the adjoint matrices of the Lie algebra g, ``basis`` and ``inverse`` are its adapted basis and the
+    inverse, and ``simple`` is dim [g, g].
     """
     m = len(ad)
     total = _matrix(m, m)
@@ -128,7 +130,11 @@ def _restricted(ad: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat, k: i
 
 
 def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
-    """Yield the candidates for the module S that fit the dimension of g, those with the smallest algebra A first."""
+    """Yield the candidates for the module S of symmetric elements in a star algebra A = K ⊕ g ⊕ S ⊕ Z.
+
+    They fit the dimension of the Lie algebra g; those with the smallest A come first. ``ad`` are the adjoint matrices
+    of g, and ``centre`` is the dimension of its centre.
+    """
     m = len(ad)
     form = fmpq_mat(m, m, [_trace(a * b) for a in ad for b in ad])
     if m < 8 or form.det() == 0:
@@ -136,13 +142,13 @@ def _modules(ad: Sequence[fmpq_mat], centre: int) -> Iterator[_Module]:
     eigenvalues: list[tuple[int, Fraction, bool]] = []
     n = isqrt(m + 1)
     if n * n == m + 1:
-        eigenvalues.append((m, Fraction(1), True))  # sl(n): S ≅ g, symmetric products without trace
+        eigenvalues.append((m, Fraction(1), True))  # sl(n): S has the dimension of g
     n = (1 + isqrt(1 + 8 * m)) // 2
     if n * (n - 1) == 2 * m and not centre:
         eigenvalues.append((n * (n + 1) // 2 - 1, Fraction(n, n - 2), False))  # so(n): symmetric matrices of trace 0
     n = (isqrt(1 + 8 * m) - 1) // 4
     if n * (2 * n + 1) == m and not centre:
-        # sp(2n): S are the skew-Hamiltonian matrices of trace 0
+        # sp(2n): symmetric elements are the skew-Hamiltonian matrices of trace 0
         eigenvalues.append((n * (2 * n - 1) - 1, Fraction(n, n + 1), False))
     for size, eigenvalue, central in sorted(eigenvalues):
         if 1 + m + size + central > MOST_UNKNOWNS:
@@ -157,9 +163,10 @@ def _trace(a: fmpq_mat) -> fmpq:
 
 
 def _eigenspace(ad: Sequence[fmpq_mat], form: fmpq_mat, eigenvalue: Fraction) -> list[fmpq_mat]:
-    """Return a basis of an eigenspace of the Casimir operator on symmetric tensors over g.
+    """Return a basis of an eigenspace of the Casimir operator on symmetric tensors over a Lie algebra g.
 
-    The operator is normalised so that it has the eigenvalue 1 on g.
+    ``ad`` are the adjoint matrices of g, and ``form`` is the Killing form. The operator is normalised so that it has
+    the eigenvalue 1 on g.
     """
     m = len(ad)
     flat = fmpq_mat(m * m, m, [ad[a][i, p] for i in range(m) for p in range(m) for a in range(m)])
@@ -185,10 +192,10 @@ def _eigenspace(ad: Sequence[fmpq_mat], form: fmpq_mat, eigenvalue: Fraction) ->
 
 @dataclass(frozen=True)
 class _Module:
-    """Module S of a simple Lie algebra g, spanned by symmetric ``tensors`` over g.
+    """The module S of symmetric elements in the star algebra A = K ⊕ g ⊕ S ⊕ Z of a simple Lie algebra g.
 
-    ``central`` says whether A has the central element z. ``ad`` are the adjoint matrices of g, and ``form`` is the
-    Killing form.
+    ``tensors`` are symmetric tensors over g that span S. ``central`` says whether Z is spanned by a central element z,
+    or 0. ``ad`` are the adjoint matrices of g, and ``form`` is the Killing form.
     """
 
     ad: Sequence[fmpq_mat]
@@ -198,14 +205,14 @@ class _Module:
 
     @property
     def size(self) -> int:
-        """The dimension of A = K ⊕ g ⊕ S ⊕ Z."""
+        """The dimension of the star algebra A = K ⊕ g ⊕ S ⊕ Z."""
         return 1 + len(self.ad) + len(self.tensors) + self.central
 
     def products(self) -> list[fmpq_mat] | None:
-        """Return the matrices of left multiplication by the basis elements of A = K ⊕ g ⊕ S ⊕ Z.
+        """Return the matrices of left multiplication by the basis elements of the star algebra A = K ⊕ g ⊕ S ⊕ Z.
 
-        The factors c, μ, ν and the isomorphism ι are defined at the head of the module. Returns None if one of them
-        does not exist.
+        Returns None if the factors c, μ, ν or the isomorphism ι in the products of A do not exist; see the head of the
+        module.
         """
         m, d = len(self.ad), len(self.tensors)
         lowered = [self.form * s * self.form for s in self.tensors]
@@ -215,8 +222,8 @@ class _Module:
         action = [self._action(a, lowered, extract) for a in self.ad]
         metric = fmpq_mat(d, d, [_trace(q * s) for q in lowered for s in self.tensors]).inv()
         raised = [s * self.form for s in self.tensors]
-        # These are the matrices of τ(·, f_l) for the basis elements f_l of S, where τ is the transpose of the
-        # projection σ.
+        # These are the matrices of τ(·, f_l) for the basis elements f_l of S. τ maps g × S to g: it is the transpose of
+        # the projection σ of symmetric products to S.
         right_factors = [_combination(raised, [metric[k, k2] for k in range(d)]) for k2 in range(d)]
         iota = _isomorphism(self.ad, action) if self.central else None
         if self.central and iota is None:
@@ -228,7 +235,9 @@ class _Module:
         return self._completed(left, lowered, factors, iota)
 
     def _action(self, a: fmpq_mat, lowered: Sequence[fmpq_mat], extract: fmpq_mat) -> fmpq_mat:
-        """Return the matrix of the action of ``a`` on S, where ``a`` is the adjoint matrix of a basis element of g."""
+        """Return the matrix of the action of ``a`` on S, the module of symmetric elements; ``a`` is the adjoint matrix
+        of a basis element of the Lie algebra.
+        """
         m, d = a.nrows(), len(lowered)
         images = [a.transpose() * q + q * a for q in lowered]
         return fmpq_mat(d, m * m, [e[i, j] for e in images for i in range(m) for j in range(m)]) * extract
@@ -240,10 +249,10 @@ class _Module:
         right_factors: Sequence[fmpq_mat],
         iota: fmpq_mat | None,
     ) -> tuple[fmpq, fmpq, fmpq] | None:
-        """Return the factors c, μ, ν in the products of A, from linear equations for a few pairs of elements of g.
+        """Return the factors c, μ, ν in the products of the star algebra; see the head of the module.
 
-        Returns None if the equations have no solution. The caller of `enveloping` gets A only if it satisfies all
-        axioms.
+        They solve linear equations for a few pairs of elements of the Lie algebra. Returns None if there is no
+        solution. A solution may still violate axioms of a star algebra; `enveloping` checks these at the end.
         """
         m, d, rows = len(self.ad), len(self.tensors), list[list[fmpq]]()
         pairing = None if iota is None else self.form * iota.inv()  # ⟨a, ι(b)⟩ = κ(a, b) defines the pairing ⟨a, f⟩
@@ -282,7 +291,7 @@ class _Module:
         right_factors: Sequence[fmpq_mat],
         iota: fmpq_mat | None,
     ) -> fmpq_mat:
-        """Return the matrix of left multiplication by basis element ``a`` of g."""
+        """Return the matrix of left multiplication in the star algebra by basis element ``a`` of the Lie algebra."""
         m, d, (c, mu, nu) = len(self.ad), len(self.tensors), factors
         left = _matrix(self.size, self.size)
         left[1 + a, 0] = fmpq(1)
@@ -312,10 +321,10 @@ class _Module:
         factors: tuple[fmpq, fmpq, fmpq],
         iota: fmpq_mat | None,
     ) -> list[fmpq_mat] | None:
-        """Return the matrices of left multiplication by all basis elements of A; ``left`` has those for g.
+        """Return the matrices of left multiplication by all basis elements of the star algebra A = K ⊕ g ⊕ S ⊕ Z.
 
-        Elements of S, and z, are combinations of products of elements of g. Returns None if these products do not span
-        S.
+        ``left`` has those for the Lie algebra g. Elements of S and Z are combinations of products of elements of g.
+        Returns None if these products do not span S.
         """
         m, d, size = len(self.ad), len(self.tensors), self.size
         identity = fmpq_mat(size, size, [fmpq(int(i == j)) for i in range(size) for j in range(size)])
@@ -342,7 +351,8 @@ class _Module:
     ) -> fmpq_mat:
         """Return the matrix of left multiplication by the central element z.
 
-        It follows from af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z), with any a in g and f in S such that ⟨a, f⟩ ≠ 0.
+        It follows from the product af + fa = 2(μ τ(a, f) + ν ⟨a, f⟩ z) of any a in the Lie algebra and f in S with ⟨a,
+        f⟩ ≠ 0; see the head of the module.
         """
         m, d, pairing = len(self.ad), len(self.tensors), self.form * iota.inv()
         a, f = next((a, f) for a in range(m) for f in range(d) if pairing[a, f] != 0)
@@ -376,10 +386,10 @@ def _pivots(a: fmpq_mat) -> list[int]:
 
 
 def _isomorphism(ad: Sequence[fmpq_mat], action: Sequence[fmpq_mat]) -> fmpq_mat | None:
-    """Return an invertible matrix ι with D_x ι = ι ad_x for all x in g; None if there is none.
+    """Return an invertible matrix ι with D_x ι = ι ad_x for all elements x of a Lie algebra; None if there is none.
 
-    D_x is the matrix by which x acts on S: ``action`` has these matrices for the basis of g, and ``ad`` the adjoint
-    matrices.
+    ``ad`` has the adjoint matrices ad_x of the basis of the Lie algebra. ``action`` has the matrices D_x by which the
+    basis acts on S, the module of symmetric elements.
     """
     m, d = len(ad), action[0].nrows()
     rows: list[fmpq] = []
@@ -403,9 +413,10 @@ def _isomorphism(ad: Sequence[fmpq_mat], action: Sequence[fmpq_mat]) -> fmpq_mat
 def _assembled(
     lie: LieAlgebra, module: _Module, left: Sequence[fmpq_mat], basis: fmpq_mat, inverse: fmpq_mat
 ) -> StarAlgebra:
-    """Return the star algebra A in the basis of K, g, S, Z, from the matrices ``left`` of left multiplication.
+    """Return the star algebra A = K ⊕ g ⊕ S ⊕ Z, from the matrices ``left`` of left multiplication by its basis.
 
-    The rows of ``basis`` are elements of [g, g], followed by a basis element of the centre if there is a centre.
+    The rows of ``basis`` are a basis of g: elements of [g, g], then one of the centre if there is a centre. ``inverse``
+    is the inverse of ``basis``.
     """
     field, size, simple, m = lie.field, module.size, len(module.ad), lie.dimension
 
@@ -415,7 +426,8 @@ def _assembled(
     table = {(i, j): vector([left[i][k, j] for k in range(size)]) for i in range(size) for j in range(size)}
     skew = {*range(1, 1 + simple), *([size - 1] if module.central else [])}
     star = [{k: -field.one if k in skew else field.one} for k in range(size)]
-    # A has the basis 1, [g, g], S, z. These are the positions there of the elements in the rows of ``basis``.
+    # The star algebra has the basis 1, [g, g], S, z. These are the positions there of the elements in the rows of
+    # ``basis``.
     row_numbers = [*range(1, 1 + simple), *([size - 1] if m > simple else [])]
     elements = [{row_numbers[r]: v for r, v in vector([inverse[a, r] for r in range(m)]).items()} for a in range(m)]
     functional: list[Vector] = [{} for _ in range(size)]

@@ -55,9 +55,10 @@ def _products(copy: Copy, one: Scalar) -> dict[tuple[int, int], Vector]:
 def momentum_form(
     algebra: StarAlgebra, copies: Sequence[Copy], element: Mapping[int, Scalar]
 ) -> dict[tuple[int, int], Scalar]:
-    """Return the quadratic form k̃(U a U*) of U for a = ``element``, where k̃ adds the k-components of all copies.
+    """Return the momentum k̃(U a U*) for a = ``element`` as a quadratic form in the components of U.
 
-    The form maps ascending pairs of indices of components of U to coefficients.
+    The functional k̃ adds the k-components of all copies of the quaternions. The form maps ascending pairs of indices
+    of components to coefficients.
     """
     unit, last = algebra.field.one, {copy[3] for copy in copies}
     form: dict[tuple[int, int], Scalar] = {}

@@ -24,13 +24,16 @@ from phigen.symbolic.tower import rational
 #: Linear map of g: its entries by (row, column).
 Map = dict[tuple[int, int], Scalar]
 
-#: Largest dimension of a Lie algebra. The linear equations for β have a number of unknowns that grows as its third
-#: power.
+#: Largest dimension of a Lie algebra. The number of unknowns in the linear equations for the products grows as its
+#: third power.
 MOST_QUATERNIONIC = 12
 
 
 def quaternionic(algebra: LieAlgebra) -> StarAlgebra | None:
-    """Return the star algebra A of quaternionic type; None if there is none, or if the Lie algebra is too large."""
+    """Return the star algebra of quaternionic type that contains a Lie algebra.
+
+    Returns None if there is none, or if the Lie algebra has more than `MOST_QUATERNIONIC` dimensions.
+    """
     m, field = algebra.dimension, algebra.field
     if m > MOST_QUATERNIONIC:
         return None
@@ -45,7 +48,7 @@ def quaternionic(algebra: LieAlgebra) -> StarAlgebra | None:
 
 
 def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
-    """Return a basis of the linear maps φ of g with φ[a, b] = [φa, b]; the first is the identity."""
+    """Return a basis of the linear maps φ of a Lie algebra with φ[a, b] = [φa, b]; the first is the identity."""
     m = len(ad)
     rows: list[dict[int, Scalar]] = []
     for i in range(m):
@@ -54,7 +57,7 @@ def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
             for k, v in ad[i][j].items():
                 for row in range(m):
                     add_multiple(equations.setdefault(row, {}), {row * m + k: v}, field.one)
-            for k in range(m):  # [φ e_i, e_j] = Σ_k φ_ki [e_k, e_j]
+            for k in range(m):  # the components of [φ e_i, e_j] = Σ_k φ_ki [e_k, e_j]
                 for row, v in ad[k][j].items():
                     add_multiple(equations.setdefault(row, {}), {k * m + i: v}, -field.one)
             rows += [e for e in equations.values() if e]
@@ -65,8 +68,9 @@ def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
 
 
 def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> dict[tuple[int, int], Map] | None:
-    """Return the symmetric form β: a linear map of g for each pair (i, j) of basis elements; None if β does not
-    exist.
+    """Return the symmetric form β with [[a, b], c] = 4(β(b, c)a − β(a, c)b), whose values are combinations of ``maps``.
+
+    It has a linear map of the Lie algebra for each pair (i, j) of basis elements. Returns None if β does not exist.
     """
     m, count = len(ad), len(maps)
     pair_numbers = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(m) for j in range(i + 1))}
@@ -109,7 +113,9 @@ def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> 
 
 
 def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> list[Map]:
-    """Return a basis of the algebra that the values of β generate; the first is the identity."""
+    """Return a basis of the algebra of linear maps that the values of the form β generate; the first is the
+    identity.
+    """
     basis: list[Map] = [{(i, i): field.one for i in range(m)}]
     pending = [value for value in form.values() if value]
     while pending:
@@ -137,9 +143,10 @@ def _composed(a: Mapping[tuple[int, int], Scalar], b: Mapping[tuple[int, int], S
 def _assembled(
     ad: Sequence[Sequence[Vector]], form: Mapping[tuple[int, int], Map], scalars: Sequence[Map], field: Field
 ) -> StarAlgebra:
-    """Return the algebra K ⊕ g; the caller checks its axioms.
+    """Return the star algebra K ⊕ g of a Lie algebra g, where K is the commutative algebra with the basis ``scalars``.
 
-    Its basis has the elements of K, then 2e for each basis element e of g. The products are 2a·2b = 4β(a, b) + 2[a, b].
+    Its basis has the elements of K, then 2e for each basis element e of g. The products are 2a·2b = 4β(a, b) + 2[a, b]
+    with the ``form`` β. The caller checks the axioms.
     """
     m, count, unit = len(ad), len(scalars), field.one
     span, twice_unit, one_half = Span(field, scalars), field.number(2), unit / field.number(2)
@@ -164,9 +171,10 @@ def _assembled(
 
 
 def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
-    """Return the algebra as the direct sum of two algebras, if K has two dimensions and a rational idempotent.
+    """Return a star algebra K ⊕ g as the direct sum of two algebras, if K has two dimensions and a rational idempotent.
 
-    Returns the algebra unchanged if there is no such idempotent. ``count`` is the dimension of K.
+    K is the commutative part, and ``count`` its dimension. Returns the algebra unchanged if there is no such
+    idempotent.
     """
     field, unit = algebra.field, algebra.field.one
     idempotent = _idempotent(algebra) if count == 2 else None
@@ -184,9 +192,9 @@ def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
 
 
 def _idempotent(algebra: StarAlgebra) -> Vector | None:
-    """Return an idempotent of K = span(1, k) other than 0 and 1; None if no rational one exists.
+    """Return an idempotent other than 0 and 1 of the commutative part, span(1, k), of a star algebra.
 
-    If k² = p + qk and r² = p + q²/4, the idempotent is (1 + (k − q/2)/r)/2.
+    If k² = p + qk and r² = p + q²/4, it is (1 + (k − q/2)/r)/2. Returns None if r is not rational.
     """
     field = algebra.field
     if not field.is_rational:

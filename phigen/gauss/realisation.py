@@ -171,7 +171,9 @@ def _parts(coordinates: Sequence[str], poisson: Matrix, shape: Shape) -> list[Pa
 
 
 def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] | None:
-    """Return the parts of all diagonal blocks of π; None if π is one block, or if phigen knows no parts for a block."""
+    """Return the parts of all diagonal blocks of π, whose coordinates have no brackets with other blocks; None if π is
+    one block, or if phigen knows no parts for a block.
+    """
     blocks_of_poisson = blocks(coordinates, poisson)
     if len(blocks_of_poisson) < 2:
         return None
@@ -187,9 +189,9 @@ def _parts_of_blocks(coordinates: Sequence[str], poisson: Matrix) -> list[Part] 
 
 
 def _with_global_indices(part: Part, block: Sequence[int]) -> Part:
-    """Return a part whose indices count within a block, with indices into all coordinates instead.
+    """Return a part of a block with the indices of its coordinates among all coordinates of the system.
 
-    ``block`` has the indices of the coordinates of the block.
+    In ``part``, indices count the coordinates of the block. ``block`` has the indices of these among all coordinates.
     """
     indices = tuple(block[i] for i in part.indices)
     if isinstance(part, LogarithmicBlock):
@@ -266,10 +268,10 @@ def _without_constants(lie: LieAlgebra, last: int) -> LieAlgebra:
 
 
 def _shift(lie: LieAlgebra, last: int) -> list[Expression] | None:
-    """Return a shift s of the coordinates that absorbs the constant terms of affine brackets.
+    """Return constants s_k that absorb the constant terms of affine brackets, when they are added to the coordinates.
 
-    With the linear terms c_ij^k, the brackets are {x_i, x_j} = Σ_k c_ij^k (x_k + s_k). Returns None if there is no such
-    s.
+    With the linear terms c_ij^k, the brackets are {x_i, x_j} = Σ_k c_ij^k (x_k + s_k). ``last`` is the index of the
+    basis element that stands for the constant 1. Returns None if there are no such s_k.
     """
     field = lie.field
     rows: list[Vector] = []

@@ -45,7 +45,7 @@ def _element(
         total(algebra.field.expression(image[k]) * z for image, z in zip(images, offsets, strict=True) if image[k])
         for k in range(8)
     ]
-    if attitude.spatial:  # then the attitude is multiplied from the left by the inverse of G
+    if attitude.spatial:  # then G acts on the attitude from the left, by its inverse
         w = [w[0], *(-v for v in w[1:4]), w[4], *(-v for v in w[5:])]
     inverse = [ONE + w[0], *(-v for v in w[1:4])]
     translation = quaternion_product(w[4:], inverse)[1:]
@@ -53,7 +53,11 @@ def _element(
 
 
 def _images(group: AlgebraBlock, attitude: Group) -> list[Dual] | None:
-    """Return the dual quaternions of the basis elements of the star algebra; None if there is no homomorphism."""
+    """Return the image of each basis element of the star algebra under a homomorphism to dual quaternions.
+
+    It maps rotations and translations of the attitude as the head of the module says. Returns None if there is no such
+    homomorphism.
+    """
     algebra, field = group.algebra, group.algebra.field
     half = field.one / field.number(2)
     scale = half if attitude.spatial else -half
@@ -84,7 +88,10 @@ def _combination(algebra: StarAlgebra, factors: Vector, images: Sequence[Dual]) 
 
 
 def _generate(algebra: StarAlgebra, elements: list[Vector], images: list[Dual]) -> None:
-    """Append products of elements, and of their images, until the elements span the algebra or no product is new."""
+    """Append products of elements, and the products of their images, until the elements span the algebra.
+
+    It ends earlier if no product is linearly independent of the elements.
+    """
     generators = len(elements)
     for k in count():
         if k == len(elements) or Span(algebra.field, elements).dimension == algebra.dimension:

@@ -19,10 +19,11 @@ from phigen.gauss.star_algebra import StarAlgebra
 
 
 def square_zero_ideal(algebra: StarAlgebra) -> tuple[int, ...]:
-    """Return a square-zero ideal N with 2 dim B ≤ dim A (see the module), by the indices of its basis elements.
+    """Return the basis elements of a square-zero ideal N of a star algebra A, which reduces the number of unknowns of a
+    step.
 
-    N is the radical of the bilinear form tr ab. Returns () if there is no such ideal, if N and a complement B are not
-    spanned by basis elements, or if an element of the frame of the algebra lies in neither.
+    A = N ⊕ B with a subalgebra B, and 2 dim B ≤ dim A. N is the radical of the bilinear form tr ab. Returns () if there
+    is no such ideal, if N and B are not spanned by basis elements, or if a frame element of A is in neither.
     """
     n, zero = range(algebra.dimension), algebra.field.zero
     products = {at: row for at, row in algebra.table.items() if row}

@@ -32,7 +32,7 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.symbols import Symbol
 
-#: Kinds of symbols: unknowns of a stage, and components of the frames F of group elements.
+#: Kinds of symbols: unknowns of a stage, and components of the frames F of group elements (`phigen.gauss.lift`).
 OFFSET, FRAME = "z", "frame"
 
 
@@ -153,10 +153,11 @@ def _combined(algebra: StarAlgebra, factors: Mapping[int, object], values: Seque
 
 @dataclass(frozen=True)
 class _Scaled:
-    """The functional x̃/q at the basis elements of a star algebra, and the frame elements f/c, with numbers q and c.
+    """A functional x̃ of the momenta on a star algebra, and frame elements f, both scaled by numbers: x̃/q and f/c.
 
-    The numbers are chosen such that products need few multiplications by constants. ``combination`` has the
-    coefficients by which x̃(E_a) is a combination of the values of x̃/q at the f/c.
+    The numbers q and c are chosen such that products need few multiplications by constants. ``at_basis`` has x̃/q at
+    the basis elements of the algebra, ``frame`` the elements f/c. ``combination`` has the coefficients by which the
+    momenta x̃(E_a) are combinations of the values of x̃/q at the f/c.
     """
 
     at_basis: list[Expression]
@@ -184,15 +185,20 @@ def _scaled(group: AlgebraBlock, x: Sequence[Expression]) -> _Scaled:
 
 
 def offset_element(group: AlgebraBlock, offsets: Sequence[Expression]) -> list[Expression]:
-    """Return the components of w = G − 1, or of w = U − F, from the unknowns of a group; components in its ideal
-    are 0.
+    """Return the offset of a group element from its start, as an element w of the star algebra, from the unknowns of a
+    group.
+
+    Components in the square-zero ideal of the group have no unknowns; they are 0.
     """
     components = dict(zip(group.subalgebra, offsets, strict=False))
     return [components.get(k, ZERO) for k in range(group.algebra.dimension)]
 
 
 def _start_of(group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return the components of a group element at the start of a step: those of 1, or the symbols of its frame F."""
+    """Return the components of a group element at the start of a step: those of 1, or the symbols of its frame F.
+
+    Frames are explained in `phigen.gauss.lift`.
+    """
     if group.copies:
         return [symbol(frame_symbol(k)) for k in places]
     unit = group.algebra.unit
@@ -200,19 +206,21 @@ def _start_of(group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
 
 
 def _element_at(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return the components of the group element, G = 1 + w or U = F + w, from the unknowns w of a group.
+    """Return the components of a group element G = 1 + w, or F + w with a frame F, as functions of the unknowns w.
 
-    Components in the ideal of the group have no unknowns, and are those of 1.
+    Components in the square-zero ideal of the group have no unknowns, and are those of 1.
     """
     offsets = offset_element(group, offsets_of(points, places))
     return [w + start for w, start in zip(offsets, _start_of(group, places), strict=True)]
 
 
 def _momentum_change(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return the change x̃(G E_a G*) − x_a of the momenta since the start of a step, for all a, without cancellation.
+    """Return the changes of the momenta x_a since the start of a step, as functions of the unknowns, without
+    cancellation.
 
-    For G = 1 + w it is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. For E_a in a subalgebra with a functional λ = x̃ +
-    u, it is u(E_a) + λ(E_a w*). With frames it is the change of the quadratic forms k̃(U E_a U*).
+    They are x̃(G E_a G*) − x_a with the functional x̃ of the star algebra and its basis E_a of the Lie algebra. For G =
+    1 + w this is 2x̃(wE_a) + x̃(wE_a w*), since E_a is skew. For E_a in a subalgebra with a functional λ = x̃ + u, it
+    is u(E_a) + λ(E_a w*). With frames it is the change of the quadratic forms k̃(U E_a U*).
     """
     algebra, offsets = group.algebra, offsets_of(points, places)
     scaled, w = _scaled(group, group_values(points.system, group)), offset_element(group, offsets)
@@ -242,15 +250,19 @@ def _form_change(
 
 
 def _momentum(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return the momenta x̃(G E_a G*) of a group element G for all a; ``places`` are the indices of its unknowns."""
+    """Return the momenta x̃(G E_a G*) of a group element G, with the functional x̃ of the star algebra, for all a.
+
+    E_a is the basis of the Lie algebra; ``places`` are the indices of the unknowns of G.
+    """
     at_frame, combination = _at_frame(points, group, places)
     return [_combined(group.algebra, parts, at_frame) for parts in combination]
 
 
 def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> tuple[list[Expression], list[Vector]]:
-    """Return multiples of the momenta x̃(G f G*) for the frame elements f, and coefficients for all basis elements E_a.
+    """Return the momenta x̃(G f G*) of a group element G for the frame elements f of the star algebra, up to factors.
 
-    The coefficients of E_a combine the multiples to x̃(G E_a G*).
+    The second result has, for each basis element E_a of the Lie algebra, the coefficients that combine them to x̃(G E_a
+    G*).
     """
     algebra, g = group.algebra, _element_at(points, group, places)
     scaled = _scaled(group, group_values(points.system, group))
@@ -263,10 +275,10 @@ def _at_frame(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> t
 
 
 def _left(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[Expression]:
-    """Return the functional b ↦ x̃(Gb)/q at the basis elements b of the algebra.
+    """Return x̃(Gb)/q for a group element G and the basis elements b of the star algebra.
 
-    If the group has an ideal, the values at the basis elements of the subalgebra are λ(b)/q. The number q is that of
-    `_scaled`.
+    x̃ is the functional of the momenta, and q a number (`_Scaled`). If the group has an ideal, the values at the basis
+    elements of the subalgebra are λ(b)/q, with the functional λ that is an unknown.
     """
     scaled = _scaled(group, group_values(points.system, group))
     left = _functional_times(group.algebra, scaled, _element_at(points, group, places))
@@ -278,7 +290,7 @@ def _left(points: StageMap, group: AlgebraBlock, places: Sequence[int]) -> list[
 
 
 def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Expression]) -> list[Expression]:
-    """Return the functional b ↦ x̃(wb)/q at the basis elements b of the algebra; the number q is that of ``scaled``."""
+    """Return x̃(wb)/q for an element w and the basis elements b of the star algebra; ``scaled`` has x̃/q."""
     left = []
     for k in range(algebra.dimension):
         values = [_combined(algebra, algebra.table.get((i, k), {}), scaled.at_basis) for i in range(algebra.dimension)]
@@ -289,7 +301,10 @@ def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Express
 def _with_star(
     algebra: StarAlgebra, f: Mapping[int, Scalar], left: Sequence[Expression], w: Sequence[Expression]
 ) -> Expression:
-    """Return f̃(w*) = x̃(wfw*)/q for a frame element f; ``left`` has the values x̃(wb)/q at the basis elements b."""
+    """Return x̃(wfw*)/q for an element w and a frame element f of the star algebra.
+
+    ``left`` has the values x̃(wb)/q at the basis elements b, as `_functional_times` returns them.
+    """
     unit = algebra.field.one
     terms = []
     for j in range(algebra.dimension):
@@ -316,7 +331,7 @@ def at_unknowns(points: StageMap) -> dict[str, Expression]:
 def _element(
     algebra: StarAlgebra, elements: Sequence[Mapping[int, object]], factors: Sequence[Expression]
 ) -> list[Expression]:
-    """Return the components of Σ_a factors[a]·elements[a] in the basis of the algebra."""
+    """Return the components of Σ_a factors[a]·elements[a], a combination of elements of the star algebra."""
     return [
         total(_scalar(algebra, e[k]) * r for e, r in zip(elements, factors, strict=False) if k in e)
         for k in range(algebra.dimension)
@@ -377,9 +392,10 @@ def vector_field(
 def _derivatives(
     points: StageMap, group: AlgebraBlock, places: Sequence[int], velocity: Sequence[Expression]
 ) -> list[Expression]:
-    """Return the derivatives of the unknowns of a group if G follows Ġ = Gξ; ``velocity`` has the components of ξ.
+    """Return the derivatives of the unknowns of a group, whose element G follows Ġ = Gξ; ``velocity`` has the
+    components of ξ.
 
-    If the group has an ideal, components of ξ along the ideal are passed with the factor 2.
+    If the group has a square-zero ideal, components of ξ along the ideal must be passed with the factor 2.
     """
     of_element = multiplied(group.algebra, _element_at(points, group, places), velocity)
     if not group.ideal:
@@ -389,9 +405,11 @@ def _derivatives(
 
 
 def functional_offsets(group: AlgebraBlock, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
-    """Return λ − λ_start for the functional λ of the subalgebra at G = 1 + w, where w has components in the ideal too.
+    """Return the offset λ − λ_start of the functional that replaces the components of a group element G in a
+    square-zero ideal.
 
-    ``x`` are the values of the basis elements of the Lie algebra at the start, see `group_values`.
+    ``w`` = G − 1 has all components, also those in the ideal. ``x`` are the values of the basis elements of the Lie
+    algebra at the start, see `group_values`. See `phigen.gauss.square_zero` for λ.
     """
     doubled = [number(2) * v if k in group.ideal else v for k, v in enumerate(w)]
     left = _functional_times(group.algebra, _scaled(group, x), doubled)
@@ -399,8 +417,9 @@ def functional_offsets(group: AlgebraBlock, x: Sequence[Expression], w: Sequence
 
 
 def _pulled_back(group: AlgebraBlock, a: Sequence[Expression], left: Sequence[Expression]) -> list[Expression]:
-    """Return f(ab) for a functional f and the basis elements b of the subalgebra; ``left`` has f at all basis
-    elements.
+    """Return f(ab) for a functional f, an element a, and the basis elements b of the subalgebra outside the ideal.
+
+    ``left`` has the values of f at all basis elements of the star algebra.
     """
     n = range(group.algebra.dimension)
     rows = [[_combined(group.algebra, group.algebra.table.get((i, k), {}), left) for i in n] for k in group.subalgebra]
@@ -410,9 +429,10 @@ def _pulled_back(group: AlgebraBlock, a: Sequence[Expression], left: Sequence[Ex
 def _collected(
     points: StageMap, group: AlgebraBlock, places: Sequence[int], slopes: Sequence[Expression], weight: Expression
 ) -> list[Expression | None]:
-    """Return the components of the velocity −w Σ_a E_a ∂H/∂x_a for w = ``weight``, written with fewer multiplications.
+    """Return the components of the velocity −w Σ_a E_a ∂H/∂x_a of a group element, for w = ``weight``.
 
-    Components that are affine in the momenta are sums over x̃(G f G*) for the frame elements f. All others are None.
+    E_a is the basis of the Lie algebra. Components that are affine in the momenta are written as sums over x̃(G f G*)
+    for the frame elements f, which needs fewer multiplications. All others are None.
     """
     system, algebra = points.system, group.algebra
     names = [system.coordinates[i] for i in group.indices]
@@ -454,9 +474,10 @@ def multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expres
 
 
 def lifted_functionals(points: StageMap) -> list[Expression]:
-    """Return the vectors y with x̃(q) = y·Im q, the components of all copies of the quaternions in one list.
+    """Return, for each copy of the quaternions in a star algebra, the vector y of the momenta: x̃(q) = y·Im q.
 
-    The components of y are in the order of i, j, k. At the start of a step, the frame F satisfies F* k F = y.
+    The components in the order of i, j, k are in one list for all copies. At the start of a step, the frame F satisfies
+    F* k F = y (`phigen.gauss.lift`).
     """
     values: list[Expression] = []
     for group in points.realisation.groups:
@@ -470,8 +491,8 @@ def derivatives_in_next_frame(points: StageMap, slopes: Sequence[Expression]) ->
     """Transform ``slopes``, derivatives of the unknowns, to the frame at the end of the step, where the next step
     starts.
 
-    Derivatives of group elements are multiplied by G* = G⁻¹ from the left. Derivatives of functionals λ are transformed
-    likewise. Those of coordinates, time and logarithms do not change.
+    Derivatives of a group element G are multiplied by G* = G⁻¹ from the left. Derivatives of functionals λ in place of
+    an ideal are transformed likewise. Derivatives of coordinates, time and logarithms do not change.
     """
     values = list(slopes)
     for group, places in zip(points.realisation.groups, points.places, strict=True):
@@ -494,10 +515,11 @@ def _functional_in_next_frame(
     k: Sequence[Expression],
     turned: Sequence[Expression],
 ) -> list[Expression]:
-    """Transform derivatives ``k`` of the functional λ to the frame at the end of a step: k(bg*) − λ(sg*) for all b.
+    """Transform derivatives ``k`` of the functional λ (`phigen.gauss.square_zero`) to the frame at the end of a step.
 
-    ``turned`` is the derivative ġ in that frame, and s is the symmetric part of ġb. The second term follows from nb +
-    gn* = 0 at the end of a step, where G = g + n.
+    The result is k(bg*) − λ(sg*) for all basis elements b of the subalgebra. ``turned`` is the derivative ġ in the new
+    frame, and s is the symmetric part of ġb. The second term follows from nb + gn* = 0 at the end of a step, where G =
+    g + n.
     """
     algebra, half = group.algebra, group.algebra.field.one / group.algebra.field.number(2)
     left = _left(points, group, places)

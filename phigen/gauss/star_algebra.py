@@ -59,7 +59,9 @@ class StarAlgebra:
         return difference(self.product(a, b), self.product(b, a), self.field.one)
 
     def value(self, a: Mapping[int, Scalar]) -> Vector:
-        """Return x̃(a) as a linear form in x: the coefficient of each x_k, by the index k."""
+        """Return x̃(a), the value of the functional x̃ of a point x, as a linear form in x: coefficients by the index
+        of x_k.
+        """
         return combined(self.functional, a)
 
     @cached_property
@@ -99,7 +101,7 @@ class StarAlgebra:
         yield "skew elements on which all functionals x̃ vanish form an ideal", self._commutators_of_skew()
 
     def _associators(self) -> Iterator[Vector]:
-        """Yield (ab)c − a(bc) for basis elements a, b, c.
+        """Yield the residuals (ab)c − a(bc) of the associative law, for basis elements a, b, c.
 
         For rational coefficients, the residuals of all b and c are yielded together, in one vector for each a.
         """
@@ -139,9 +141,10 @@ class StarAlgebra:
             yield difference(self.starred(f), f, -self.field.one)
 
     def _commutators_of_skew(self) -> Iterator[Vector]:
-        """Yield x̃([u, n]) for all skew u, and for all skew n that every functional x̃ maps to 0.
+        """Yield residuals that are 0 if the skew elements which every functional x̃ maps to 0 form an ideal of the skew
+        elements.
 
-        If these residuals are 0, the elements n form an ideal of the skew elements.
+        They are x̃([u, n]) for all skew u and for all these elements n.
         """
         rows: list[Vector] = [{} for _ in self.basis]
         for i, u in enumerate(self.skew):
@@ -169,7 +172,7 @@ def difference(a: Mapping[int, Scalar], b: Mapping[int, Scalar], factor: Scalar)
 
 
 def in_basis(algebra: StarAlgebra, vectors: Sequence[Vector]) -> StarAlgebra:
-    """Return the same algebra in the basis ``vectors``, which are given in the present basis."""
+    """Return the same algebra in the basis ``vectors``, which are given by their components in the present basis."""
     span = Span(algebra.field, vectors)
 
     def converted(a: Mapping[int, Scalar]) -> Vector:

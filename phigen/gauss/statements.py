@@ -76,7 +76,7 @@ def _symplectic(tableau: Tableau) -> Statement:
 
 
 def _order(tableau: Tableau) -> Statement:
-    """Decide the order conditions B(2s) and C(s), from which the order 2s follows."""
+    """Decide the order conditions B(2s) and C(s) of Butcher for a method of s stages. They imply the order 2s."""
     s = tableau.stages
     c, b = (list(map(Fraction, values)) for values in (tableau.nodes, tableau.weights))
     residuals = [abs(sum(w * x**k for w, x in zip(b, c, strict=True)) - Fraction(1, k + 1)) for k in range(2 * s)]
@@ -93,9 +93,7 @@ def _order(tableau: Tableau) -> Statement:
 
 
 def _brackets(system: System, realisation: Realisation) -> Statement:
-    """Decide whether the brackets of π are those that the realisation assumes: brackets of Lie algebras, and
-    constants.
-    """
+    """Decide whether π has the brackets that the realisation assumes: those of Lie algebras, and constant brackets."""
     n = system.dimension
     expected: dict[tuple[int, int], Expression] = {}
     group_of = {i: group for group in realisation.groups for i in group.indices}
@@ -130,7 +128,7 @@ def _lie_poisson(system: System, group: AlgebraBlock) -> dict[tuple[int, int], E
 
 
 def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
-    """Decide whether the coordinates of a Lie algebra part are a quadratic momentum map on its star algebra."""
+    """Decide whether the coordinates of a Lie algebra are a quadratic momentum map on its star algebra."""
     coordinate_names = ", ".join(system.coordinates[i] for i in group.indices)
     algebra = group.algebra
     name = (
@@ -152,9 +150,10 @@ def _momentum_map(system: System, group: AlgebraBlock) -> Statement:
 
 
 def _functionals(system: System, points: StageMap) -> Statement:
-    """Decide whether a step with functionals λ as unknowns is the step of group elements: equal changes and velocities.
+    """Decide whether functionals λ as unknowns, in place of some components of group elements, give the same step.
 
-    Symbols stand for ∇H, so that the statement holds for any H.
+    The changes of coordinates and the velocities must be equal. Symbols stand for ∇H, so that the statement holds for
+    any H.
     """
     complete = stage_map(points.system, points.realisation.with_elements, points.pace)
     values = _unknowns_by_elements(points, complete)
@@ -165,7 +164,8 @@ def _functionals(system: System, points: StageMap) -> Statement:
 def _frames(system: System, points: StageMap, lifted: StageMap) -> Statement:
     """Decide whether the step with the unknowns U − F, where U = FG, is the step with the unknowns G − 1.
 
-    F is the frame at the start of the step; x̃(q) = k̃(FqF*) holds there (see `phigen.gauss.lift`).
+    G is a group element, and F its frame at the start of the step, where x̃(q) = k̃(FqF*) holds (see
+    `phigen.gauss.lift`).
     """
     others = points.unknowns[: len(points.unknowns) - len(lifted.frames)]
     values = {name: symbol(name) for name in others}
@@ -208,7 +208,7 @@ def _differences(
 def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Expression]:
     """Return the unknowns of ``points`` by name, as functions of the unknowns of ``complete``.
 
-    All unknowns of the groups of ``complete`` are components of group elements; ``points`` has functionals as well.
+    In ``complete``, all components of group elements are unknowns; in ``points``, functionals take the place of some.
     """
     first, size = len(points.moved) + len(points.system.times), len(points.scaled)
     common = [*range(first), *range(points.plain, points.plain + size)]

@@ -21,19 +21,19 @@ DIGITS = 60
 #: Largest number of stages; a method of s stages has order 2s.
 MOST_STAGES = 8
 
-#: Band of the predictor, an angular frequency in units of 1/h, for each stage of the method. The predictor of the next
-#: step is optimal for motions with frequencies up to the band. Methods with more stages are used with longer steps, so
-#: their band is wider.
+#: Band of the predictor of a Gauss step, an angular frequency in units of 1/h, for each stage of the method. The
+#: predictor of the next step is optimal for motions with frequencies up to the band. Methods with more stages are used
+#: with longer steps, so their band is wider.
 BAND = Fraction(1, 4)
 
 
-#: Largest number of previous steps that the predictors of C with vectorised stages read.
+#: Largest number of previous steps that predictors read in C code with the stages of a step in SIMD lanes.
 EARLIER = 2
 
-#: Bands of several predictors, as `BAND`, each with the number of previous steps that the predictor reads. C with
-#: vectorised stages uses the predictor that was best in recent steps. For the Kowalevski top with steps of 0.1, 0.25,
-#: 0.5 and 1, the errors of its predicted derivatives are 3e-10, 4e-8, 8e-5 and 0.1. With `BAND` alone they are 3e-5,
-#: 6e-5, 3e-4 and 0.2.
+#: Bands of several predictors, as `BAND`, each with the number of previous steps that the predictor reads. C code with
+#: the stages of a step in SIMD lanes uses the predictor that was best in recent steps. For the Kowalevski top with
+#: steps of 0.1, 0.25, 0.5 and 1, the errors of its predicted derivatives are 3e-10, 4e-8, 8e-5 and 0.1. With `BAND`
+#: alone they are 3e-5, 6e-5, 3e-4 and 0.2.
 BANDS = ((Fraction(3, 32), EARLIER), (Fraction(3, 16), EARLIER), (Fraction(3, 8), 1))
 
 
@@ -80,14 +80,16 @@ class Tableau:
 
     @property
     def defects(self) -> list[Fraction]:
-        """The values μ_ij + μ_ji − 1 for j ≤ i in exact arithmetic, which are all 0."""
+        """The values μ_ij + μ_ji − 1 for j ≤ i in exact arithmetic. They are all 0, so that the method is
+        symplectic.
+        """
         mu = [[Fraction(v) for v in row] for row in self.mixing]
         return [mu[i][j] + mu[j][i] - 1 for i in range(self.stages) for j in range(i + 1)]
 
 
 @cache
 def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
-    """Return the coefficients of the method with a number of stages, rounded for a floating-point format."""
+    """Return the coefficients of the Gauss method with ``stages`` stages, rounded for a floating-point format."""
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
     times = [_nearest(c, precision.spacing / 2) for c in nodes]
@@ -121,8 +123,9 @@ def continuation(stages: int) -> list[list[float]]:
 def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool = False) -> list[list[list[float]]]:
     """Return the matrix of each predictor in `BANDS`, in the form of ``prediction`` of `Tableau`.
 
-    The first columns belong to the L_j of the last step, and further columns to the step before, if the predictor reads
-    it. With ``integrated``, the matrices predict the integrals of the offsets that ``doubled`` of `Tableau` defines.
+    The first columns are for the stage increments L_j of the last step. Further columns are for the step before, if the
+    predictor reads it. With ``integrated``, the matrices predict the integrals of the offsets that ``doubled`` of
+    `Tableau` defines.
     """
     nodes = gauss_nodes(stages)
     weights, exact = _exact(stages)
@@ -133,9 +136,10 @@ def predictors(stages: int, precision: Precision = DOUBLE, *, integrated: bool =
 def _integrated(
     weights: Sequence[Fraction], mixing: Sequence[Sequence[Fraction]], values: Sequence[Sequence[Fraction]]
 ) -> list[list[Fraction]]:
-    """Return μ diag(b) V: integrals of functions from the start of a step to each stage, in units of the step.
+    """Return the integrals of functions from the start of a step to each stage, in units of the step.
 
-    Column k of V = ``values`` has function k at the stages.
+    Column k of ``values`` has function k at the stages. The integrals are μ diag(b) V with V = ``values``, the
+    ``weights`` b and the matrix ``mixing`` μ of the Gauss method.
     """
     columns = list(zip(*values, strict=True))
     return [[sum((m * w * v for m, w, v in zip(row, weights, column, strict=True)), Fraction(0)) for column in columns]
@@ -148,7 +152,7 @@ def _floats(rows: Sequence[Sequence[Fraction]]) -> list[list[float]]:
 
 @cache
 def _exact(stages: int) -> tuple[list[Fraction], list[list[Fraction]]]:
-    """Return the exact weights b_j and the exact matrix μ."""
+    """Return the weights b_j and the matrix μ_ij = a_ij/b_j of the Gauss method in exact arithmetic."""
     nodes = gauss_nodes(stages)
     basis = _lagrange(nodes)
     weights = [_integral(p, Fraction(1)) for p in basis]
@@ -200,7 +204,7 @@ def _integral(p: Sequence[Fraction], end: Fraction) -> Fraction:
 
 
 def _rounded(exact: Sequence[Sequence[Fraction]], spacing: Fraction) -> list[list[float]]:
-    """Return the matrix μ rounded to multiples of the spacing, with μ_ij + μ_ji = 1 exactly."""
+    """Return the matrix μ of a Gauss method, rounded to multiples of ``spacing`` such that μ_ij + μ_ji = 1 exactly."""
     n = len(exact)
     mu = [[Fraction(1, 2)] * n for _ in range(n)]
     for i in range(n):
@@ -215,9 +219,9 @@ def _nearest(value: Fraction, spacing: Fraction) -> Fraction:
 
 
 def _skew_by(times: Sequence[Fraction], exact: Sequence[Sequence[Fraction]], spacing: Fraction) -> list[list[Fraction]]:
-    """Return the matrix ν = μ diag(b) μ rounded to multiples of the spacing, such that ν_ij − ν_ji = τ_i − τ_j exactly.
+    """Return the matrix ν = μ diag(b) μ of a Gauss method, rounded such that ν_ij − ν_ji = τ_i − τ_j exactly.
 
-    ``exact`` is ν before rounding, and ``times`` are the rounded nodes τ_i.
+    ``exact`` is ν before rounding, ``times`` are the rounded nodes τ_i, and the entries are multiples of ``spacing``.
     """
     nu = [[_nearest(v, spacing) for v in row] for row in exact]
     for i in range(len(nu)):
@@ -233,10 +237,10 @@ def _prediction(
     band: tuple[Fraction, int],
     noise: Fraction,
 ) -> list[list[Fraction]]:
-    """Return a predictor: μ diag(b) W diag(1/b), where W extrapolates f from the stages of previous steps to the next
-    step.
+    """Return the matrix of a predictor for the stages of a Gauss step, from the stage increments of previous steps.
 
-    ``band`` is an entry of `BANDS`, and ``noise`` is the relative error of the known values of f.
+    It is μ diag(b) W diag(1/b) with the coefficients of the method, where W extrapolates derivatives from the previous
+    steps to the next step. ``band`` is an entry of `BANDS`, and ``noise`` is the relative error of known derivatives.
     """
     n, (width, step_count) = len(nodes), band
     known_times = [c - steps_back for steps_back in range(1, step_count + 1) for c in nodes]

@@ -1,1 +1,3 @@
-"""Systems of many identical sites, described by one cell: fields, brackets, energies and the generated step."""
+"""Lattices: systems of many identical sites. One site describes a lattice of any size: fields, brackets, energies,
+step.
+"""

@@ -12,14 +12,12 @@ from phigen.lattice.cell import GRID, Cell
 from phigen.symbolic.expression import ONE, Expression, fold, gradient, mul, power, product, rebuild, symbol
 from phigen.symbolic.neighbours import ENDS
 
-#: Expression as two factors: one without powers of some symbols, and the exponents of these powers.
+#: Expression as a pair: a factor without powers of some symbols, and the exponents of these powers.
 Factored = tuple[Expression, Mapping[str, int]]
 
 
 def cancelled(values: Sequence[Expression], names: Iterable[str]) -> list[Expression]:
-    """Return equal expressions in which the powers of each symbol of ``names`` in a product are combined, as in m·m⁻¹ =
-    1.
-    """
+    """Return the expressions with the powers of each symbol of ``names`` in a product combined, as in m·m⁻¹ = 1."""
     return [_multiplied(f) for f in _factored(values, names)]
 
 

@@ -1,4 +1,4 @@
-"""One cell of a lattice: the fields of a site, their brackets with neighbours, and the density of H.
+"""One cell of a lattice, the description of one site: fields, brackets with neighbours, and the energy density.
 
 Values at neighbours are ordinary symbols of expressions. On a grid, ``x[i-1,j+2]`` is x at the site with the offset −1
 along the axis i and 2 along the axis j. Axes come in their order, and axes with the offset 0 are left out: ``x[i+1]``
@@ -100,7 +100,8 @@ class Cell:
         return self.neighbours.at(name, offset)
 
     def place(self, name: str) -> Place:
-        """Return the field, or parameter at sites, that a symbol stands for, and the offset of its site.
+        """Return the name of the field, or of the parameter at sites, that a symbol stands for, and the offset of its
+        site.
 
         Raises `KeyError` for symbols of any other kind.
         """
@@ -129,9 +130,8 @@ class Cell:
         return tuple(self.additive_terms(self.hamiltonian))
 
     def additive_terms(self, density: Expression) -> Iterator[Expression]:
-        """Yield the additive terms of a density.
-
-        Factors of a bracketed sum that do not depend on the site are multiplied into its terms.
+        """Yield the additive terms of a density. A product such as c·(a + b) has two terms if c does not depend on the
+        site.
         """
         yield from self._terms(density, ())
 
@@ -160,7 +160,7 @@ class Cell:
 
     @cached_property
     def poisson_reach(self) -> tuple[int, ...]:
-        """The largest offset along each axis that occurs in a bracket {f, g}: that of g, or of a symbol in its
+        """The largest offset along each axis between sites in a bracket {f, g}: of f, of g, or of a symbol in its
         value.
         """
         second_fields = [symbol(other) for _, other in self.bracket]

@@ -15,7 +15,7 @@ from phigen.symbolic.neighbours import Neighbours, minus
 
 @dataclass(frozen=True)
 class Misfit:
-    """A size in a run that is not a multiple of the period of the colouring along its axis.
+    """A size in a run that is not a multiple of the period with which the colours of sites repeat along its axis.
 
     ``fitting`` is a multiple of the period near ``size``.
     """
@@ -31,8 +31,9 @@ class Misfit:
 
 
 class MisfitError(SpecError):
-    """Error for runs with sizes that are not multiples of the periods of the colouring; ``reason`` states it in one
-    line.
+    """Error for runs with sizes that are not multiples of the periods with which the colours of sites repeat.
+
+    ``reason`` states it in one line.
     """
 
     def __init__(self, diagnostics: list[Diagnostic], reason: str = "") -> None:
@@ -41,7 +42,7 @@ class MisfitError(SpecError):
 
 
 def cell_from_spec(spec: Spec) -> Cell:
-    """Return the cell of a spec.
+    """Return the cell of a lattice spec: the fields, brackets and energy densities of one site.
 
     Raises `SpecError` if the lattice does not allow the form of π, forces or noise of the spec, or if a run has fewer
     sites along an axis than a term spans.
@@ -90,13 +91,15 @@ def least_sizes(cell: Cell) -> tuple[int, ...]:
 
 
 def expect_coloured(spec: Spec, cell: Cell, periods: Sequence[int]) -> None:
-    """Raise `MisfitError` for runs whose sizes are not multiples of the ``periods`` of the colouring of a splitting."""
+    """Raise `MisfitError` for runs whose sizes are not multiples of ``periods``, with which the colours of sites
+    repeat.
+    """
     if wrong_sizes := misfits(spec, cell, periods):
         raise MisfitError(misfit_diagnostics(spec, wrong_sizes))
 
 
 def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
-    """Return the sizes of all runs that are not multiples of the ``periods`` of a colouring along the axes."""
+    """Return the sizes of all runs that are not multiples of ``periods``, with which the colours of sites repeat."""
     return [
         Misfit(run.name, axis, size, period, max(size // period, -(-least // period)) * period)
         for run in spec.runs.values()
@@ -120,9 +123,10 @@ def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagno
 
 
 def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
-    """Return one line that names all sizes which are not multiples of the periods, for the header of generated files.
+    """Return one line that names all sizes which do not fit the colours of sites, for the header of generated files.
 
-    It says that a splitting with this number of ``colours`` needs multiples. It is "" if there is no wrong size.
+    It says that a splitting with this number of ``colours`` needs multiples of the periods of the colours. It is "" if
+    there is no wrong size.
     """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     requirement = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"
@@ -130,9 +134,9 @@ def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
 
 
 def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
-    """Return one line that names all sizes which are not multiples of the periods, if a boundary seam allows them.
+    """Return one line that names all sizes which are allowed by a boundary seam only, and sizes that need no seam.
 
-    It says which sizes need no seam.
+    A seam is needed if a size is not a multiple of the period with which the colours of sites repeat.
     """
     distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would do without"
@@ -145,7 +149,7 @@ def _local(spec: Spec) -> dict[tuple[str, str], Expression]:
 
 
 def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression]:
-    """Return the brackets between different sites that a spec states in one order, completed to both orders."""
+    """Return the brackets between different sites in both orders; a spec states each of them in one order only."""
     at_sites = (p.name for p in spec.parameters if p.at == "sites")
     neighbours = Neighbours((*spec.coordinates, *at_sites), lattice.axes)
     brackets: dict[tuple[str, str], Expression] = {}

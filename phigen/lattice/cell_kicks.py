@@ -35,7 +35,10 @@ def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
 
 
 def _graded(cell: Cell, v: CellFlow, t: CellFlow) -> bool:
-    """Whether {V, {V, {V, T}}} = 0 follows from the polynomial degrees of T and of the brackets."""
+    """Whether {V, {V, {V, T}}} = 0 follows from the polynomial degrees of T and of the brackets.
+
+    V and T are the parts of H with the flows ``v`` and ``t``.
+    """
     potential_fields = {f for s, _ in v.summands for f in _fields(cell, s.expression)}
     while True:
         entries = [e for (f, _), e in cell.bracket.items() if f in potential_fields]
@@ -65,7 +68,10 @@ def _degree(cell: Cell, e: Expression, fields: set[str]) -> float:
 
 
 def _modified(cell: Cell, splitting: CellSplitting, v: CellFlow, t: CellFlow) -> CellFlow | None:
-    """Return the flow of V + κ{V, {V, T}}, or None if the bracket is 0 or too long."""
+    """Return the flow of V + κ{V, {V, T}}, the modified potential of a Nyström method, for parts V and T of H.
+
+    Returns None if the bracket is 0, or if it has too many terms.
+    """
     potential, kinetic = ([s for s, _ in flow.summands] for flow in (v, t))
     twice = list(_bracket(cell, potential, list(_bracket(cell, potential, kinetic))))
     if not twice or len(twice) > MOST_MONOMIALS:
@@ -89,9 +95,7 @@ def _bracket(cell: Cell, left: Sequence[Summand], right: Sequence[Summand]) -> I
 
 
 def _slopes(cell: Cell, summands: Sequence[Summand], field: str) -> Iterator[Summand]:
-    """Yield the derivatives of a sum over sites with respect to a field at one site, one for each term and each symbol
-    of the field.
-    """
+    """Yield the terms of the derivative of a sum over sites with respect to a field at one site."""
     for s in summands:
         places = {n: o for n, (f, o) in cell.places(s.expression).items() if f == field}
         for slope, offset in zip(gradient(s.expression, list(places)), places.values(), strict=True):

@@ -54,7 +54,7 @@ def expect_applicable(cell: Cell, spec: Spec) -> None:
 
 
 def negative_part(cell: Cell, flows: Sequence[CellFlow], spec: Spec) -> int:
-    """Return the index of the part B, which must be negative.
+    """Return the index of the negative part B of H = A + B, which the monitor log(A + e) − log(−B) needs.
 
     The sign is decided for all states or, if that fails, at the initial states of all runs. Raises `SpecError` unless
     there are two parts, one of them negative.
@@ -84,7 +84,7 @@ def _positive(cell: Cell, e: Expression) -> set[str]:
 
 
 def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
-    """Return the energy of the part of a ``flow`` at the initial state of a run."""
+    """Return the energy of one part of H, that with the given ``flow``, at the initial state of a run."""
     import numpy as np  # numpy is imported here: its import takes as long as the compilation of a small system
 
     from phigen.lattice.states import start_of
@@ -107,7 +107,7 @@ def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
 def rates_of(
     cell: Cell, flows: Sequence[CellFlow], negative: int, *, tangent: bool
 ) -> tuple[PartRates, list[tuple[str, BondSum]]]:
-    """Return the kernels of the energies of A and B, and the sums over pairs that these kernels read.
+    """Return the kernels of the energies of the parts of H = A + B, and the sums over pairs that these kernels read.
 
     Each sum comes with the name of its kernel. With ``tangent``, kernels and sums for the variations of the energies
     are added.
@@ -134,9 +134,10 @@ def fact(flows: Sequence[CellFlow], negative: int) -> str:
 
 
 def delayed(increments: Sequence[Expression], slopes: Sequence[Expression]) -> list[Expression]:
-    """Return the variations of the increments of a flow whose duration varies by `LATE`.
+    """Return the variations of the increments of a flow along a tangent vector, if the duration of the flow varies too.
 
-    ``slopes`` are the variations of the increments at a fixed duration.
+    ``slopes`` are the variations of the increments at a fixed duration; the symbol `LATE` is the variation of the
+    duration.
     """
     rates = (gradient(e, [TIME])[0] for e in increments)
     return [slope + rate * symbol(LATE) for slope, rate in zip(slopes, rates, strict=True)]

@@ -41,7 +41,7 @@ KIND = "constant in logarithms"
 
 @dataclass(frozen=True)
 class CellRealisation:
-    """Symmetric and exact bi-realisation of a lattice: α and β at a site.
+    """Symmetric and exact bi-realisation (α, β) of the brackets of a lattice, at one site.
 
     ``displacement`` is α − x and ``increment`` is β − α, by field. They are expressions in the fields around the site,
     and in the symbols `momentum` of covectors. If brackets are between fields of one site only, ``site`` has the system
@@ -57,7 +57,8 @@ class CellRealisation:
 
     @cached_property
     def middle(self) -> dict[str, Expression]:
-        """The solution y of α(y, p) = x at a site, by field, with the symbols `initial` for x at this site.
+        """The solution y of the implicit equation α(y, p) = x at a site, by field, with the symbols `initial` for x at
+        this site.
 
         The formula is explicit if α is affine in y. Otherwise y also occurs on its right-hand side.
         """
@@ -82,7 +83,7 @@ def realise_cell(cell: Cell, form: PoissonForm | None, choice: BirealisationChoi
 
 def _of_site(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) -> CellRealisation:
     rows = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in cell.fields) for f in cell.fields)
-    energy = total(symbol(f) for f in cell.fields)  # α and β do not depend on H
+    energy = total(symbol(f) for f in cell.fields)  # any H will do, since the bi-realisation does not depend on it
     system = build_system(cell.name, cell.fields, cell.parameters, form or MatrixForm(rows), energy)
     realisation = realise(system, choice)
     if realisation.path or not realisation.exact:

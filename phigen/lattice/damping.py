@@ -37,7 +37,7 @@ _HINT = (
 
 
 def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """Return the flows of damping for sites that are coloured by ``colouring``.
+    """Return the flows of damping, ẋ = λππ∇H, for sites that are coloured by ``colouring``.
 
     Raises `SpecError` with the reason if there is no flow in closed form. If another colouring might have a flow, the
     error is a `TogetherError`.
@@ -133,7 +133,10 @@ def _flow(
     sums: tuple[BondSum, ...] = (),
     weight: Expression = ONE,
 ) -> CellFlow:
-    """Return the flow of ẋ = w λππb at the sites of ``colours``, with b = ``covector`` and w = ``weight``."""
+    """Return the flow of damping ẋ = w λππb at the sites of ``colours``, with the damping coefficient λ.
+
+    ``covector`` is b, the part of ∇H that is treated, and ``weight`` is w. ``sums`` are the sums over bonds in b.
+    """
     site_fields, n = SiteFields(cell), cell.fields
     fields_in_covector = {f for f, e in covector.items() if set(symbols_of(e)) & set(n)}
     b = {f: e if fields_in_covector or e.is_zero else symbol(Symbol(FORCE, f)) for f, e in covector.items()}

@@ -84,9 +84,9 @@ def shifted(array: Floats, offset: Offset) -> Floats:
 
 
 def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: Sequence[int]) -> NDArray[np.bool_]:
-    """Return a mask (*sizes): true where a term fits between open ends if it is placed at the site.
+    """Return a mask (*sizes) of the sites at which a term of a density fits between open ends.
 
-    ``extent`` has the smallest and the largest offset of the term along each axis.
+    ``extent`` has the smallest and the largest offset of the sites that the term reads, along each axis.
     """
     mask = np.ones(tuple(sizes), dtype=bool)
     if cell.relation != GRID:
@@ -112,7 +112,9 @@ def integral(values: Floats, h: float, row_positions: Floats | None = None) -> t
 
 
 def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | None) -> Floats:
-    """Return the integrals that `integral` returns, by polynomials through ``count`` neighbouring values."""
+    """Return the integrals of the power that `integral` returns, by polynomials through ``count`` neighbouring
+    values.
+    """
     intervals = len(values) - 1
     integrals = np.append(
         0.0, h * np.cumsum(_interval_integrals(values, count, np.arange(intervals), np.ones(intervals)))
@@ -125,7 +127,7 @@ def _integrals_to(values: Floats, count: int, h: float, row_positions: Floats | 
 
 
 def _interval_integrals(values: Floats, count: int, stencil_starts: NDArray[np.int64], lengths: Floats) -> Floats:
-    """Return the integral over each interval, by the polynomial through the ``count`` values around the interval.
+    """Return the integral of ``values`` over each interval, by the polynomial through the ``count`` values around it.
 
     ``stencil_starts`` are the indices of the values at which intervals begin. ``lengths`` of intervals are in units of
     the distance between two values.

@@ -80,7 +80,7 @@ class Expansion:
         return substitute([expression], values)[0]
 
     def summed(self, density: Expression) -> list[Expression]:
-        """Return the terms of Σ density over all sites. Terms that reach beyond open ends are left out."""
+        """Return the terms of the sum of a density over all sites. Terms that reach beyond open ends are left out."""
         terms = [term for site in self.sites for t in self.cell.additive_terms(density) for term in [self.at(t, site)]]
         return [t for t in terms if t is not None]
 

@@ -42,7 +42,7 @@ Rates = Mapping[str, Expression]
 
 
 def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """Return the flows of the forces; () if the lattice has no forces.
+    """Return the flows of the forces πζ + f, with the covector force ζ and the vector force f; () without forces.
 
     Raises `SpecError` if a summand of πζ + f has no flow in closed form; the error names the summand.
     """
@@ -99,7 +99,7 @@ def _summand_flows(
 
 
 def _tangent_of_covector(cell: Cell, site_fields: SiteFields, field: str) -> dict[str, Expression]:
-    """Return πζ by field, for the part of the covector force ζ that has only the component ``field``."""
+    """Return πζ by field, where ζ is the covector force with all components but ``field`` set to 0."""
     return {f: site_fields.tangent(f, lambda g, d: site_fields.push(g, d) if g == field else ZERO) for f in cell.fields}
 
 
@@ -193,8 +193,9 @@ def force_statements(cell: Cell) -> Iterator[Statement]:
 def noise_statements(cell: Cell) -> Iterator[Statement]:
     """Yield statements on noise: whether the sources commute, and which density is stationary.
 
-    If the noise and the brackets at a site read no neighbours, the statements are decided at one site, with symbols for
-    the gradient of H. Otherwise they are decided on a small periodic box or a small graph.
+    If noise, damping and brackets at a site read no neighbours, and there are no forces except damping, the statements
+    are decided at one site, with symbols for the gradient of H. Otherwise they are decided on a small periodic box or a
+    small graph.
     """
     if not cell.noise:
         return

@@ -35,8 +35,7 @@ from phigen.symbolic.neighbours import ENDS, Offset
 from phigen.symbolic.symbols import CHOSEN, GATHERED, Symbol, kind_of
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Sites at which a part has a coordinate: all sites; the sites of the colour of the part; the sites of all other
-#: colours.
+#: Sites at which the terms of a part read a field: all sites; the sites of the colour of the part; all other sites.
 ANYWHERE, INSIDE, OUTSIDE = 0, 1, 2
 #: Classes of terms in a part: at all sites and bonds; at bonds that begin at sites of one colour; at bonds that end
 #: there.
@@ -76,8 +75,10 @@ class GraphSearch(PartSearch):
         return []
 
     def _end_of(self, term: Summand) -> int:
-        """Return the class of the energy of a bond, `BEGINS` or `ENDS_THERE`. Mirror images of a term get different
-        classes.
+        """Return the class of a term of a bond: whether it is summed over bonds that begin, or end, at the colour of
+        the part.
+
+        If two terms are mirror images under the exchange of the ends, they get different classes.
         """
         places = self.cell.places(term.expression).values()
         fields_at = {end: sorted(f for f, o in places if o == (end,) and f in self.cell.fields) for end in ENDS}
@@ -127,7 +128,7 @@ class GraphSearch(PartSearch):
 
 @dataclass
 class _SiteEquation:
-    """The equation of motion of a site in a part: ẋ = ``rates``.
+    """The equation of motion ẋ = ``rates`` of a site under the flow of a part of H.
 
     ``rates`` has symbols that stand for the expressions in ``forces``. These depend on the sums over bonds in
     ``gathered``.
@@ -281,7 +282,7 @@ def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expressio
 
 
 def _moving_forces(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
-    """Return the forces of `_forces_at`, without those that have no effect in the vector field."""
+    """Return the forces of a bond on a site that occur in the vector field; see `_forces_at`."""
     read_symbols = symbols_of(*field_at_site(cell, {f: symbol(_gathered(f)) for f in cell.fields}))
     return {name: e for name, e in _forces_at(cell, density, end).items() if name in read_symbols}
 

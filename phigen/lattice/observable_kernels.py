@@ -67,8 +67,8 @@ def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
 def _density(cell: Cell, name: str, *, single: bool) -> Expression:
     """Return the density of the observable ``name`` at a site, with symbols for sums and extremes over bonds and pairs.
 
-    If a maximum or minimum is taken, and the density reaches beyond an open end, its value is ∓ the largest number,
-    which is never selected.
+    Where the density reaches beyond an open end, a maximum or minimum must not select its value. There, the value is
+    minus or plus the largest number.
     """
     reduction = cell.reductions[name]
     if reduction.over != "sites":

@@ -12,7 +12,8 @@ from phigen.symbolic.arrays import Floats
 #: Largest number of sites that are placed. Time and memory grow with the square of this number, and 600 sites take some
 #: seconds.
 MOST_PLACED = 600
-#: Iterations of the majorisation; each decreases the stress.
+#: Number of iterations of stress majorisation. Each iteration decreases the deviation of distances from numbers of
+#: bonds.
 ROUNDS = 60
 
 

@@ -117,14 +117,16 @@ def euler(cell: Cell, density: Expression) -> dict[str, Expression]:
 
 
 def rate_of(cell: Cell, density: Expression) -> Expression:
-    """Return a density whose sum over sites is the time derivative of Σ ``density``."""
+    """Return a density whose sum over sites is the time derivative of the sum of ``density`` over sites."""
     slopes, rates = euler(cell, density), vector_field(cell)
     along_motion = total(slopes[f] * rates[f] for f in cell.fields if not (slopes[f].is_zero or rates[f].is_zero))
     return along_motion + total(gradient(density, cell.times))
 
 
 def _uniform(cell: Cell, density: Expression) -> Expression:
-    """Return a density at a state that is equal at all sites: symbols of neighbours become those of the site itself."""
+    """Return the value of a density at states that are equal at all sites: symbols of neighbours become those of the
+    site.
+    """
     same_symbols = {name: symbol(base) for name, (base, _) in cell.places(density).items()}
     return substitute([density], same_symbols)[0]
 
@@ -164,7 +166,7 @@ def _jacobi(cell: Cell) -> Iterator[Labelled]:
     """Yield the residuals of the Jacobi identity for triples of coordinates, one residual for each triple up to
     translation.
 
-    The sum runs over all ordered pairs of coordinates, so each residual is twice the cyclic sum.
+    The terms of a residual are collected from all ordered pairs of coordinates, so it is twice the cyclic sum.
     """
     partners, sums = _partners(cell), dict[tuple[Point, ...], list[Expression]]()
     for f, bracket_partners in partners.items():
@@ -242,8 +244,9 @@ def _closed(cell: Cell) -> bool:
 
 
 def _box(cell: Cell) -> tuple[int, ...]:
-    """Return sizes of a box in which no term of H, a Casimir or an invariant, nor its bracket, reaches both ends of an
-    axis.
+    """Return sizes of a box that is so large that no term reaches both ends of an axis.
+
+    The terms are those of H, Casimirs and invariants, and of their brackets.
     """
     densities = [*cell.terms, *(d for d, _ in cell.casimirs.values()), *cell.invariants.values()]
     extents = [cell.extent(t) for d in densities for t in cell.additive_terms(d)]

@@ -74,14 +74,15 @@ class LatticeBodies:
 
     @cached_property
     def kepler(self) -> KeplerMotion:
-        """The Kepler motion of one body, which is the flow of A at a site."""
+        """The Kepler motion of one body: the flow of the part A of H = A + B, at a site."""
         q, v = (tuple(symbol(n) for n in of) for of in zip(*self.axes, strict=True))
         return KeplerMotion(q, v, ONE, self.gravity * symbol(INNER_MASS))
 
     @property
     def shifts(self) -> tuple[Symbol, ...]:
-        """The symbols of the velocity Σ m_j V_j/m_0 with which B moves positions, one for each axis; () in Jacobi
-        coordinates.
+        """The symbols of Σ m_j V_j/m_0, a velocity with which one part of H moves all positions, for each axis.
+
+        () in Jacobi coordinates. m_j are masses, and V_j relative velocities.
         """
         return () if self.jacobi else tuple(Symbol(GATHERED, "shift", q) for q, _ in self.axes)
 
@@ -94,11 +95,11 @@ class LatticeBodies:
         return BondSum({n: divided(e, inertia) for n, e in zip(names, slopes, strict=True)})
 
     def flows(self) -> CellSplitting:
-        """Return the flows of A and B, in this order."""
+        """Return the flows of the parts of H in relative coordinates: Kepler motions, then the remainder."""
         return CellSplitting((self._motions(), self._remainder()), Colouring(1, (0,) * len(self.cell.axes)))
 
     def sites(self, flows: Sequence[CellFlow]) -> RelativeSites:
-        """Return the data of the bodies that runtimes need; ``flows`` are the flows of A and B in the order of a
+        """Return the data of the bodies that runtimes need; ``flows`` are the flows of the parts of H in the order of a
         step.
         """
         fields = self.cell.fields
@@ -115,8 +116,9 @@ class LatticeBodies:
         return CellFlow(motion.hamiltonian, tuple(increments.values()), motion.manner, (moved,), (), motion=motion)
 
     def _remainder(self) -> CellFlow:
-        """Return the flow of B. The attribute ``hamiltonian`` of the flow holds the terms of B that belong to a pair of
-        bodies.
+        """Return the flow of the part of H that remains without the Kepler motions.
+
+        The attribute ``hamiltonian`` of the flow holds the terms that belong to a pair of bodies.
         """
         pulls, time = self.pulls, symbol(TIME)
         q = [symbol(name) for name, _ in self.axes]
@@ -154,9 +156,9 @@ def lattice_bodies(cell: Cell, spec: Spec) -> LatticeBodies:
 
 
 def of_bodies(parts: tuple[tuple[Sweep, ...], ...], bodies: LatticeBodies) -> tuple[tuple[Sweep, ...], ...]:
-    """Return the sweeps of A and B, restricted to all bodies but the first.
+    """Return the sweeps of the parts of H, restricted to all bodies but the first.
 
-    Sweeps with sums over pairs get the additional sums with which B moves positions.
+    Sweeps with sums over pairs get the additional sums by which positions move in democratic heliocentric coordinates.
     """
     return tuple(tuple(_of_bodies(sweep, bodies) for sweep in part) for part in parts)
 

@@ -107,9 +107,10 @@ class _FewBodies:
         return [first, *([c + e for c, e in zip(first, of, strict=True)] for of in relative)]
 
     def product(self, positions: str, velocities: str) -> Expression:
-        """Return the difference of Σ m q·v in Cartesian coordinates and M R·V + Σ Q·V/w in relative coordinates.
+        """Return Σ m q·v in Cartesian coordinates minus M R·V + Σ Q·V/w in relative coordinates.
 
-        R and V are position and velocity of the centre of mass; M is the total mass, and 1/w are reduced masses.
+        Q and V are relative positions and velocities, R and V of body 0 those of the centre of mass. M is the total
+        mass, and 1/w are reduced masses.
         """
         pairs = zip(self.masses, self.cartesian(positions), self.cartesian(velocities), strict=True)
         weights = [total(self.masses), *(self.inertia(i) for i in self.others)]
@@ -121,14 +122,16 @@ class _FewBodies:
         return total(m * a * b for m, q, v in pairs for a, b in zip(q, v, strict=True)) - total(relative)
 
     def canonical(self) -> Iterator[tuple[str, Expression]]:
-        """Yield Σ m q·v − (M R·V + Σ Q·V/w) as a residual. If it is 0, the change to relative coordinates is
-        canonical.
+        """Yield a residual that is 0 if the change to relative coordinates is canonical.
+
+        It is Σ m q·v in Cartesian coordinates minus the same sum in relative coordinates; see `product`.
         """
         yield f"{self.count} bodies", self.product("Q", "V")
 
     def recoil(self) -> Expression:
-        """Return |Σ m_j V_j|²/2m_0, the kinetic part of B in democratic heliocentric coordinates; 0 in Jacobi
-        coordinates.
+        """Return |Σ m_j V_j|²/2m_0, the kinetic energy that remains without Kepler motions; 0 in Jacobi coordinates.
+
+        m_j are masses, and V_j velocities in democratic heliocentric coordinates.
         """
         if self.bodies.jacobi:
             return ZERO
@@ -137,8 +140,9 @@ class _FewBodies:
         return square(moments) * power(self.masses[0], -1) / 2
 
     def sums(self) -> Iterator[tuple[str, Expression]]:
-        """Yield residuals for H = A + B: of the kinetic energy, and of the positions of bodies relative to the first
-        body.
+        """Yield residuals that show that H is the sum of its parts in relative coordinates.
+
+        They are those of the kinetic energy, and of the positions of bodies relative to the first body.
         """
         yield f"kinetic energy of {self.count} bodies", self.product("V", "V") / 2 - self.recoil()
         q = self.cartesian("Q")
@@ -147,7 +151,7 @@ class _FewBodies:
                 yield f"q_{i} - q_0", q[i][k] - q[0][k] - symbol(n)
 
     def remainder(self) -> Expression:
-        """Return the part B of H as a function of the relative coordinates."""
+        """Return the part of H that remains without the Kepler motions, as a function of the relative coordinates."""
         gravity, m, q = self.bodies.gravity, self.masses, self.cartesian("Q")
         pairs = [(i, j) for i, j in combinations(range(self.count), 2) if self.bodies.jacobi or i > 0]
         energies = (
@@ -161,8 +165,9 @@ class _FewBodies:
         return total([*energies, *kepler]) + self.recoil()
 
     def pull(self, a: int, b: int, k: int) -> Expression:
-        """Return the acceleration of body ``a`` by body ``b`` along axis ``k``, with the opposite sign, as the kernel
-        of B has it.
+        """Return the acceleration of body ``a`` by body ``b`` along axis ``k``, with the opposite sign.
+
+        It is computed as the kernel of the remainder, the part of H without Kepler motions, computes it.
         """
         q, cell = self.cartesian("Q"), self.bodies.cell
         value = [*self.bodies.pulls.values.values()][k]
@@ -172,7 +177,7 @@ class _FewBodies:
         return substitute([value], places)[0]
 
     def gathered(self, i: int) -> dict[str, Expression]:
-        """Return the sums over bodies that the kernel of B reads for body ``i``, by symbol."""
+        """Return the sums over bodies that the kernel of the remainder of H reads for body ``i``, by symbol."""
         axes, first = range(len(self.bodies.axes)), 0 if self.bodies.jacobi else 1
 
         def pulled(a: int, k: int) -> Expression:
@@ -188,8 +193,9 @@ class _FewBodies:
         return sums
 
     def shifts(self, flow: CellFlow) -> Iterator[tuple[str, Expression]]:
-        """Yield the differences between the rates in the flow of B and the rates that follow from B as a
-        Hamiltonian.
+        """Yield the differences between the rates in the flow of the remainder of H and the rates of its vector field.
+
+        The remainder is the part of H without Kepler motions.
         """
         (motion,), b = flow.motions, self.remainder()
         for i in self.others:

@@ -101,8 +101,9 @@ class SeriesPlan:
         ]
 
     def acting(self, forces: SpecForces) -> str:
-        """Return the words about forces in the header of generated files: ζ is added to ∇H, and f acts in two
-        halves.
+        """Return the words in the header of generated files that say how forces act.
+
+        Covector forces ζ are added to ∇H; vector forces f act in two halves.
         """
         return "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(forces.vector)
 
@@ -167,9 +168,10 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return formulas by field, with covectors inserted for their symbols: p = h(∇H + ζ) + Σ ΔW σ∇g at each site.
+    """Return formulas by field, with expressions in place of the symbols of covectors p, for all sites.
 
-    ``maps`` has formulas in the symbols of covectors, such as those for y and for the increment of x.
+    They are p = h(∇H + ζ) + Σ ΔW σ∇g with the covector force ζ and the sources of noise. ``maps`` has formulas in the
+    symbols, such as those for the increment of x in a stage.
     """
     site_fields = SiteFields(cell, sums_by_field(cell))
     covectors: dict[str, Expression] = {}
@@ -183,7 +185,8 @@ def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expre
 
 
 def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
-    """Return y and the increment of x by field, with the vector force f.
+    """Return the formulas for a stage by field, with the vector force f: the solution y of its equation, and the
+    increment of x.
 
     Half of the impulse hf acts before the stage, and half after it.
     """

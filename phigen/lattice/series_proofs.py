@@ -41,9 +41,7 @@ def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
 
 
 def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
-    """Yield the statement that the formula for y solves the equation of a stage, and the statement on the order of a
-    stage.
-    """
+    """Yield two statements on a stage: the formula for y solves its equation α(y, p) = x, and the stage has order 2."""
     realisation, positive = plan.realisation, tuple(p.name for p in cell.parameters if p.positive)
     alpha: dict[str, Expression] = {initial(f): symbol(f) + e for f, e in realisation.displacement.items()}
     substituted = substitute([realisation.middle[f] for f in cell.fields], alpha)

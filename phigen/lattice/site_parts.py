@@ -377,7 +377,8 @@ class PartSearch:
     def _seam_motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
     ) -> SiteMotion | None:
-        """Return the motion of sites near boundary seams under the terms that begin on a given set of seams.
+        """Return the motion of sites near boundary seams, the last sites along an axis, where colours break their
+        period.
 
         Returns None if there are no seams, or if the part has the terms of all colours, so that seams make no
         difference.
@@ -401,11 +402,12 @@ class PartSearch:
         shift: Offset = (),
         factor: Expression = ONE,
     ) -> Expression:
-        """Return ∂V/∂field at the site ``shift`` away, for the sum V of the terms ``part``; terms of bonds are left
-        out.
+        """Return ∂V/∂field at the site ``shift`` away, for a part V of H, the sum of the terms ``part``; terms of bonds
+        are left out.
 
         ``colour`` is the colour of that site. Each term has a weight that is 0 if the term reaches beyond an open end.
-        If ``colour`` is None, the site is near a seam, and the weight also depends on the site where the term begins.
+        If ``colour`` is None, the site is near a boundary seam, and the weight also depends on the site where the term
+        begins.
         """
         slopes = []
         for summand, begin in part:
@@ -427,8 +429,10 @@ class PartSearch:
     def _motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int | None
     ) -> SiteMotion:
-        """Return the motion of the sites of a colour under the terms of a part, or of sites near seams if ``colour`` is
-        None.
+        """Return the motion of the sites of a colour under the terms of a part of H; of sites near seams if ``colour``
+        is None.
+
+        The terms in ``more`` are multiplied by the symbol `KICK`.
         """
         cell = self.cell
         coordinates: set[tuple[str, int | None]] = {c for s in (*part, *more) for c in self._support(s)}
@@ -564,11 +568,14 @@ class SiteFields:
         return self._shifted(self.cell.forces.damping or ZERO, shift)
 
     def impulse(self, field: str) -> Expression:
-        """Return the component ``field`` of the vector force f at the site."""
+        """Return the component ``field`` of the vector force at the site."""
         return self._shifted(self.cell.forces.vector.get(field, ZERO))
 
     def noise(self, field: str, shift: Offset = ()) -> Expression:
-        """Return Σ ΔW σ ∂g/∂field over the sources of noise, at the site ``shift`` away with its increments ΔW."""
+        """Return the derivative of the noise Hamiltonian Σ ΔW σ g by ``field``, at the site ``shift`` away.
+
+        The sum is over the sources of noise, with their increments ΔW, amplitudes σ and Hamiltonians g.
+        """
         slopes = [
             symbol(dw) * s.amplitude * gradient(s.hamiltonian, [field])[0]
             for dw, s in zip(self.cell.increments, self.cell.noise.values(), strict=True)
@@ -596,7 +603,7 @@ class SiteFields:
 
 
 def field_at_site(cell: Cell, gathered: Mapping[str, Expression]) -> tuple[Expression, ...]:
-    """Return ẋ of all fields at a site, without noise, with weights at open ends.
+    """Return ẋ of all fields at a site, without noise. Terms have weights that are 0 beyond open ends.
 
     ``gathered`` maps a field f to the expression for the sums over bonds or pairs in ∂H/∂f.
     """

@@ -73,8 +73,8 @@ class SplittingPlan:
     parts: CellSplitting
     choice: ScheduledMethod
     noise: tuple[CellFlow, ...] = ()
-    since: str = ""  # reason for boundary seams, or for more colours than the minimum
-    negative: int | None = None  # with a monitor: index of the part B of K = log(A + e) − log(−B)
+    since: str = ""  # reason for boundary seams (irregular colours), or for more colours than the minimum
+    negative: int | None = None  # with a monitor: index of the part of H that is negative
     bodies: LatticeBodies | None = None  # the bodies, if the spec asks for relative coordinates
 
     #: The scheme, as in specs; it is also the name of the method for users. A step is a sequence of explicit flows.
@@ -225,9 +225,10 @@ def _plan_bodies(cell: Cell, spec: Spec) -> SplittingPlan:
 
 
 def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMethod:
-    """Return the method with additional flows, those of the terms of each part that begin on boundary seams.
+    """Return the method with additional flows, of the terms that begin on boundary seams, where colours break their
+    period.
 
-    The flows on seams come after the flow of the remaining terms of their part, but before it in the last part.
+    The flows on seams come after the flow of the remaining terms of their part of H, but before it in the last part.
     """
     flows = choice.splitting.flows
     last, all_flows = len(flows) - 1, list[Flow]()
@@ -239,8 +240,9 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
 
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
-    """Yield flows of those terms of a part that begin on seams, one flow for each set of seams on which a site may
-    lie.
+    """Yield flows of the terms of a part of H that begin on boundary seams, where colours break their period.
+
+    There is one flow for each set of seams on which a site may lie.
     """
     colours = {colour for _, summand_colours in flow.summands for colour in summand_colours}
     if colours and colours.isdisjoint(colouring.on_seams()):
@@ -283,10 +285,11 @@ def _coloured(cell: Cell, search: type[PartSearch], spec: Spec) -> tuple[CellSpl
 def _seamed(
     cell: Cell, colouring: Colouring, search: type[PartSearch], spec: Spec
 ) -> tuple[CellSplitting, tuple[CellFlow, ...]] | None:
-    """Return the parts of H and the flows of forces for a colouring with boundary seams, which fits runs of any size.
+    """Return the parts of H and the flows of forces for a colouring with boundary seams, where colours break their
+    period.
 
-    Returns None if a run is too small for its seams, an axis has open ends, or sites near seams have no elementary
-    flow.
+    Seams allow sizes that are no multiples of the period. Returns None if a run is too small for its seams, an axis has
+    open ends, or sites near seams have no elementary flow.
     """
     seamed = colouring.with_seams(cell)
     small = any(
@@ -401,7 +404,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
 
 
 def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
-    """Return the schedule of a method on a graph, whose number of colours is known only at run time; see `Sweeps`.
+    """Return the order of flows in a step on a graph, whose number of colours is known only at run time; see `Sweeps`.
 
     ``dated`` says that H depends on the time. Then the time advances in the last flow.
     """
