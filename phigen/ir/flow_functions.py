@@ -100,9 +100,9 @@ class FlowFunctions:
         return self.function("corrector", doc, parameters, tuple(body))
 
     def tangent(self, count: int) -> ir.Function:
-        """Return the function that computes the derivative of the increment of flow ``part``, then applies this flow.
+        """Return the function that computes the derivative of the increment of a flow, then applies this flow.
 
-        ``count`` is the number of flows.
+        The argument ``part`` of the function selects one of ``count`` flows.
         """
         cases = tuple(
             (
@@ -155,8 +155,8 @@ def _in_order(
 def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
     """Return the function that adds the increments of a flow to the values ``updated`` of all members of a group.
 
-    ``form`` is the suffix of the version of elementary functions, for small or for all arguments
-    (`phigen.ir.passes.forms`).
+    ``form`` is the suffix in its name. It says whether sin and other elementary functions are replaced by versions for
+    small or for all arguments (`phigen.ir.passes.forms`).
     """
     count = ir.Constant(max(1, len(updated)))
     x, start, compensation = (ir.Member(PACK, name) for name in ("x", "start", "carry"))
@@ -177,8 +177,8 @@ def group_flow(number: int, form: str, updated: Sequence[int]) -> ir.Function:
 def group_schedule(schedule: Schedule, form: str) -> ir.Function:
     """Return the function that applies all flows of a step to all members of a group.
 
-    ``form`` is the suffix of the version of elementary functions, for small or for all arguments
-    (`phigen.ir.passes.forms`).
+    ``form`` is the suffix in its name. It says whether sin and other elementary functions are replaced by versions for
+    small or for all arguments (`phigen.ir.passes.forms`).
     """
 
     def flow(part: int, row: ir.Value) -> Iterator[ir.Statement]:
@@ -318,9 +318,10 @@ class FlowTransposes:
 
 
 def _in_form(name: str, has_far: bool, arguments: tuple[ir.Value, ...]) -> ir.Statement:
-    """Return the call of a function for SIMD lanes.
+    """Return the call of a function ``name`` for SIMD lanes.
 
-    If the function has a version for all arguments of elementary functions, groups marked ``far`` call this version.
+    If the function has a second version, in which sin and other elementary functions are correct for all arguments,
+    groups of members marked ``far`` call this version.
     """
     near = ir.Call(f"{name}_lanes", arguments)
     if not has_far:

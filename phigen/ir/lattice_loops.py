@@ -60,7 +60,7 @@ class LatticeLoops:
         return self._over_sites(kernel, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read)
 
     def observable(self, kernel: Kernel) -> ir.Function:
-        """Return the function of a density, an energy or the vector field.
+        """Return the function of the kernel of an observable: a density, an energy or the vector field.
 
         An energy at a site includes half of the energy of each bond or pair of the site.
         """
@@ -245,7 +245,7 @@ class LatticeLoops:
 
     @cached_property
     def seams(self) -> tuple[Symbol, ...]:
-        """The symbols that test for boundary seams, in the order in which kernels read them."""
+        """The symbols of the weights of terms near boundary seams, in the order in which kernels read them."""
         return _present((sweep.kernel for sweep in self.step.sweeps), symbols.BEGINS)
 
 

@@ -29,7 +29,7 @@ class SumLaunch:
     """Data for launching a kernel that computes sums over the bonds of each site, or over all other sites.
 
     ``values`` is the number of sums at a site. ``of_parameters`` says that the kernel reads parameters in place of
-    coefficients. ``end`` and ``chosen`` are as in `phigen.scheme.steps.Ends`.
+    coefficients. ``end`` and ``chosen`` select bonds of a site, see `phigen.scheme.steps.Ends`.
     """
 
     kernel: str

@@ -200,11 +200,10 @@ class HasColour:
 
 @dataclass(frozen=True)
 class OnSeam:
-    """Weight of a term near boundary seams. It is 1 if the term begins at a site of the part that the sweep belongs to,
-    else 0.
+    """Weight of a term of H near boundary seams: 1 if the sweep of a part of H includes the term, else 0.
 
-    The term begins at the site ``offset`` away. This site must have the colour ``colour``, and must lie on exactly the
-    seams of the sweep's window.
+    The term begins at the site ``offset`` away. It is included if this site has the colour ``colour`` and lies on
+    exactly those seams that the sweep is for.
     """
 
     number: int
@@ -560,7 +559,8 @@ Statement = (
 Block = tuple[Statement, ...]
 
 
-#: Parameters of functions on the level of sites; each target gives them its own names.
+#: Parameters of functions before lowering, whose loops are over sites, bonds or pairs. Each target gives them its own
+#: names.
 PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "out")
 
 _NUMBERED = dict.fromkeys(("first", "end", "unit"), Type.SIZE)
@@ -609,14 +609,14 @@ class Function:
 
     @property
     def loop(self) -> Loop:
-        """The loop of a function on the level of sites, which is its last statement."""
+        """The loop over sites, bonds or pairs of a function before lowering, which is its last statement."""
         loop = self.body[-1]
         assert isinstance(loop, Loop)
         return loop
 
     @property
     def known_types(self) -> dict[str, ParameterType]:
-        """The types of parameters on the level of memory, by name."""
+        """The types of the parameters of a function after lowering, by name."""
         return {**TYPES, **dict(self.types)}
 
     def with_body(self, *body: Statement) -> Function:

@@ -38,7 +38,7 @@ LANES = 8
 #: stack on macOS.
 MAX_STACK_BYTES = 256 * 1024
 
-#: Largest number of packs in a group, which must equal that of the runtime.
+#: Largest number of packs (SIMD batches of members) in a group, which must equal that of the runtime.
 PACKS_PER_GROUP = 4
 
 #: Number of arrays (stages × unknowns) that a batch of members needs for a Gauss step: the unknowns, and the increments
@@ -114,7 +114,7 @@ class Packs:
 
 @dataclass(frozen=True)
 class Rows:
-    """Sites of a row of a lattice as lanes. ``calls`` are the functions that loops over sites call.
+    """SIMD lanes of a lattice: neighbouring sites of a row. ``calls`` are the functions that loops over sites call.
 
     ``small_argument`` are the functions that have a polynomial for small arguments. ``limited`` are the functions in
     flows and stages whose fast versions fail at very large arguments: those with a polynomial, and those with a vector
@@ -411,7 +411,7 @@ def _with_transposes(program: Program, packs: Packs, transposes: Sequence[Kernel
 
 
 def _block(program: Program, more: int = 0, once: int = 0) -> int:
-    """Return the number of bytes that a block of steps needs on the stack.
+    """Return the number of bytes on the stack for a block of steps, which are solved together in SIMD lanes.
 
     In each lane there are ``more`` additional values for each stage, and ``once`` additional values for all stages
     together.

@@ -40,14 +40,14 @@ def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> t
 
 
 def kernels(step: Path, lanes: PathLanes, coordinates: Sequence[str]) -> list[Kernel]:
-    """Return the kernels that blocks of steps along paths need."""
+    """Return the kernels for blocks of steps along Karasev's paths, which are solved together in SIMD lanes."""
     momentum = Kernel("momentum", "p = grad S_h(y)", lanes.curvature.inputs, lanes.curvature.outputs[:1])
     curvature, *further = traced(step, lanes.slopes, lanes.curvature, coordinates)
     return [curvature, momentum, *further, lanes.along_mean, lanes.invert]
 
 
 def back(path: PathAdjoint) -> list[Kernel]:
-    """Return the additional kernels that the reverse pass along paths needs."""
+    """Return the additional kernels for the reverse pass through steps along Karasev's paths."""
     return [path.slope]
 
 

@@ -148,14 +148,19 @@ def elliptic_used(program: Program) -> list[str]:
 
 
 def remainders_used(program: Program) -> list[str]:
-    """Return the functions of `phigen.symbolic.remainders` that kernels of a program call."""
+    """Return the functions of `phigen.symbolic.remainders` that kernels of a program call.
+
+    Exponentials of small matrices need these functions.
+    """
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     return [name for name in (*remainders.REMAINDERS, *remainders.QUOTIENTS) if name in ops]
 
 
 def remainder_values(names: Sequence[str]) -> dict[str, object]:
-    """Return the template values for functions of `phigen.symbolic.remainders`, with the index that each has among
+    """Return template values for functions that exponentials of small matrices need, with the index of each among
     these.
+
+    ``names`` are functions of `phigen.symbolic.remainders`.
     """
     places = {name: k for k, name in enumerate((*remainders.REMAINDERS, *remainders.QUOTIENTS))}
     reach = remainders.MAX_ROOT

@@ -158,8 +158,8 @@ class BondLoop:
 
 
 def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Function:
-    """Return the function by rows of a density, an energy or the vector field. It first calls the functions ``calls``
-    for sums.
+    """Return the function by rows of a density, an energy or the vector field. It first calls the functions ``calls``,
+    which compute sums over bonds or pairs.
 
     ``apart`` is the distance in memory between successive values of one site in the output.
     """

@@ -70,8 +70,8 @@ class _WorkItems:
     declared: set[int] = field(default_factory=set)
 
     def loop(self, loop: ir.Loop) -> Iterator[ir.Statement]:
-        """Yield the statements of a work item for a loop: the body for its own site, or a loop over the bonds or pairs
-        of the site.
+        """Yield the statements of a work item, which computes one site, for a loop: the body for its own site, or a
+        loop over the bonds or pairs of the site.
         """
         if loop.kind == "sites":
             yield from (new for s in loop.body for new in self.lowered(s))
@@ -88,7 +88,7 @@ class _WorkItems:
         yield from (ir.Assign(self._element(s.array, SITE), total) for s, total in zip(stores, totals, strict=True))
 
     def lowered(self, s: ir.Statement) -> Iterator[ir.Statement]:
-        """Yield a statement on the level of sites as statements on the level of memory."""
+        """Lower a statement: where it names a site by an offset, the result names an element of an array."""
         match s:
             case ir.Store(array, value, adds):
                 yield from self._stored(array, value, adds=adds)

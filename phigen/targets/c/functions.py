@@ -195,7 +195,9 @@ def _nested(coefficients: Sequence[float]) -> str:
 
 
 def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
-    """Return the definitions for loops over lanes of φ and of those derivatives of φ that are in ``ops``."""
+    """Return the definitions for loops over lanes of φ(s) = (1 − w cot w)/s, w = √s/2, and of its derivatives that
+    ``ops`` has.
+    """
     texts = []
     for f in (f for f in SPECIAL if f in ops):
         first, *rest = map(repr, lane_coefficients(order_of(f)))

@@ -44,7 +44,7 @@ def _width(step: Gauss, lanes: Lanes | None) -> int:
 
 
 def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
-    """Return the sizes that are declared with the struct of the solver: name, value and comment."""
+    """Return the sizes of a Gauss method that are declared with the struct of the solver: name, value and comment."""
     width = _width(step, lanes)
     return [
         ("NODES", step.tableau.stages, "stages of a step"),

@@ -31,7 +31,7 @@ class Choice:
         yield from (_definition(name, texts[which]) for name, texts in self.phrases.items())
 
     def header(self) -> Iterator[str]:
-        """Yield the definitions for all solvers, with an ``#if`` for each condition."""
+        """Yield the ``#define`` lines of the macros for all solvers, with an ``#if`` for each condition."""
         yield f"/* {self.about} */"
         for k, condition in enumerate((*self.conditions, "")):
             expression = " ".join(

@@ -43,7 +43,9 @@ class _PathOverMembers(PathLayout):
 
 
 def _path_lines(program: Program, path: Recurrences) -> dict[str, list[str]]:
-    """Return the statements of a path as lines of text, by the name of the block."""
+    """Return the statements that compute a path ṁ = π(m)p by Taylor series, as lines of text by the name of their
+    block.
+    """
     blocks = PathFunctions(program, path, _PathOverMembers()).blocks()
     printed = {name: statements(function)[1] for name, function in blocks.items()}
     return {name: [line.strip() for line in lines] for name, lines in printed.items()}

@@ -238,8 +238,9 @@ class _Reverse(RowLoops):
             yield replace(both, first=(*both.first, *copied), second=second)
 
     def of_equation(self) -> Iterator[Back]:
-        """Yield both traversals of each kernel in the reverse pass of a stage. The first of these also computes the
-        sums.
+        """Yield both traversals of the sites for each kernel in the reverse pass of a stage.
+
+        The first traversal of the first kernel also computes the sums over bonds or pairs.
         """
         layout, fields, gather = self.layout, self.program.coordinates, self.layout.partners.field
         transposed = [
@@ -275,8 +276,10 @@ class _Reverse(RowLoops):
             return ir.Call(loop.name, (*[COEF] * coefficients, at(sites), of_segment))
 
         def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], recomputed: Sequence[str]) -> ir.Block:
-            """Return the calls of a transposed kernel for a row segment, with both forms of elementary functions if
-            these are needed.
+            """Return the calls of a transposed kernel for a row segment.
+
+            If sin and other elementary functions have versions for small and for all arguments, there is a call for
+            each.
             """
             sums, blocks = one.gather.names if one.gather else (), dict[str, ir.Block]()
             on_sites = self.sites.transposed(kernel, one.gather, one.sweep, recomputed)

@@ -106,10 +106,11 @@ class RowLoops:
         return IN_LANES if self.fast else FULL_RANGE
 
     def forms(self, rows: Rows | None, loops: Iterable[ir.Function]) -> Forms:
-        """Return the forms in which loops are generated: suffixes of names, with versions of elementary functions.
+        """Return the versions of elementary functions with which loops are generated, by the suffix of the names of the
+        loops.
 
         There is a form for small arguments and a form for all arguments, if one of the ``loops`` calls a function that
-        needs both. Without ``rows`` there is a single form.
+        needs both. Without ``rows``, the data on loops over sites in SIMD lanes, there is a single form.
         """
         if rows is None:
             return {"": self.versions}

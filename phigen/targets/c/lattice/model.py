@@ -75,7 +75,10 @@ def declarations(program: Program, step: Sweeps) -> str:
 
 
 def _differences(program: Program) -> int:
-    """Return the number of past differences of y − x from which the predictor of a stage extrapolates."""
+    """Return the number of past differences from which the predictor of a stage extrapolates.
+
+    The differences are those of y − x: the solution of the stage minus the state at its start.
+    """
     return max(1, min(LatticeSweepPolicy().differences, MOST_REMEMBERED // len(program.fractions)))
 
 
