@@ -135,8 +135,8 @@ class Realisation:
 
 
 def direct(system: System) -> Realisation:
-    """Return the realisation in which all coordinates are unknowns; its step is a Poisson map exactly if π is
-    constant.
+    """Return the realisation in which all coordinates are unknowns; if π is constant, its step is an exact Poisson
+    map.
     """
     constant = isinstance(system.shape, Constant | Canonical)
     return Realisation((Plain(tuple(range(system.dimension))),), constant)

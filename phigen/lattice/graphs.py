@@ -106,7 +106,10 @@ class GraphSearch(PartSearch):
     # --- flows
 
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
-        """Return the flow of a sum of commuting terms. The terms in ``more`` are multiplied by the symbol `KICK`."""
+        """Return the flow of a sum of commuting terms of H.
+
+        The terms in ``more`` are those of a modified potential; they are multiplied by the symbol `KICK`.
+        """
         return replace(super().flow(part, more), by_colour=part[0][1] != WHOLE)
 
     def _motions(

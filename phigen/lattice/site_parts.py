@@ -358,7 +358,11 @@ class PartSearch:
     # --- flows
 
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
-        """Return the flow of a sum of commuting terms. The terms in ``more`` are multiplied by the symbol `KICK`."""
+        """Return the flow of a sum of commuting terms of H.
+
+        The terms in ``more`` are those of a modified potential, V + κ{V, {V, T}}; they are multiplied by the symbol
+        `KICK`, κ.
+        """
         motions = [m for m in self._motions(part, more) if m.increments]
         by_term: dict[int, tuple[Summand, list[int]]] = {}
         for summand, colour in (*part, *((replace(s, expression=symbol(KICK) * s.expression), c) for s, c in more)):
@@ -432,7 +436,7 @@ class PartSearch:
         """Return the motion of the sites of a colour under the terms of a part of H; of sites near seams if ``colour``
         is None.
 
-        The terms in ``more`` are multiplied by the symbol `KICK`.
+        The terms in ``more`` are those of a modified potential; they are multiplied by the symbol `KICK`.
         """
         cell = self.cell
         coordinates: set[tuple[str, int | None]] = {c for s in (*part, *more) for c in self._support(s)}

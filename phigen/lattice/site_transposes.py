@@ -30,7 +30,7 @@ def transposed(
     coefficients: Coefficients,
     partners: Partners | None,
 ) -> Adjoint:
-    """Return the transposes of all kernels of a step. The transpose of a kernel has the same name, followed by
+    """Return the transposes of all kernels of a step. The name of a transpose is that of the kernel, with the suffix
     `BACK`.
     """
     kernels: list[Kernel] = []
