@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from syntax_trees import parsed
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -41,9 +42,8 @@ def empty_names(tree: ast.Module) -> list[str]:
     ]
 
 
-def breaches(source: str) -> list[str]:
+def breaches(tree: ast.Module) -> list[str]:
     """Names and docstrings of a module that break the rules, each with its line."""
-    tree = ast.parse(source)
     listed = empty_names(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
@@ -58,7 +58,7 @@ def test_rooms_keep_the_rules(room: str) -> None:
     place = ROOT / "phigen" / room
     files = [place] if place.suffix else sorted(place.rglob("*.py"))
     assert files
-    assert {str(f): b for f in files if (b := breaches(f.read_text(encoding="utf-8")))} == {}
+    assert {str(f): b for f in files if (b := breaches(parsed(f)))} == {}
 
 
 def test_variables_of_tests_name_their_content() -> None:
@@ -72,7 +72,7 @@ def test_breaches_are_seen() -> None:
         '"""What a module has."""\ndef f(given):\n    """Of it."""\n    for found in given:\n        kept = found\n'
     )
     source += 'class C:\n    """A record."""\n    made: int\n'
-    listed = breaches(source)
+    listed = breaches(ast.parse(source))
     assert [line.partition(" ")[2] for line in listed] == ["given", "found", "kept", "What a module has. …", "Of it. …"]
 
 
@@ -82,8 +82,7 @@ SHARED_CLASS_NAMES = {"Constant", "Function"}
 
 def test_class_names_occur_once() -> None:
     files = sorted((ROOT / "phigen").rglob("*.py"))
-    trees = [ast.parse(f.read_text(encoding="utf-8")) for f in files]
-    names = [node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
+    names = [node.name for f in files for node in ast.walk(parsed(f)) if isinstance(node, ast.ClassDef)]
     assert {name for name in names if names.count(name) > 1} <= SHARED_CLASS_NAMES
 
 

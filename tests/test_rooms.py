@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from syntax_trees import parsed
+
 from phigen import resources
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -101,12 +103,6 @@ KINDS = {
     "phigen.lattice.series": {"SeriesPlan"},
     "phigen.lattice.sweep_plans": {"SplittingPlan"},
 }
-
-
-@cache
-def parsed(path: Path) -> ast.Module:
-    """The syntax tree of a module."""
-    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 @cache

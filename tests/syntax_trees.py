@@ -1,0 +1,11 @@
+"""Syntax trees of Python modules, each parsed once."""
+
+import ast
+from functools import cache
+from pathlib import Path
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    """Return the syntax tree of the module in a file."""
+    return ast.parse(path.read_text(encoding="utf-8"))
