@@ -219,17 +219,9 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
 
 def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None) -> Compilation:
     """Compile a system by the scheme of its spec; ``early_realisation`` is the result of `_realised_early`."""
-    _expect_inputs_to_change(spec)
     if early_realisation:
         return _compile_series(spec, source, clock, early_realisation)
     return SCHEME_COMPILERS[spec.scheme](spec, source, clock)
-
-
-def _expect_inputs_to_change(spec: Spec) -> None:
-    """Raise `SpecError` if the spec has inputs, but ``without`` leaves out the C function that sets them."""
-    if spec.inputs and "parameters" in spec.extras.without:
-        message = f"inputs need {spec.name}_set_parameters, which `without` leaves out"
-        raise SpecError([spec.diagnostic(("inputs",), message, "remove inputs, or the parameters of `without`")])
 
 
 def _compile_series(
@@ -412,7 +404,6 @@ def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:
     """Compile a lattice, for any numbers of sites, to a plan of sweeps (updates of all sites)."""
     if spec.scheme == "gauss":
         expect_offered(spec)
-    _expect_inputs_to_change(spec)
     from phigen.lattice.cell_building import expect_coloured
     from phigen.lattice.sweep_plans import build_sweeps, plan_sweeps
 

@@ -91,13 +91,6 @@ def test_auto_leaves_out_schemes_without_the_settings_that_are_named():
     assert compile_text(f"{text}scheme: auto\nsolver: {{tolerance: 1e-8}}\n").program.step.kind.implicit
 
 
-@pytest.mark.parametrize("text", [f"{BODY}parameters: {{k: 1}}\n", f"{CHAIN}parameters: {{k: 1}}\n"])
-def test_inputs_and_the_function_that_changes_them_belong_together(text):
-    for lines in ("without: [parameters]\n", "without: [parameters]\nprofile: small\n"):
-        assert "which `without` leaves out" in str(attempted(f"{text}inputs: [k]\n{lines}", "series"))
-    compile_text(f"{text}inputs: [k]\nscheme: series\n")
-
-
 def test_the_usual_tolerance_may_be_named():
     usual = "solver: {tolerance: auto}\n"
     assert compile_text(f"{CHAIN}{usual}scheme: series\n").program.step.equation
