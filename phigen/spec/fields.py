@@ -176,7 +176,10 @@ BIREALISATION = Record(
     (
         RecordKey("kind", KIND, "the kind; auto chooses by the form of π", required=True),
         RecordKey(
-            "side", OneOf(("q", "p")), "canonical-euler: the half of the coordinates that is implicit", default="q"
+            "side",
+            OneOf(("q", "p")),
+            "canonical-euler: a step takes H at these coordinates of its start and at the others of its end",
+            default="q",
         ),
         RecordKey(
             "of",

@@ -77,8 +77,8 @@ def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapp
 
 #: Keys that runs of lattices do not have, with the hint: the reason, or what to use instead.
 _ABSENT_IN_RUNS = {
-    "box": "certificates are those of ordinary systems; phigen show --expand prints a lattice as one",
-    "exact": "closed forms are those of ordinary systems; phigen show --expand prints a lattice as one",
+    "box": "phigen show --expand prints an ordinary spec of a few sites, where it is allowed",
+    "exact": "phigen show --expand prints an ordinary spec of a few sites, where it is allowed",
     "compare": "phigen verify and phigen tune set classical methods beside the solver of a lattice",
     "members": "sweeps: integrates many members, each with its own path",
 }
@@ -198,7 +198,7 @@ def _bonds(name: str, raw: Raw, declared: Declarations) -> tuple[tuple[int, int]
 def _names(name: str, raw: Raw, declared: Declarations) -> tuple[str, ...]:
     names = tuple(text for text in raw.get("names") or () if text is not None)
     if names and declared.relation == "grid":
-        _fail(name, "names", "names are those of bodies: for lattice: {pairs: all} and {graph: NAME}", declared)
+        _fail(name, "names", "names: only for sites of lattice: {pairs: all} and {graph: NAME}", declared)
         return ()
     repeated = next((text for k, text in enumerate(names) if text in names[:k]), None)
     if repeated is not None:

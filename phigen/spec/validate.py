@@ -158,7 +158,7 @@ WITHOUT_SERIES = {
 NOT_OF_LATTICES: Mapping[str, tuple[tuple[object, ...], str]] = {
     "reconstruct": ((), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
     "terms": ((), "order: sets the method of a lattice"),
-    "gauge": (("auto", "none"), "gauges are those of ordinary systems"),
+    "gauge": (("auto", "none"), "remove gauge: lattices have none"),
     "modified_hamiltonian": ((0,), "phigen show --expand prints an ordinary spec of a few sites, where it is allowed"),
 }
 
@@ -177,7 +177,7 @@ NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     ),
     "modified_hamiltonian": ((0,), "each step has a Hamiltonian of its own", ""),
     "terms": ((), "with noise the method is chosen by order", "order: 2"),
-    "adjoint": ((False,), "it is not offered", ""),
+    "adjoint": ((False,), "gradients of steps with noise are not available", ""),
 }
 #: Keys of runs that are refused with noise, and keys of runs that are allowed with noise only.
 NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "every", "at"), ("seed", "members")

@@ -122,7 +122,7 @@ def measured(
     the checks.
     """
     apart = _largest(fixed_level_runs, transposition_error)
-    reason = f"the gradient is not the transpose of the tangent maps, {apart:.1e} off"
+    reason = f"the gradient differs from the transpose of the tangent maps by {apart:.1e}"
     yield f"gradient against tangent maps{place}", apart, TRANSPOSED, reason
     slip = _largest(free_level_runs, difference_error)
     yield f"gradient against differences{place}", slip, DIFFERENCES, f"the gradient is {slip:.1e} off"
