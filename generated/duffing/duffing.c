@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 5d26716b4efa491f543c95d0e6da4b265929ca055337b342caa6658d3d863328
+ * body-sha256: 8f80ff7d79d9372ab221efd544bac3926e1ec6872e0176483aeb7ba6df1da636
  */
 #include "duffing.h"
 #include <float.h>
@@ -21,7 +21,7 @@ const duffing_params duffing_default_params = { 0.1, 1.2 };
 
 enum { duffing_PREPARED = 22 };       /* first coefficients, which depend on params and h only */
 enum { duffing_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
-#define duffing_TOLERANCE 1e-20       /* largest estimated error after an accepted correction */
+#define duffing_TOLERANCE 1e-20       /* largest accepted error of a solution, relative to it */
 
 /* Midpoint of the step, at which time-dependent coefficients are evaluated. */
 #define duffing_middles 0.5
@@ -146,8 +146,8 @@ static int duffing_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
-   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
+   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static int duffing_advance(duffing_solver *s, const double *change, const double *small)
 {
     double x[duffing_DIM], carry[duffing_DIM];
@@ -196,8 +196,8 @@ static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[d
 /* ---- Predictors ---- */
 #define duffing_REACH 4.0 /* largest distance from the last value, relative to it */
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far
-   away, where the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
+   there the equation of a step has solutions unrelated to the motion. */
 static int duffing_predict(const duffing_history *history, double value[duffing_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -235,8 +235,8 @@ static void duffing_remember(duffing_history *history, const double value[duffin
 #define duffing_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
-   equation may have solutions far away, at another energy, unrelated to the motion. */
+/* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+   is too large may have solutions far away, at another energy, unrelated to the motion. */
 static int duffing_plausible(const duffing_solver *s, const double increment[duffing_DIM])
 {
     double distance = 0.0, size = 0.0, field[duffing_DIM], point[duffing_DIM], H[3];
@@ -248,7 +248,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
     duffing_vector_field(&s->params, s->t, s->x, field);
     for (int i = 0; i < duffing_DIM; ++i) size += fabs(s->h * field[i]);
     if (distance <= duffing_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
+    for (int k = 0; k < 3; ++k) { /* energy at the start, halfway, and at the end */
         for (int i = 0; i < duffing_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = duffing_hamiltonian(&s->params, s->t, point);
     }
@@ -264,7 +264,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 #define duffing_SHRINKING 0.25
 
-/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
+/* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */
 static double duffing_size(const double y[duffing_DIM], const double delta[duffing_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -299,7 +299,7 @@ static duffing_status duffing_attempt(duffing_solver *s)
         const int stalled = previous < duffing_NEARLY_SOLVED && size > duffing_SHRINKING * previous;
         previous = size;
         if (!(remaining <= duffing_TOLERANCE || stalled)) continue;
-        double small[duffing_DIM] = { 0.0 }; /* correction of the increment, and compensation */
+        double small[duffing_DIM] = { 0.0 }; /* correction of the increment and compensation term */
         for (int i = 0; i < duffing_DIM; ++i)
             for (int j = 0; j < duffing_DIM; ++j) small[i] -= slope[i * duffing_DIM + j] * delta[j];
         for (int i = 0; i < duffing_DIM; ++i) small[i] += s->carry[i];
@@ -312,7 +312,7 @@ static duffing_status duffing_attempt(duffing_solver *s)
 }
 
 /* ---- The solver ---- */
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, const double x0[duffing_DIM],
     double t0)
 {
@@ -343,7 +343,7 @@ static void duffing_renew(duffing_solver *s)
     duffing_at_time(s->coef, s->t + duffing_middles * s->h, s->coef + duffing_PREPARED);
 }
 
-/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
+/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
 static duffing_status duffing_stage(duffing_solver *s)
 {
     const duffing_status status = duffing_attempt(s);
@@ -355,7 +355,7 @@ static duffing_status duffing_stage(duffing_solver *s)
 duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return duffing_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         duffing_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

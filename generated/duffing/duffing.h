@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 86ff4399cc1ed4535e1b185c3e29a656b2b2d2e69872cc38cf22a77eabd21a80
+ * body-sha256: a569fd0b3810ade0e1a60d8bb4b5cdca50bba7da7a9921b1bd4d567a06e3601a
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -32,10 +32,10 @@ typedef enum { duffing_OK = 0, duffing_NO_CONVERGENCE, duffing_SINGULAR, duffing
     duffing_BAD_ARGUMENT } duffing_status;
 const char *duffing_status_string(duffing_status status); /* the meaning of a status */
 
-/* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
+/* Predictor: the last solution y and its backward differences, which extrapolate the next. For speed only. */
 typedef struct {
-    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
-    double difference[duffing_DIFFERENCES][duffing_DIM]; /* the solution, then differences */
+    int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
+    double difference[duffing_DIFFERENCES][duffing_DIM]; /* the last solution, then its differences */
 } duffing_history;
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
@@ -52,11 +52,11 @@ typedef struct {
     double t_before_h;
     duffing_history history; /* predictor of the starting value of the iteration */
 } duffing_solver;
-size_t duffing_solver_size(void); /* bytes; for languages that cannot read the struct */
+size_t duffing_solver_size(void); /* in bytes, for languages that cannot read the struct */
 size_t duffing_solver_steps_done(const duffing_solver *s);
 
-/* Initialise *s with x0; params = NULL means the defaults. Returns duffing_BAD_ARGUMENT, with *s unchanged,
-   if a value or a coefficient is not finite, or a parameter that must be positive is not. */
+/* Initialise *s with the state x0; params = NULL for the defaults. Returns duffing_BAD_ARGUMENT, with *s
+   unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
 duffing_status duffing_init(duffing_solver *s, const duffing_params *params, const double x0[duffing_DIM]);
 
 /* As duffing_init, at the time t0; duffing_init starts at the time 0. */
@@ -72,8 +72,8 @@ duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps);
 duffing_status duffing_set_state(duffing_solver *s, const double x[duffing_DIM]);
 duffing_status duffing_kick(duffing_solver *s, const double change[duffing_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
-   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
+   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
 duffing_status duffing_ensemble(const duffing_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 

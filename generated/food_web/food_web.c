@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: f513b0ae77a9d96966532e3f488ff0eda7050edb22089b1a0e630e17f6d13046
+ * body-sha256: c0c34d05780f4dc1ec5a53bd6ca0598ac80bb4402c8ae69399530b3c53ddea1b
  */
 #include "food_web.h"
 #include <limits.h>
@@ -17,7 +17,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
+#define restrict /* no keyword of C++; Microsoft's compiler refuses it in the brackets of an array */
 #endif
 
 /* ---- The model ---- */
@@ -28,7 +28,7 @@ enum { food_web_ROW = 1 };            /* coefficients of one flow */
 enum { food_web_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { food_web_FLOWS = 25 };         /* flows in a step */
 
-/* Along each axis: the smallest size. */
+/* Along each axis: the smallest number of sites. */
 static const size_t food_web_least[food_web_AXES] = { 1 };
 
 /* For each part of H, 1 if it consists of one flow for each colour of sites. */
@@ -50,7 +50,7 @@ static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.079203696431195
     -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663,
     0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* Kind of each flow: 0 first, 1 all inner ones, 2 last, 3 the inner ones in reverse order. */
+/* Flows of each row of coefficients: 0 first, 1 all inner ones, 2 last, 3 all inner ones in reverse. */
 static const unsigned char food_web_flow_parts[food_web_ROWS_OF_FLOWS] = { 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3,
     0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 0 };
 
@@ -80,7 +80,7 @@ typedef struct {
     int chosen;         /* the colour that a part of H belongs to */
 } food_web_row;
 
-/* Before a loop over sites: tells the compiler that iterations are independent. */
+/* Stands before loops over sites: it tells the compiler that their iterations are independent. */
 #if defined(__clang__)
 #define food_web_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -96,11 +96,11 @@ static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width
     const size_t n = sizes != NULL ? sizes[0] : 0;
     if (n < food_web_least[0] || n > SIZE_MAX / 128 / food_web_RESERVED) return 0;
     const size_t wide = (n + 7) / 8 * 8;
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* multiples of 512 share cache sets */
     return 1;
 }
 
-/* The whole row. */
+/* The record of the whole row. */
 static inline food_web_row food_web_row_of(const food_web_solver *s)
 {
     food_web_row row;
@@ -114,13 +114,13 @@ static inline food_web_row food_web_row_of(const food_web_solver *s)
 
 enum { food_web_PIECE = 256 }; /* sites of a work item, for any number of threads */
 
-/* Number of segments of the row; the last one is the longest, so that halos copy from one segment only. */
+/* Number of segments of the row; the last is the longest, so that a halo copies from one segment only. */
 static size_t food_web_units(const food_web_solver *s)
 {
     return s->length < 2 * food_web_PIECE ? 1 : (size_t)s->length / food_web_PIECE;
 }
 
-/* Segment with this number, a work item of threads. */
+/* Segment number `unit` of the row, a work item of threads. */
 static inline food_web_row food_web_piece_of(const food_web_solver *s, size_t unit)
 {
     food_web_row row = food_web_row_of(s);
@@ -129,14 +129,14 @@ static inline food_web_row food_web_piece_of(const food_web_solver *s, size_t un
     return row;
 }
 
-#define food_web_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
+#define food_web_ROUNDER 6755399441055744.0 /* 1.5 * 2^52: adding it rounds to integers */
 
-/* exp(u) - 2^k, and 2^k, where u = k log 2 + r; branch-free. */
+/* Compute exp(u) - 2^k and *power = 2^k, where k is the integer nearest to u / log 2; branch-free. */
 static inline double food_web_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + food_web_ROUNDER, k = shifted - food_web_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the last bits of shifted are k */
+    uint64_t bits; /* of shifted, whose last bits are k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
@@ -240,17 +240,17 @@ static void food_web_vector_field_row(const food_web_row *row, double *restrict 
 }
 
 /* ---- Bonds ---- */
-/* Whether the numbers of sites and bonds fit their types. */
+/* Whether the numbers of sites and of ends of bonds fit into int. */
 static int food_web_few(size_t sites, size_t bonds) { return sites < INT_MAX && bonds < INT_MAX / 2; }
 
-/* Bytes for sites and bonds, after the rows of fields. */
+/* Number of bytes for tables of sites and bonds; in memory they follow the rows of fields. */
 static size_t food_web_graph_size(size_t sites, size_t bonds)
 {
     const size_t integers = 4 * sites + 1 + 4 * bonds;
     return food_web_BOND_ARRAYS * 2 * bonds * sizeof(double) + integers * sizeof(int);
 }
 
-/* Whether all bonds connect two different existing sites. */
+/* Whether each bond connects two different sites of the lattice. */
 static int food_web_connected(const food_web_bonds *bonds, size_t sites)
 {
     if (!food_web_few(sites, bonds != NULL ? bonds->count : 0)) return 0;
@@ -262,7 +262,7 @@ static int food_web_connected(const food_web_bonds *bonds, size_t sites)
     return 1;
 }
 
-/* Greedy colouring: each site takes the first colour that none of its earlier neighbours has. */
+/* Colour the sites: each one takes the first colour that none of its earlier neighbours by bonds has. */
 static void food_web_colour(food_web_solver *s, int *used_by)
 {
     const int sites = (int)s->sites;
@@ -281,7 +281,7 @@ static void food_web_colour(food_web_solver *s, int *used_by)
         s->flows += food_web_by_colour[part] ? s->colour_count : 1;
 }
 
-/* List the bonds of each site in order, those that start at the site first. */
+/* Make the table of bonds: for each site, in order, the bonds that start there, then those that end there. */
 static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, double *memory)
 {
     const size_t sites = s->sites, count = bonds != NULL ? bonds->count : 0;
@@ -293,13 +293,13 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
     s->number = s->other + 2 * count;
     memset(s->bonds, 0, (2 * sites + 1) * sizeof *s->bonds);
     for (size_t k = 0; k < 2 * count; ++k) ++(k % 2 == 0 ? s->bonds : s->middle)[bonds->ends[k]];
-    int end = 0; /* number of bonds so far */
+    int end = 0; /* number of ends of bonds at the sites so far */
     for (size_t i = 0; i < sites; ++i) {
         s->bonds[i] = end += s->bonds[i];
         s->middle[i] = end += s->middle[i];
     }
     s->bonds[sites] = end;
-    for (size_t k = count; k-- > 0;) { /* backwards, which turns ends of lists into their starts */
+    for (size_t k = count; k-- > 0;) { /* in reverse, since entries move the end of a list to its start */
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
         const int begins = --s->bonds[a], ends = --s->middle[b];
         s->other[begins] = (int)b;
@@ -313,9 +313,9 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
 /* ---- The lattice ---- */
 #define food_web_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
-enum { food_web_BUFFER = 256 }; /* number of densities summed in one pass */
+enum { food_web_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 
-/* Doubles from one array to the next. */
+/* Number of doubles from one array to the next. */
 static size_t food_web_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
@@ -341,7 +341,7 @@ static void food_web_take(const food_web_solver *s, double *const *fields, doubl
         memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
-/* Store the values of a parameter at sites, or one value for all sites. */
+/* Store a parameter at all sites: its values, or if values is NULL, `value` everywhere. */
 static void food_web_put_parameter(const food_web_solver *s, double *rows, const double *values, double value)
 {
     for (ptrdiff_t i = 0; i < s->width; ++i) rows[i] = value;
@@ -410,7 +410,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     return food_web_OK;
 }
 
-/* Compute coefficients for the step size h, if h has changed. */
+/* Compute the coefficients for steps of size h, if h has changed. */
 static food_web_status food_web_set_step(food_web_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return food_web_BAD_ARGUMENT;
@@ -441,7 +441,7 @@ static void food_web_copy(double *const *to, double *const *from, const food_web
 /* ---- The flows ---- */
 enum { food_web_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply the flow kind: 0 first, 1 all inner ones, 2 last, 3 inner ones in reverse order. */
+/* Apply flows of a step: kind 0 the first, 1 all inner ones, 2 the last, 3 all inner ones in reverse. */
 static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef)
 {
     const int last = s->flows - 1;
@@ -450,14 +450,14 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
         food_web_sweep_colour(s, kind == 1 ? flow : last - flow, coef);
 }
 
-/* Apply flow `number` of a step; number food_web_FLOWS is the last merged with the first. */
+/* Apply flow `number` of a step; food_web_FLOWS means the last flow merged with the first one. */
 static void food_web_apply_flow(const food_web_solver *s, size_t steps, int number)
 {
     (void)steps;
     food_web_sweep_part(s, food_web_flow_parts[number], s->coef + number * food_web_ROW);
 }
 
-/* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
+/* Make some steps but for the last flow, which the next step merges; 0 steps: make the last flow alone. */
 static void food_web_steps(const food_web_solver *s, size_t steps)
 {
     if (steps == 0) food_web_apply_flow(s, s->steps - 1, food_web_FLOWS - 1);
@@ -467,7 +467,7 @@ static void food_web_steps(const food_web_solver *s, size_t steps)
     }
 }
 
-/* Make some steps from the state in s->before, or restore it and return 0 if values are not finite. */
+/* Make some steps from the state in s->before. If values are not finite, restore this state and return 0. */
 static int food_web_try(food_web_solver *s, size_t steps)
 {
     food_web_steps(s, steps);
@@ -476,8 +476,8 @@ static int food_web_try(food_web_solver *s, size_t steps)
     return 0;
 }
 
-/* Make steps from s->before, equal to s->x, without the last flow of the last step. Values are checked after
-   several steps; if they are not finite, these steps are repeated one by one. */
+/* Make steps from the state s->before, which equals s->x, except for the last flow of the last step. Values
+   are checked after several steps; if they are not finite, these steps are repeated one by one. */
 static food_web_status food_web_march(food_web_solver *s, size_t steps)
 {
     const size_t end = s->steps + steps;
@@ -499,10 +499,10 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
     food_web_status status = food_web_set_step(s, h);
     if (status != food_web_OK || steps == 0) return status;
-    /* an open flow is merged with the next */
+    /* if the last flow is still to be merged with the next, the state is s->before */
     food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = food_web_march(s, steps);
-    if (s->open && !food_web_try(s, 0)) { /* the last flow of the last step; s->before stays before it */
+    if (s->open && !food_web_try(s, 0)) { /* makes the last flow; s->before remains before it */
         status = food_web_NOT_FINITE;
         s->open = 0;
         --s->steps;

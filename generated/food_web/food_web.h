@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ff5afcc3d59dfb964744049b3c3250836300d6bb205d7319e82de3a5640be22a
+ * body-sha256: 51e9ad682652de171bcf36ea4242ce1380efddc5d6745dd3546668311e1f1fc4
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -31,9 +31,9 @@ enum { food_web_BOND_ARRAYS = 1 };   /* parameters at bonds */
 typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food_web_NOT_FINITE,
     food_web_BAD_ARGUMENT } food_web_status;
 
-/* A solver, initialised by food_web_init. Its arrays lie in memory of the caller: a copy of the struct is no
-   independent solver. A field lies in rows, all sites along the last axis, with a halo where steps read other
-   sites: copies of the other end beside each end. Only read the struct, at any time. */
+/* A solver, initialised by food_web_init. Its arrays lie in memory of the caller, so a copy is no independent
+   solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a halo: copies
+   of the other end beside each end. Callers may only read the struct. */
 typedef struct {
     size_t sizes[food_web_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
@@ -83,9 +83,9 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void food_web_state(const food_web_solver *s, double *x);
 
-/* Save and restore a run with the same bits: food_web_saved writes far and arrays x[field][site], and returns
-   their number, at most that of fields, with compensated steps three times that. food_web_resume takes all
-   three after food_web_init with the state. */
+/* Save and restore a run: it continues with the same bits. food_web_saved writes far and arrays
+   x[array][site], and returns their number: at most that of fields, or three times that with compensated
+   steps. To restore, call food_web_resume with these after food_web_init. */
 size_t food_web_saved(const food_web_solver *s, double *x, size_t *far);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t fields, size_t far);
 

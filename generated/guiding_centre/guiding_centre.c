@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: eb8db355e8820b7e82b258801a9570c6bd262fe8e36e7ed4c11b12abf9bd94a8
+ * body-sha256: 719c14399d33bd20683b6008076f265c8f57b97987061d3036e165f91287e5f0
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -125,8 +125,8 @@ static int guiding_centre_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
-   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
+   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static int guiding_centre_advance(guiding_centre_solver *s, const double *change, const double *small)
 {
     double x[guiding_centre_DIM], carry[guiding_centre_DIM];
@@ -178,8 +178,8 @@ static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centr
 /* ---- Predictors ---- */
 #define guiding_centre_REACH 4.0 /* largest distance from the last value, relative to it */
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far
-   away, where the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
+   there the equation of a step has solutions unrelated to the motion. */
 static int guiding_centre_predict(const guiding_centre_history *history, double value[guiding_centre_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -217,8 +217,8 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
 #define guiding_centre_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
-   equation may have solutions far away, at another energy, unrelated to the motion. */
+/* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+   is too large may have solutions far away, at another energy, unrelated to the motion. */
 static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
     const double increment[guiding_centre_DIM])
 {
@@ -232,14 +232,14 @@ static int guiding_centre_plausible(const guiding_centre_solver *s, int stage,
     for (int i = 0; i < guiding_centre_DIM; ++i)
         size += fabs(guiding_centre_fractions[stage] * s->h * field[i]);
     if (distance <= guiding_centre_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
+    for (int k = 0; k < 3; ++k) { /* energy at the start, halfway, and at the end */
         for (int i = 0; i < guiding_centre_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = guiding_centre_hamiltonian(&s->params, point);
     }
     return fabs(H[2] - H[0]) <= guiding_centre_MAX_ENERGY_CHANGE * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 
-/* Coefficient k of the product of two Taylor series. */
+/* Coefficient k of the product of two Taylor series, whose coefficients are the entries of a and b. */
 static double guiding_centre_taylor_product(const double *a, const double *b, int k)
 {
     double sum = 0.0;
@@ -247,7 +247,8 @@ static double guiding_centre_taylor_product(const double *a, const double *b, in
     return sum;
 }
 
-/* a[0] times coefficient k >= 1 of the Taylor series of b = a^r, from a b' = r a' b. */
+/* a[0] times coefficient k >= 1 of the Taylor series of b = a^r, from a b' = r a' b; coefficients of b before
+   k are known. */
 static double guiding_centre_taylor_power(const double *a, const double *b, double r, int k)
 {
     double sum = 0.0;
@@ -464,8 +465,9 @@ enum {
 /* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define guiding_centre_CONTRACTING 0.05
 
-/* Whether the slope of an expansion at a point m is pi(m) p. If not, the expansion only seems to have
-   converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value. */
+/* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to
+   have converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute
+   value. */
 static int guiding_centre_holds(const double *coef, const double p[guiding_centre_DIM],
     const double m[guiding_centre_DIM], const double slope[guiding_centre_DIM])
 {
@@ -477,9 +479,9 @@ static int guiding_centre_holds(const double *coef, const double p[guiding_centr
     return 1;
 }
 
-/* Compute the path m(t) from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start, mean the mean
-   of m - start. Terms are added until they are negligible. Returns 0 if guiding_centre_TERMS terms do not
-   suffice. */
+/* Compute the path dm/dt = pi(m) p from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start,
+   mean the mean of m - start. Terms are added until they are negligible. Returns 0 if guiding_centre_TERMS
+   terms do not suffice. */
 static int guiding_centre_piece(const double *coef, const double p[guiding_centre_DIM],
     const double start[guiding_centre_DIM], double change[guiding_centre_DIM],
     double mean[guiding_centre_DIM])
@@ -511,9 +513,10 @@ static int guiding_centre_piece(const double *coef, const double p[guiding_centr
     return 0;
 }
 
-/* Compute the whole path from x, in 1, 2, 4, ... pieces until each expansion converges: change is its end
-   minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x. Returns 0
-   if the path is too long or leaves the domain. *made counts all pieces. */
+/* Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is
+   its end minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x.
+   Returns 0 if the path is too long or leaves the domain of pi. *pieces_used increases by the number of
+   computed pieces. */
 static int guiding_centre_path(const double *coef, const double x[guiding_centre_DIM],
     const double p[guiding_centre_DIM], double change[guiding_centre_DIM], double mean[guiding_centre_DIM],
     int *pieces_used)
@@ -557,7 +560,7 @@ static int guiding_centre_residual(guiding_centre_solver *s, const double *coef,
     return 1;
 }
 
-/* Compute the Jacobian of the residual by differences, for steps so large that iterations with the
+/* Compute the Jacobian of the residual by differences. It serves for steps so large that iterations with the
    approximate Jacobian do not converge. */
 static int guiding_centre_differences(guiding_centre_solver *s, const double *coef,
     const double p[guiding_centre_DIM], const double residual[guiding_centre_DIM],
@@ -576,8 +579,9 @@ static int guiding_centre_differences(guiding_centre_solver *s, const double *co
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path. A step
-   that needs more than guiding_centre_MOST_PIECES pieces is too large for a meaningful solution. */
+/* Make one stage: solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that
+   path; S_h is the generating function. A step that needs more than guiding_centre_MOST_PIECES pieces is too
+   large for a meaningful solution. */
 static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, int stage)
 {
     const double *coef = s->coef[stage];
@@ -615,7 +619,7 @@ static guiding_centre_status guiding_centre_attempt(guiding_centre_solver *s, in
 }
 
 /* ---- The solver ---- */
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM])
 {
@@ -634,7 +638,7 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     return guiding_centre_OK;
 }
 
-/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
+/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
 static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int stage)
 {
     const guiding_centre_status status = guiding_centre_attempt(s, stage);
@@ -662,7 +666,7 @@ static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return guiding_centre_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
             guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
         s->h = h;

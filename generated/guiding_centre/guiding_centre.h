@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 78d70f674f7cd04c033d3989862ba412c98a2459eae347d189008610ed239dbd
+ * body-sha256: 72b6595048b9d5251df031dbc3da601834e5e1ac75f533e08dab5b7faa6d256e
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -34,10 +34,11 @@ typedef enum { guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_cen
     guiding_centre_NOT_FINITE, guiding_centre_BAD_ARGUMENT } guiding_centre_status;
 const char *guiding_centre_status_string(guiding_centre_status status); /* the meaning of a status */
 
-/* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
+/* Predictor: the last solution y and its backward differences, which extrapolate the next. For speed only. */
 typedef struct {
-    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
-    double difference[guiding_centre_DIFFERENCES][guiding_centre_DIM]; /* the solution, then differences */
+    int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
+    /* the last solution, then its differences */
+    double difference[guiding_centre_DIFFERENCES][guiding_centre_DIM];
 } guiding_centre_history;
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
@@ -56,11 +57,11 @@ typedef struct {
     /* predictor of the starting value of the iteration */
     guiding_centre_history history[guiding_centre_STAGES];
 } guiding_centre_solver;
-size_t guiding_centre_solver_size(void); /* bytes; for languages that cannot read the struct */
+size_t guiding_centre_solver_size(void); /* in bytes, for languages that cannot read the struct */
 size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s);
 
-/* Initialise *s with x0; params = NULL means the defaults. Returns guiding_centre_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
+/* Initialise *s with the state x0; params = NULL for the defaults. Returns guiding_centre_BAD_ARGUMENT, with
+   *s unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM]);
 
@@ -73,8 +74,8 @@ guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double 
 guiding_centre_status guiding_centre_set_state(guiding_centre_solver *s, const double x[guiding_centre_DIM]);
 guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double change[guiding_centre_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
-   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
+   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

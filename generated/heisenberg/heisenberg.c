@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: a47c45d61e8e77e6004369a616dac1a029cf4b4a601c41d58cb55c8e43309bb9
+ * body-sha256: ffd91172e66969b30c06c4f350b7b066930c89f8d01a8b33b39eab48672d6c2a
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -17,7 +17,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
+#define restrict /* no keyword of C++; Microsoft's compiler refuses it in the brackets of an array */
 #endif
 
 /* ---- The model ---- */
@@ -32,21 +32,22 @@ enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { heisenberg_FLOWS = 5 }; /* flows in a step */
 enum { heisenberg_SPAN = 1 }; /* neighbouring slices that a flow reads on each side; see wavefront blocking */
 
-/* Along each axis: the smallest size, whether the ends are open. */
+/* Along each axis: the smallest number of sites, whether the ends are open. */
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
 static const int heisenberg_open[heisenberg_AXES] = { 0, 0, 0 };
 
-/* Rows that kernels read, by their offsets along all axes but the last. */
+/* Rows of sites that kernels read, by their offsets from the updated row along all axes but the last. */
 static const int heisenberg_lines[heisenberg_LINES][heisenberg_AXES] = { { 0, 0, 0 }, { -1, 0, 0 },
     { 0, -1, 0 }, { 0, 1, 0 }, { 1, 0, 0 } };
 
 /* Times of the flows, as fractions of a step, one for each row of coefficients; the last merges two flows. */
 static const double heisenberg_times[heisenberg_ROWS_OF_FLOWS] = { 0.5, 0.5, 1.0, 0.5, 0.5, 1.0 };
 
-/* The part of H of each flow. */
+/* For each row of coefficients, the part of H whose flow uses it. */
 static const unsigned char heisenberg_flow_parts[heisenberg_ROWS_OF_FLOWS] = { 1, 2, 3, 2, 1, 1 };
 
-/* For each part of H: planes read before and after a site, fields read there, fields changed. */
+/* For each part of H: numbers of planes read before and after the updated one, fields read there, fields
+   changed. */
 static const heisenberg_stage heisenberg_stages_of[] = { { 1, 1, 1, 6 }, { 1, 1, 2, 5 }, { 1, 1, 4, 3 } };
 
 /* Whether all parameters are finite and within their bounds. */
@@ -74,7 +75,7 @@ typedef struct {
     ptrdiff_t from, to;  /* first site of the segment, and the one after the last */
 } heisenberg_row;
 
-/* Before a loop over sites: tells the compiler that iterations are independent. */
+/* Stands before loops over sites: it tells the compiler that their iterations are independent. */
 #if defined(__clang__)
 #define heisenberg_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -84,7 +85,7 @@ typedef struct {
 #define heisenberg_EACH_SITE
 #endif
 
-/* Update the halo for the sites from..to: copies of the other end, or mirrored values of weight 0. */
+/* Update the halo for changed sites from ... to - 1: copies of the other end, or mirrored (weight 0). */
 static inline void heisenberg_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)
@@ -106,12 +107,12 @@ static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *w
         rows *= sizes[a];
     }
     size_t wide = heisenberg_LEAD + ((sizes[heisenberg_AXES - 1] + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
-    if (wide % 512 == 0) wide += 8; /* rows pages apart share cache sets */
+    if (wide % 512 == 0) wide += 8; /* multiples of 512 share cache sets */
     *width = (ptrdiff_t)wide;
     return rows > most / wide ? 0 : rows;
 }
 
-/* Position of a row along all axes but the last. */
+/* Compute the position of row number `index` along all axes but the last. */
 static inline void heisenberg_place(const heisenberg_solver *s, size_t index,
     ptrdiff_t place[heisenberg_AXES])
 {
@@ -122,7 +123,7 @@ static inline void heisenberg_place(const heisenberg_solver *s, size_t index,
     }
 }
 
-/* Addresses of a row and its neighbours. */
+/* Compute the offsets in memory of a row and its neighbours. */
 static void heisenberg_find_lines(const heisenberg_solver *s, size_t index, ptrdiff_t at[heisenberg_LINES])
 {
     ptrdiff_t place[heisenberg_AXES];
@@ -132,7 +133,7 @@ static void heisenberg_find_lines(const heisenberg_solver *s, size_t index, ptrd
         for (int a = 0; a < heisenberg_AXES - 1; ++a) {
             const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
             ptrdiff_t p = place[a] + heisenberg_lines[k][a];
-            if (heisenberg_open[a]) { /* mirrored, as in heisenberg_ends */
+            if (heisenberg_open[a]) { /* rows beyond open ends are mirrored; their values have the weight 0 */
                 p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
                 p = p < 0 ? 0 : p < size ? p : size - 1;
             } else {
@@ -144,14 +145,14 @@ static void heisenberg_find_lines(const heisenberg_solver *s, size_t index, ptrd
     }
 }
 
-/* Store the addresses of all rows and their neighbours in memory. */
+/* Store the offsets of all rows and their neighbours in memory, for s->lines. */
 static void heisenberg_find_all_lines(heisenberg_solver *s, double *memory)
 {
     s->lines = (ptrdiff_t *)(void *)memory;
     for (size_t r = 0; r < s->rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
 }
 
-/* Row with this number, a work item of threads. */
+/* Row number `index`, a work item of threads. */
 static inline heisenberg_row heisenberg_piece_of(const heisenberg_solver *s, size_t index)
 {
     heisenberg_row row;
@@ -163,11 +164,11 @@ static inline heisenberg_row heisenberg_piece_of(const heisenberg_solver *s, siz
     return row;
 }
 
-/* work items of threads: the rows */
+/* number of work items for threads: the rows */
 static size_t heisenberg_units(const heisenberg_solver *s) { return s->rows; }
 
-/* Before a loop over the sites of a segment, rounded up to whole vectors of 8; the excess lies in the halo,
-   which is updated afterwards. */
+/* Restrict a row to the sites from ... to - 1, for a loop over them that is rounded up to whole vectors of 8.
+   Excess sites lie in the halo, which is updated afterwards. */
 static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     row->from = from;
@@ -175,7 +176,7 @@ static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrd
     return row;
 }
 
-#define heisenberg_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
+#define heisenberg_ROUNDER 6755399441055744.0 /* 1.5 * 2^52: adding it rounds to integers */
 
 /* sin u for loops over lanes: u = k pi + r with |r| <= pi/2; branch-free. NaN for |u| > 10^8. */
 static inline double heisenberg_sin_lane(double u)
@@ -183,7 +184,7 @@ static inline double heisenberg_sin_lane(double u)
     const double shifted = u * 0.3183098861837907 + heisenberg_ROUNDER, k = shifted - heisenberg_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of the rounded u */
+    uint64_t parity, bits; /* bits of shifted, whose last one is the parity of k */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -523,7 +524,7 @@ static void heisenberg_vector_field_row(const heisenberg_row *row, double *restr
 #ifdef __cplusplus
 extern "C" {
 #endif
-int omp_get_num_threads(void); /* declared as in omp.h, which compilers without OpenMP lack */
+int omp_get_num_threads(void); /* declared here as in omp.h, a header that may be missing */
 int omp_get_thread_num(void);
 #ifdef __cplusplus
 }
@@ -537,7 +538,8 @@ int omp_get_thread_num(void);
 #define heisenberg_THREAD (size_t)0
 #endif
 
-/* The share of a thread in a number of work items: from *first on; returns its end. */
+/* Divide a number of work items among the threads. The share of the calling thread begins at *first; its end
+   is returned. */
 static size_t heisenberg_share(size_t units, size_t *first)
 {
     const size_t threads = heisenberg_THREADS, thread = heisenberg_THREAD, each = units / threads,
@@ -550,16 +552,16 @@ static size_t heisenberg_share(size_t units, size_t *first)
 static void heisenberg_wait(void)
 {
 #ifdef _OPENMP
-    if (heisenberg_THREADS > 1) { /* a barrier may cost a system call even for one thread */
+    if (heisenberg_THREADS > 1) { /* even for one thread a barrier may cost a system call */
 #pragma omp barrier
     }
 #endif
 }
 
-enum { heisenberg_BUFFER = 256 }; /* number of densities summed in one pass */
+enum { heisenberg_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 
-/* Doubles from one array to the next. Arrays start at different places of their pages: a load that has the
-   page offset of a pending store would wait for it. */
+/* Number of doubles from one array to the next. Arrays start at different offsets in memory pages, since a
+   load would wait for a pending store with the same offset. */
 static size_t heisenberg_block(size_t rows, ptrdiff_t width)
 {
     const size_t block = rows * (size_t)width, apart = 512 / heisenberg_ARRAYS / 8 * 8;
@@ -595,7 +597,7 @@ static void heisenberg_take(const heisenberg_solver *s, double *const *fields, d
                 (size_t)s->length * sizeof *x);
 }
 
-/* Store the values of a parameter at sites, or one value for all sites. */
+/* Store a parameter at all sites: its values, or if values is NULL, `value` everywhere. */
 static void heisenberg_put_parameter(const heisenberg_solver *s, double *rows, const double *values,
     double value)
 {
@@ -655,7 +657,7 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     return heisenberg_OK;
 }
 
-/* Compute coefficients for the step size h, if h has changed. */
+/* Compute the coefficients for steps of size h, if h has changed. */
 static heisenberg_status heisenberg_set_step(heisenberg_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return heisenberg_BAD_ARGUMENT;
@@ -687,10 +689,11 @@ static void heisenberg_copy(double *const *to, double *const *from, const heisen
 }
 
 /* ---- The flows ---- */
-enum { heisenberg_STRETCH = 32 };   /* steps between checks for finite values */
-enum { heisenberg_FAR_STEPS = 64 }; /* steps with full-range functions, after one that needed them */
+enum { heisenberg_STRETCH = 32 }; /* steps between checks for finite values */
+/* number of steps with functions for arguments of any size, after a step that needed them */
+enum { heisenberg_FAR_STEPS = 64 };
 
-/* Apply the flow of one part of H. */
+/* Apply the flow of one part of H; called by all threads together. */
 static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const double *coef, int far)
 {
     size_t first, end = heisenberg_share(heisenberg_units(s), &first);
@@ -698,13 +701,14 @@ static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const do
     heisenberg_wait();
 }
 
-/* A part of H, and the coefficients of its flow. */
+/* A flow to apply: the part of H, and the coefficients of its flow. */
 typedef struct {
     int part;           /* the part of H */
     const double *coef; /* its coefficients */
 } heisenberg_flow;
 
-/* Set *flow to flow `number` of a step; number heisenberg_FLOWS is the last merged with the first. */
+/* Set *flow to flow `number` of the step that follows `steps` steps; heisenberg_FLOWS is the last flow merged
+   with the first. */
 static void heisenberg_set_flow(const heisenberg_solver *s, size_t steps, int number, heisenberg_flow *flow)
 {
     flow->part = heisenberg_flow_parts[number];
@@ -720,18 +724,18 @@ static void heisenberg_apply_flow(const heisenberg_solver *s, size_t steps, int 
 }
 
 /* ---- Wavefront (temporal) blocking ---- */
-/* If the fields exceed the caches, several flows pass over the lattice together, slice by slice, each
-   heisenberg_SPAN slices behind the one before, so that a slice is loaded once for all of them. Each thread
-   has its own slices. At the ends of these, flow k first leaves out k heisenberg_SPAN slices, which are made
-   after all threads have come so far. Each flow reads the same values as in separate passes: the bits are the
-   same. */
-/* most flows in a block; bytes that their slices may take */
+/* If the fields exceed the caches, several flows pass over the lattice together, slice by slice. Each flow is
+   heisenberg_SPAN slices behind the flow before it, so that a slice is loaded once for all of them. Each
+   thread has its own range of slices. At the ends of the range, flow k first leaves out k heisenberg_SPAN
+   slices, which are updated when all threads have reached their ends. Each flow reads the same values as in
+   separate passes, so the bits are the same. */
+/* largest number of flows in a block; bytes of cache for their slices */
 enum { heisenberg_DEEPEST = 16, heisenberg_CACHE = 1 << 21 };
 
 /* Number of slices: all rows with one index of the first axis form a slice. */
 static size_t heisenberg_slices(const heisenberg_solver *s) { return s->sizes[0]; }
 
-/* Number of flows in a block; 1 for no blocking. */
+/* Number of flows that pass over the lattice together; 1 if blocking does not pay. */
 static size_t heisenberg_depth(const heisenberg_solver *s)
 {
     const size_t slices = heisenberg_slices(s), bytes = s->rows * (size_t)s->width * heisenberg_ARRAYS
@@ -770,7 +774,8 @@ static void heisenberg_make_wave(const heisenberg_solver *s, const heisenberg_fl
     heisenberg_wait();
 }
 
-/* Apply the flows of some steps, merged, without the last one. */
+/* Apply the flows of some steps but for the last flow; the last flow of a step is merged with the first of
+   the next. */
 static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
 {
     const size_t each = heisenberg_FLOWS - 1, depth = heisenberg_depth(s);
@@ -786,7 +791,7 @@ static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
     }
 }
 
-/* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
+/* Make some steps but for the last flow, which the next step merges; 0 steps: make the last flow alone. */
 static void heisenberg_shared_steps(const heisenberg_solver *s, size_t steps)
 {
     if (steps == 0) heisenberg_apply_flow(s, s->steps - 1, heisenberg_FLOWS - 1);
@@ -799,7 +804,7 @@ static void heisenberg_steps(const heisenberg_solver *s, size_t steps)
     heisenberg_shared_steps(s, steps);
 }
 
-/* Make some steps from the state in s->before, or restore it and return 0 if values are not finite. */
+/* Make some steps from the state in s->before. If values are not finite, restore this state and return 0. */
 static int heisenberg_try(heisenberg_solver *s, size_t steps)
 {
     heisenberg_steps(s, steps);
@@ -808,7 +813,8 @@ static int heisenberg_try(heisenberg_solver *s, size_t steps)
     return 0;
 }
 
-/* Apply the last flow of a step, with full-range functions if needed; returns whether values are finite. */
+/* Apply the last flow of a step, if needed with functions for arguments of any size; returns whether values
+   are finite. */
 static int heisenberg_close(heisenberg_solver *s)
 {
     if (heisenberg_try(s, 0)) return 1;
@@ -819,8 +825,8 @@ static int heisenberg_close(heisenberg_solver *s)
     return done;
 }
 
-/* Make steps from s->before, equal to s->x, without the last flow of the last step. Values are checked after
-   several steps; if they are not finite, these steps are repeated one by one. */
+/* Make steps from the state s->before, which equals s->x, except for the last flow of the last step. Values
+   are checked after several steps; if they are not finite, these steps are repeated one by one. */
 static heisenberg_status heisenberg_march(heisenberg_solver *s, size_t steps)
 {
     const size_t end = s->steps + steps;
@@ -829,7 +835,7 @@ static heisenberg_status heisenberg_march(heisenberg_solver *s, size_t steps)
         if (s->far > 0 && s->far < now) now = s->far;
         if (!heisenberg_try(s, now)) {
             if (now == 1 && s->far > 0) return heisenberg_NOT_FINITE;
-            /* small-argument functions return NaN out of range */
+            /* the fast functions give NaN if an argument is too large */
             if (now == 1) s->far = heisenberg_FAR_STEPS;
             stretch = now > 1 ? 1 : heisenberg_STRETCH;
             continue;
@@ -846,10 +852,10 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
 {
     heisenberg_status status = heisenberg_set_step(s, h);
     if (status != heisenberg_OK || steps == 0) return status;
-    /* an open flow is merged with the next */
+    /* if the last flow is still to be merged with the next, the state is s->before */
     heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = heisenberg_march(s, steps);
-    if (s->open && !heisenberg_close(s)) { /* the last flow of the last step; s->before stays before it */
+    if (s->open && !heisenberg_close(s)) { /* makes the last flow; s->before remains before it */
         status = heisenberg_NOT_FINITE;
         s->open = 0;
         --s->steps;
@@ -862,7 +868,7 @@ heisenberg_status heisenberg_step(heisenberg_solver *s, double h) { return heise
 
 void heisenberg_state(const heisenberg_solver *s, double *x) { heisenberg_take(s, s->x, x); }
 
-/* Set the state to x + factor * state. */
+/* Set the state to x + factor * (present state), if all values are finite. */
 static heisenberg_status heisenberg_move(heisenberg_solver *s, const double *x, double factor)
 {
     if (s == NULL || x == NULL) return heisenberg_BAD_ARGUMENT;
@@ -898,7 +904,7 @@ heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenbe
     if (!heisenberg_finite(coef, heisenberg_COEFFICIENTS)) return heisenberg_BAD_ARGUMENT;
     s->params = *params;
     heisenberg_put_parameters(s, params);
-    s->prepared = 0; /* so that the next step starts as with a new step size */
+    s->prepared = 0; /* so that the next step computes all coefficients */
     s->open = 0;
     s->far = 0;
     return heisenberg_OK;
@@ -970,7 +976,8 @@ void heisenberg_vector_field(const heisenberg_solver *s, double *out)
 }
 
 /* ---- Caller-driven stepping ---- */
-/* Sweeps with a number: those of a step and, without noise, the merged last and first one. */
+/* Number of stages that callers can make: those of a step and, without noise, the last one merged with the
+   first. */
 enum { heisenberg_NUMBERED = heisenberg_FLOWS + 1 };
 
 size_t heisenberg_stages(void) { return heisenberg_FLOWS; }

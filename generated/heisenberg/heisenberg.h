@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cc00d6b09298354dc79630ba85a164be1824d6d08a435569d3bef21de2b9d562
+ * body-sha256: 5104f5193f4928fd1e7fb658aba418f534ae23a35e9af2b1645c1954abaee6ba
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -29,9 +29,9 @@ enum { heisenberg_COEFFICIENTS = 18 }; /* numbers that are functions of params a
 typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
     heisenberg_BAD_ARGUMENT } heisenberg_status;
 
-/* A solver, initialised by heisenberg_init. Its arrays lie in memory of the caller: a copy of the struct is
-   no independent solver. A field lies in rows, all sites along the last axis, with a halo where steps read
-   other sites: copies of the other end beside each end. Only read the struct, at any time. */
+/* A solver, initialised by heisenberg_init. Its arrays lie in memory of the caller, so a copy is no
+   independent solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a
+   halo: copies of the other end beside each end. Callers may only read the struct. */
 typedef struct {
     size_t sizes[heisenberg_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
@@ -51,7 +51,7 @@ typedef struct {
     double t_before_h;
 } heisenberg_solver;
 
-/* Bytes that heisenberg_init needs for these sizes; 0 if they are not admissible. */
+/* Number of bytes that heisenberg_init needs for these sizes; 0 if they are not admissible. */
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has heisenberg_work_size(sizes)
@@ -80,9 +80,9 @@ heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
    then changes nothing. */
 heisenberg_status heisenberg_set_parameters(heisenberg_solver *s, const heisenberg_params *params);
 
-/* Save and restore a run with the same bits: heisenberg_saved writes far and arrays x[field][site], and
-   returns their number, at most that of fields, with compensated steps three times that. heisenberg_resume
-   takes all three after heisenberg_init with the state. */
+/* Save and restore a run: it continues with the same bits. heisenberg_saved writes far and arrays
+   x[array][site], and returns their number: at most that of fields, or three times that with compensated
+   steps. To restore, call heisenberg_resume with these after heisenberg_init. */
 size_t heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t fields,
     size_t far);
@@ -97,13 +97,13 @@ void heisenberg_vector_field(const heisenberg_solver *s, double *out);
 /* Caller-driven stepping, for lattices distributed over several memories. A plane is all sites with the same
    index of the first axis. A step consists of the stages 0 ... heisenberg_stages() - 1; each is a sweep over
    all planes. Without noise, stage number heisenberg_stages() is the last stage of a step merged with the
-   first of the next, as in heisenberg_integrate. A stage may be made in parts, in any order, with the same
-   bits as heisenberg_step. Before a part is swept, all planes that it reads must have completed the stages
-   before. */
+   first of the next step, as heisenberg_integrate does. A stage may be made in parts, in any order, with the
+   same bits as heisenberg_step. Before a part is made, all planes that it reads must have completed the
+   earlier stages. */
 typedef struct {
-    size_t behind, ahead; /* number of planes read before the first swept one, and after the last */
-    /* fields that are read there, and fields that are changed; bit k is field k */
-    unsigned long read, changed;
+    /* number of planes that are read before the first updated one, and after the last */
+    size_t behind, ahead;
+    unsigned long read, changed; /* fields read there, and fields that are updated: bit k is 1 for field k */
 } heisenberg_stage;
 
 size_t heisenberg_stages(void);

@@ -8,9 +8,9 @@
  *   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
  * SPDX-License-Identifier: 0BSD
- * Contents: The model; The explicit step; The energy level e = -H(x0) and the monitor dt/dtau; The
- *   solver
- * body-sha256: 54814e3feb5a38d3525e3a468462bf0bbd20db7ef184835cc38445329fa0d697
+ * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
+ *   the monitor dt/dtau; The solver
+ * body-sha256: 39ad8aa75548731769c63858d88307ddeb9ca3f4e032af8f37b99026f2a9b89e
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -22,7 +22,7 @@ const kepler_eccentric_params kepler_eccentric_default_params = { 1e-06 };
 enum { kepler_eccentric_ROWS_OF_FLOWS = 35 }; /* durations of flows, each with its coefficients */
 enum { kepler_eccentric_ROW = 4 };            /* coefficients in a row */
 
-/* The times of flows, as fractions of h: one for each row of coefficients. */
+/* Times of the flows of a step, as fractions of h: one for each row of coefficients. */
 static const double kepler_eccentric_times[kepler_eccentric_ROWS_OF_FLOWS] = { 0.06510124154444503,
     0.13020248308889007, 0.3456827324319992, 0.5611629817751084, 0.08584400956513055, -0.38947496264484727,
     -0.11531652804484584, 0.1588419065551556, -0.11853099378904099, -0.39590389413323757,
@@ -84,8 +84,8 @@ static int kepler_eccentric_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
-   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
+   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static int kepler_eccentric_advance(kepler_eccentric_solver *s, const double *change, const double *small)
 {
     double x[kepler_eccentric_DIM], carry[kepler_eccentric_DIM];
@@ -212,12 +212,12 @@ static void kepler_eccentric_prepare(const kepler_eccentric_params *params,
     }
 }
 
-/* Quantities that flows update: the state, the physical time, and a sum that becomes NaN outside the domain
-   of a logarithm. */
+/* Indices of quantities that flows update, after the coordinates: the physical time, and a sum that becomes
+   NaN outside the domain of a logarithm. kepler_eccentric_ALONG is the number of all. */
 enum { kepler_eccentric_TIME = kepler_eccentric_DIM, kepler_eccentric_DOMAIN, kepler_eccentric_ALONG };
 
-/* Make one step: the exact flows of the parts of K, one after the other. If it fails, the state is
-   unchanged. */
+/* Make one step: the exact flows of the parts of the Hamiltonian K, one after the other. If it fails, the
+   state is unchanged. */
 static kepler_eccentric_status kepler_eccentric_stages(kepler_eccentric_solver *s)
 {
     double x[kepler_eccentric_ALONG] = { 0.0 }, displacement[kepler_eccentric_ALONG] = { 0.0 },
@@ -234,7 +234,7 @@ static kepler_eccentric_status kepler_eccentric_stages(kepler_eccentric_solver *
     return kepler_eccentric_OK;
 }
 
-/* ---- The energy level e = -H(x0) and the monitor dt/dtau ---- */
+/* ---- The energy level e = -H(x0), a constant of a trajectory, and the monitor dt/dtau ---- */
 static void kepler_eccentric_choose_gauge(const kepler_eccentric_params *params,
     const double x[kepler_eccentric_DIM], double gauge[kepler_eccentric_GAUGES])
 {
@@ -250,7 +250,7 @@ static int kepler_eccentric_time_passes(const kepler_eccentric_params *params,
 }
 
 /* ---- The solver ---- */
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
     const double gauge[kepler_eccentric_GAUGES])
@@ -283,7 +283,7 @@ kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return kepler_eccentric_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         kepler_eccentric_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
     }
@@ -300,8 +300,8 @@ kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double
     return kepler_eccentric_integrate(s, h, 1);
 }
 
-/* Set the energy level to that of the new state s->x. Returns 0, with the former state, if the new state is
-   not admissible. */
+/* Set the energy level e to -H of the new state s->x. If the new state is not admissible, restore the former
+   state and return 0. */
 static int kepler_eccentric_take_level(kepler_eccentric_solver *s, const double from[kepler_eccentric_DIM],
     const double carry[kepler_eccentric_DIM])
 {
@@ -314,7 +314,7 @@ static int kepler_eccentric_take_level(kepler_eccentric_solver *s, const double 
         return 0;
     }
     memcpy(s->gauge, level, sizeof level);
-    /* if s->h is NaN, the next step computes them */
+    /* if s->h is NaN, the next step computes the coefficients */
         kepler_eccentric_prepare(&s->params, s->gauge, s->h, s->coef);
     return 1;
 }

@@ -1,7 +1,7 @@
 /*
  * The declarations of kepler_eccentric.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2489061c3136a237f6924d338249f4d438885824beca5639963dac4898589f08
+ * body-sha256: 06cb02a576b89dd9956cbe81f636ae62c93ee5e887efc43a1671f61c2c2b8077
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -48,24 +48,24 @@ typedef struct {
     double gauge[kepler_eccentric_GAUGES];
     double coef[kepler_eccentric_COEFFICIENTS]; /* functions of params and h, computed when h changes */
 } kepler_eccentric_solver;
-size_t kepler_eccentric_solver_size(void); /* bytes; for languages that cannot read the struct */
+size_t kepler_eccentric_solver_size(void); /* in bytes, for languages that cannot read the struct */
 size_t kepler_eccentric_solver_steps_done(const kepler_eccentric_solver *s);
 double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 
-/* Initialise *s with x0; params = NULL means the defaults. Returns kepler_eccentric_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
-/* It returns the same if kepler_eccentric_monitor is not positive at x0. */
+/* Initialise *s with the state x0; params = NULL for the defaults. Returns kepler_eccentric_BAD_ARGUMENT,
+   with *s unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
+/* It also returns kepler_eccentric_BAD_ARGUMENT if kepler_eccentric_monitor is not positive at x0. */
 kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM]);
 
-/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). Steps with one e follow
-   one Hamiltonian. */
+/* As kepler_eccentric_init, with the energy level e = gauge[0] in place of -H(x0). All steps with the same e
+   follow one Hamiltonian. */
 kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
     const double gauge[kepler_eccentric_GAUGES]);
 
-/* Make steps of size h in tau, of either sign; s->t increases by their physical time. If one fails, s->x is
-   the state before it, after s->steps steps. */
+/* Make one step or many, of size h in tau, which may be negative; s->t increases by their physical time. If a
+   step fails, s->x is the state before it, after s->steps steps. */
 kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double h);
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps);
 
@@ -77,8 +77,8 @@ kepler_eccentric_status kepler_eccentric_set_state(kepler_eccentric_solver *s,
 kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
     const double change[kepler_eccentric_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
-   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
+   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
 kepler_eccentric_status kepler_eccentric_ensemble(const kepler_eccentric_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 7583f87a16831329ba6db78d7aab6e362c59df88fe3994541fd0a25705868947
+ * body-sha256: 4bd96dc3449d841d8055ebb068167aa64f6e843b0dbba002cd099c8d3466701c
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -18,7 +18,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
+#define restrict /* no keyword of C++; Microsoft's compiler refuses it in the brackets of an array */
 #endif
 
 /* ---- The model ---- */
@@ -90,14 +90,14 @@ static int kowalevski_gauss_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
-   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
+   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static inline int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const double *change,
     const double *small)
 {
-    /* a number less itself is 0, if it is finite */
+    /* x - x is 0 if x is finite, else NaN */
     double x[kowalevski_gauss_DIM], carry[kowalevski_gauss_DIM], zero = 0.0;
-    /* x is available after two additions; the others are off the critical path */
+    /* x needs two additions; the next step does not wait for the others */
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) {
         const double total = change[i] + small[i], more = total - change[i];
         const double sum = s->x[i] + total, added = sum - s->x[i];
@@ -107,7 +107,7 @@ static inline int kowalevski_gauss_advance(kowalevski_gauss_solver *s, const dou
             + (small[i] - more));
     }
     if (!(zero == 0.0)) return 0;
-    /* One by one, as they are read next: a load of several numbers would wait until all have been stored. */
+    /* Copy one number at a time: a load of several would wait until all of them have been stored. */
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) s->x[i] = x[i];
     for (int i = 0; i < kowalevski_gauss_DIM; ++i) s->carry[i] = carry[i];
     return 1;
@@ -125,9 +125,9 @@ typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES] __attribute__((ali
 typedef double kowalevski_gauss_lanes[kowalevski_gauss_LANES];
 #endif
 
-/* Before a loop over lanes: tells the compiler that iterations are independent. */
+/* Stands before loops over lanes: it tells the compiler that their iterations are independent. */
 #if defined(__clang__)
-/* Loops over lanes are not unrolled by clang, which would then vectorise the loops around them instead. */
+/* clang must not unroll loops over lanes, since it would then vectorise the loops around them instead. */
 #define kowalevski_gauss_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -165,8 +165,8 @@ static const double kowalevski_gauss_mixing[kowalevski_gauss_NODES][kowalevski_g
 };
 
 enum { kowalevski_gauss_PREDICTORS = 3 };
-/* Predictors of the stages of a step, from the stage increments of the last step, then of the step before.
-   The last one reads the last step only. */
+/* Weights of the predictors of the stages of a step: of the stage increments of the last step, then of those
+   of the step before it. The last predictor uses the last step only. */
 static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kowalevski_gauss_EARLIER
     * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH] = {
     {
@@ -257,14 +257,15 @@ static const double kowalevski_gauss_prediction[kowalevski_gauss_PREDICTORS][kow
     }
 };
 
-/* The sum of values at all stages. */
+/* Sum of the values of all stages. */
 static inline double kowalevski_gauss_total(const double values[kowalevski_gauss_WIDTH])
 {
     return (((values[0] + values[4]) + (values[2] + values[6])) + ((values[1] + values[5])
         + (values[3] + values[7])));
 }
 
-/* For each stage, a weighted sum of the increments of one unknown at all stages. */
+/* For each stage, a sum of the increments of one unknown at all stages, with weights from a column of the
+   matrix. */
 static inline void kowalevski_gauss_mix(const double matrix[kowalevski_gauss_NODES][kowalevski_gauss_WIDTH],
     const double increment[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
 {
@@ -284,7 +285,8 @@ static inline void kowalevski_gauss_mixed(const double matrix[kowalevski_gauss_N
     }
 }
 
-/* As kowalevski_gauss_mix, with the increments of two steps. */
+/* For each stage, a weighted sum of the increments of one unknown at all stages of a step and of the step
+   before. */
 static inline void kowalevski_gauss_mix_twice(const double matrix[kowalevski_gauss_EARLIER
     * (int)kowalevski_gauss_NODES][kowalevski_gauss_WIDTH], const double increment[kowalevski_gauss_WIDTH],
     const double before[kowalevski_gauss_WIDTH], double at[kowalevski_gauss_WIDTH])
@@ -364,7 +366,7 @@ static void kowalevski_gauss_next_frame_lanes(const double coef[1], const double
 }
 
 /* ---- The implicit step, by Gauss collocation ---- */
-/* Copy the data of the start of a step, kowalevski_gauss_POINT numbers, the coordinates first. */
+/* Copy the data at the start of a step, kowalevski_gauss_POINT numbers; the coordinates come first. */
 static void kowalevski_gauss_start(const kowalevski_gauss_solver *s, double point[kowalevski_gauss_POINT])
 {
     memcpy(point, s->x, sizeof s->x);
@@ -384,9 +386,9 @@ static inline void kowalevski_gauss_slopes(const kowalevski_gauss_solver *s,
     kowalevski_gauss_stage_field_lanes(s->coef, point, z, weights, increments);
 }
 
-/* Compute factors f_j: the collocation polynomial at a fraction of a step, minus its value at the end of the
-   step, is the sum of f_j times the increment of stage j. The factors are integrals of Lagrange polynomials
-   from 1 to the fraction, divided by the weights, by sums of Legendre polynomials. */
+/* Compute the factors f_j of the stage increments in the collocation polynomial at a fraction of a step,
+   minus its value at the end of the step. They are the integrals of the Lagrange polynomials from 1 to the
+   fraction, divided by the weights; they are computed by sums of Legendre polynomials. */
 static void kowalevski_gauss_factors_at(double fraction, double factor[kowalevski_gauss_NODES])
 {
     const double x = 2.0 * fraction - 1.0;
@@ -410,11 +412,11 @@ static void kowalevski_gauss_factors_at(double fraction, double factor[kowalevsk
     }
 }
 
-/* Sweeps iterate all unknowns, and read them. */
+/* Sweeps read and iterate all unknowns. */
 #define kowalevski_gauss_READ(r) (r)
 
-/* Values of the unknowns in a step of another size, the last one times a ratio, by the collocation
-   polynomial. */
+/* Predict the unknowns z at the stages of a step whose size is ratio times that of the last step, by the
+   collocation polynomial of the last step. */
 static void kowalevski_gauss_predict_at(kowalevski_gauss_history *past, double ratio,
     kowalevski_gauss_lanes *z)
 {
@@ -427,7 +429,7 @@ static void kowalevski_gauss_predict_at(kowalevski_gauss_history *past, double r
     }
 }
 
-/* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
+/* Weight of squared changes of coordinates: 1 / |x|^2, or 1 / |increments|^2 if x = 0. */
 static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowalevski_gauss_lanes *increments)
 {
     double square = DBL_MIN;
@@ -438,8 +440,8 @@ static double kowalevski_gauss_scale(const double x[kowalevski_gauss_DIM], kowal
     return 1.0 / square;
 }
 
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates and
-   functionals, and the size of group elements. */
+/* Squared change of the unknowns by a sweep, as a mean over the stages. Changes of coordinates and
+   functionals have the weight scale, those of group elements the weight element_scale. */
 static inline double kowalevski_gauss_change_of(double scale, double element_scale, int count,
     kowalevski_gauss_lanes *before, kowalevski_gauss_lanes *after)
 {
@@ -455,7 +457,8 @@ static inline double kowalevski_gauss_change_of(double scale, double element_sca
     return element_scale * (kowalevski_gauss_total(sum) / (double)kowalevski_gauss_NODES);
 }
 
-/* Predict the values that sweeps read, from the increments of the last steps. */
+/* Predict the values that sweeps read, from the stage increments of the last steps; predictor is a row of
+   kowalevski_gauss_prediction. */
 static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int predictor,
     kowalevski_gauss_lanes reads[kowalevski_gauss_UNKNOWNS])
 {
@@ -465,13 +468,13 @@ static inline void kowalevski_gauss_predict(kowalevski_gauss_history *past, int 
         for (int r = 0; r < kowalevski_gauss_UNKNOWNS; ++r)
             kowalevski_gauss_mix_twice(kowalevski_gauss_prediction[predictor], last[kowalevski_gauss_READ(r)],
             older[kowalevski_gauss_READ(r)], reads[r]);
-    else /* the last predictor reads one step only */
+    else /* the last predictor uses the last step only */
         for (int r = 0; r < kowalevski_gauss_UNKNOWNS; ++r)
             kowalevski_gauss_mix(kowalevski_gauss_prediction[predictor], last[kowalevski_gauss_READ(r)],
             reads[r]);
 }
 
-/* Number of the predictor whose prediction is nearest to the values that the last sweep of a step has
+/* Number of the predictor whose prediction is nearest to reads, the values that the last sweep of a step has
    read. */
 static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, double scale, double element_scale,
     kowalevski_gauss_lanes *reads)
@@ -491,8 +494,8 @@ static int kowalevski_gauss_best_predictor(kowalevski_gauss_history *past, doubl
     return best;
 }
 
-/* Transform stage increments of a step to the frame of its end, where the next step starts. The step begins
-   at point. */
+/* Transform stage increments of a step, which begins at point, to the frame at its end, which the next step
+   uses. */
 static void kowalevski_gauss_to_next_frame(const kowalevski_gauss_solver *s,
     double point[kowalevski_gauss_POINT], const double end[kowalevski_gauss_UNKNOWNS],
     kowalevski_gauss_lanes *increments,
@@ -500,17 +503,17 @@ static void kowalevski_gauss_to_next_frame(const kowalevski_gauss_solver *s,
 {
     kowalevski_gauss_lanes in_frame[kowalevski_gauss_UNKNOWNS];
     kowalevski_gauss_next_frame_lanes(s->coef, point, end, increments, in_frame);
-    memcpy(in_next_frame, in_frame, sizeof in_frame); /* may be unaligned */
+    memcpy(in_next_frame, in_frame, sizeof in_frame); /* to a place that may be unaligned */
 }
 
-/* Store the stage increments of a step from a point with this end, to predict the next step. */
+/* Store the stage increments of a step from point, whose sum is end, to predict the next step. */
 static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, double point[kowalevski_gauss_POINT],
     const double end[kowalevski_gauss_UNKNOWNS], kowalevski_gauss_lanes *increments)
 {
     kowalevski_gauss_history *past = &s->history;
     const int older = past->latest;
     past->latest = kowalevski_gauss_EARLIER - 1 - older;
-    if (s->h != past->h) past->count = 0; /* predictors read steps of one size */
+    if (s->h != past->h) past->count = 0; /* predictors need steps of equal size */
     past->h = s->h;
     past->kicked = 0;
     kowalevski_gauss_lanes last[kowalevski_gauss_UNKNOWNS];
@@ -535,14 +538,14 @@ enum {
 /* sweeps end at the second change below this that is no smaller than the last */
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
-/* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if they do not
-   converge. last is the change before the latest one. *usual is updated to the factor by which changes
-   shrink, *first to the number of the first sweep of the next step whose change is measured. */
+/* The last change; consecutive sweeps whose change grew; sweeps whose change grew near rounding level. */
 typedef struct {
     double last;
     int rising, rises;
 } kowalevski_gauss_progress;
 
+/* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if not. Updates
+   *usual, the factor by which they shrink, and *first, the sweep from which the next step measures. */
 static int kowalevski_gauss_judge(double *usual, int *first, kowalevski_gauss_progress *sweeps, int sweep,
     double change)
 {
@@ -553,7 +556,7 @@ static int kowalevski_gauss_judge(double *usual, int *first, kowalevski_gauss_pr
     if (rate >= 1.0 && change <= kowalevski_gauss_NEARLY_ROUNDING) ++sweeps->rises;
     sweeps->last = change;
     if ((slow && change <= kowalevski_gauss_ROUNDING) || sweeps->rises > 1) {
-        /* the first measured change may have been at rounding level already */
+        /* fewer sweeps may suffice: an earlier change may have been at rounding level already */
         *first = (sweep == *first || rate > 2.0 * *usual ? *first : sweep) - 1;
         return 1;
     }
@@ -562,8 +565,8 @@ static int kowalevski_gauss_judge(double *usual, int *first, kowalevski_gauss_pr
     return sweeps->rising < (int)kowalevski_gauss_NODES + kowalevski_gauss_MOST_RISING ? 0 : -1;
 }
 
-/* Solve for the increments of all stages by fixed-point sweeps, starting from the prediction. Changes are
-   measured only from the sweep on that is expected to be the last. */
+/* Solve the equations of a step for the increments of all stages, by fixed-point sweeps from the prediction.
+   Changes are measured only from the sweep on that is expected to be the last. */
 static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solver *s,
     double point[kowalevski_gauss_POINT], kowalevski_gauss_lanes *increments)
 {
@@ -599,7 +602,7 @@ static kowalevski_gauss_status kowalevski_gauss_collocate(kowalevski_gauss_solve
             if (!isfinite(square)) return kowalevski_gauss_NOT_FINITE;
             if (judgement < 0) return kowalevski_gauss_NO_CONVERGENCE;
             if (judgement > 0) {
-                /* the latest change is about the error before the last sweep: if it is small, that sweep was
+                /* the last change is about the error before the last sweep: if it is small, this sweep was
                    not needed */
                 if (solved)
                     past->sweeps = square <= 16.0 * kowalevski_gauss_SOLVED * kowalevski_gauss_SOLVED
@@ -632,7 +635,7 @@ static kowalevski_gauss_status kowalevski_gauss_attempt(kowalevski_gauss_solver 
 }
 
 /* ---- The solver ---- */
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     const kowalevski_gauss_params *params, const double x0[kowalevski_gauss_DIM])
 {
@@ -649,7 +652,7 @@ kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     return kowalevski_gauss_OK;
 }
 
-/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
+/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
 static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s)
 {
     const kowalevski_gauss_status status = kowalevski_gauss_attempt(s);
@@ -661,7 +664,7 @@ static kowalevski_gauss_status kowalevski_gauss_stage(kowalevski_gauss_solver *s
 kowalevski_gauss_status kowalevski_gauss_integrate(kowalevski_gauss_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return kowalevski_gauss_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         kowalevski_gauss_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;
@@ -697,7 +700,7 @@ kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
 {
     if (s == NULL || change == NULL) return kowalevski_gauss_BAD_ARGUMENT;
     if (!kowalevski_gauss_advance(s, change, s->carry)) return kowalevski_gauss_BAD_ARGUMENT;
-    s->history.kicked = 1; /* the increments of the last step still predict those of the next one */
+    s->history.kicked = 1; /* increments of the last step still predict those of the next */
     return kowalevski_gauss_OK;
 }
 
@@ -741,7 +744,7 @@ size_t kowalevski_gauss_solver_steps_done(const kowalevski_gauss_solver *s) { re
 
 /* ---- Members of an ensemble ---- */
 /* Arguments of an ensemble. per_member = 1: member m has the parameters params[m] and the step h[m];
-   per_member = 0: all have those of member 0. */
+   per_member = 0: all members have params[0] and h[0]. */
 typedef struct {
     double *x;
     size_t members, steps, per_member;
@@ -766,7 +769,8 @@ static kowalevski_gauss_members kowalevski_gauss_asked(const kowalevski_gauss_pa
     return all;
 }
 
-/* Initialise a member at a state, with its parameters and all coefficients for its step size. */
+/* Initialise a solver for member m at the state x, with its parameters and all coefficients for its step
+   size. */
 static kowalevski_gauss_status kowalevski_gauss_begin_member(const kowalevski_gauss_members *all, size_t m,
     const double x[kowalevski_gauss_DIM], kowalevski_gauss_solver *s)
 {
@@ -776,7 +780,7 @@ static kowalevski_gauss_status kowalevski_gauss_begin_member(const kowalevski_ga
         : status;
 }
 
-/* Initialise a member at its state in the ensemble, which is copied to x. */
+/* Initialise a solver for member m at its state in the ensemble, which is copied to x. */
 static kowalevski_gauss_status kowalevski_gauss_take_member(const kowalevski_gauss_members *all, size_t m,
     double x[kowalevski_gauss_DIM], kowalevski_gauss_solver *s)
 {
@@ -792,7 +796,7 @@ static size_t kowalevski_gauss_to_frame(const kowalevski_gauss_members *all, siz
         : left;
 }
 
-/* Write the frame of a member, if one is due after this number of steps: x, or NaN if x is NULL. */
+/* If a frame is due after `done` steps, write x to it, or NaN if x is NULL, for a member that has failed. */
 static void kowalevski_gauss_put_frame(const kowalevski_gauss_members *all, size_t m, size_t done,
     const double *x)
 {
@@ -801,7 +805,8 @@ static void kowalevski_gauss_put_frame(const kowalevski_gauss_members *all, size
             ? x[i] : (double)NAN;
 }
 
-/* Make the remaining steps of a member, one by one. */
+/* Make the remaining steps of member m by itself; `done` steps have been made, status is the present
+   status. */
 static kowalevski_gauss_status kowalevski_gauss_end_member(const kowalevski_gauss_members *all, size_t m,
     size_t done, kowalevski_gauss_solver *s, kowalevski_gauss_status status)
 {

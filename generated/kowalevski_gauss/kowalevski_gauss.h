@@ -1,7 +1,7 @@
 /*
  * The declarations of kowalevski_gauss.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: de1b0a0f95be7ed4208eadc49dd5ae4d9ba8b129ddb769ea8fd87be2ec159ae4
+ * body-sha256: 4df95f2c96c5a6e9fdb088527a7948814e6882bf73dbfe9df90bc4f297e92b59
  */
 #ifndef KOWALEVSKI_GAUSS_H
 #define KOWALEVSKI_GAUSS_H
@@ -34,10 +34,10 @@ typedef enum { kowalevski_gauss_OK = 0, kowalevski_gauss_NO_CONVERGENCE, kowalev
     kowalevski_gauss_NOT_FINITE, kowalevski_gauss_BAD_ARGUMENT } kowalevski_gauss_status;
 const char *kowalevski_gauss_status_string(kowalevski_gauss_status status); /* the meaning of a status */
 
-/* Results of the last steps, by which the next one predicts the starting values of its iteration. They affect
+/* Results of the last steps, from which the starting values of the next iteration are predicted. They affect
    the speed only, except for a frame, which belongs to the state. */
 typedef struct {
-    int count;     /* steps in increments */
+    int count;     /* number of steps in increments */
     int latest;    /* index of the last step in increments */
     int sweeps;    /* number of the first sweep over the stages whose change is measured */
     int predictor; /* row of kowalevski_gauss_prediction that predicts the next step */
@@ -47,7 +47,7 @@ typedef struct {
     double rate; /* factor by which the changes of a sweep shrink from one sweep to the next */
     int kicked;  /* whether the state was changed since the last step */
     double h;    /* size of the last step */
-    /* stage increments of the last steps, in the frame of the end of the last one */
+    /* stage increments of the last steps, in the frame at the end of the last step */
     double increments[kowalevski_gauss_EARLIER][kowalevski_gauss_UNKNOWNS][kowalevski_gauss_WIDTH];
 } kowalevski_gauss_history;
 
@@ -65,11 +65,11 @@ typedef struct {
     double t_before_h;
     kowalevski_gauss_history history; /* predictor of the starting value of the iteration */
 } kowalevski_gauss_solver;
-size_t kowalevski_gauss_solver_size(void); /* bytes; for languages that cannot read the struct */
+size_t kowalevski_gauss_solver_size(void); /* in bytes, for languages that cannot read the struct */
 size_t kowalevski_gauss_solver_steps_done(const kowalevski_gauss_solver *s);
 
-/* Initialise *s with x0; params = NULL means the defaults. Returns kowalevski_gauss_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
+/* Initialise *s with the state x0; params = NULL for the defaults. Returns kowalevski_gauss_BAD_ARGUMENT,
+   with *s unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
 kowalevski_gauss_status kowalevski_gauss_init(kowalevski_gauss_solver *s,
     const kowalevski_gauss_params *params, const double x0[kowalevski_gauss_DIM]);
 
@@ -84,21 +84,21 @@ kowalevski_gauss_status kowalevski_gauss_set_state(kowalevski_gauss_solver *s,
 kowalevski_gauss_status kowalevski_gauss_kick(kowalevski_gauss_solver *s,
     const double change[kowalevski_gauss_DIM]);
 
-/* The states at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial:
-   x[r * kowalevski_gauss_DIM + i] is x_i at fraction[r]. They are far less accurate than steps, and off the
-   symplectic leaf by their error; they serve to find events. To get the state at an event as accurately as by
-   whole steps, make a step of size (fraction - 1) h with a copy of *s. Returns kowalevski_gauss_BAD_ARGUMENT
-   before the first step, and after a change of the state. */
+/* States at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial: x[r *
+   kowalevski_gauss_DIM + i] is x_i at fraction[r]. They serve to find events, are far less accurate than
+   steps, and lie off the symplectic leaf by their error. For a state at an event with the accuracy of steps,
+   make a step of size (fraction - 1) h with a copy of *s. Returns kowalevski_gauss_BAD_ARGUMENT before the
+   first step, and after a change of the state. */
 kowalevski_gauss_status kowalevski_gauss_interpolate(const kowalevski_gauss_solver *s, const double *fraction,
     size_t count, double *x);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
-   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
+   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
 kowalevski_gauss_status kowalevski_gauss_ensemble(const kowalevski_gauss_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
 
-/* kowalevski_gauss_ensemble for members with parameters params[m] and step size h[m]. params may be NULL for
-   the defaults. */
+/* kowalevski_gauss_ensemble for members with separate parameters params[m] and step sizes h[m]. params may be
+   NULL for the defaults. */
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * kowalevski_gauss_DIM + i)
    * members + m] is coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before.
    Arrays must not overlap. */

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fec6d3ea5526885a2c0e02d5051e7861c218cf6d84330ac5185912b5e23b678a
+ * body-sha256: 2c3606081ac28a48814844b27cfff45ded4affa22ac50340645173394ccf1c2e
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -65,8 +65,8 @@ static int pendulum_euler_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
-   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
+   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static int pendulum_euler_advance(pendulum_euler_solver *s, const double *change, const double *small)
 {
     double x[pendulum_euler_DIM], carry[pendulum_euler_DIM];
@@ -82,7 +82,7 @@ static int pendulum_euler_advance(pendulum_euler_solver *s, const double *change
     return 1;
 }
 
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM])
 {
@@ -104,7 +104,7 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return pendulum_euler_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         pendulum_euler_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -1,7 +1,7 @@
 /*
  * The declarations of pendulum_euler.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8a08312e0838a2c1f01ca33ee0cebc7df27eeac7ec0a533600497fe1b4e543b6
+ * body-sha256: 81340387a3785e7bbc78cb7fded2cfe50490dffd2a5ba0fbb85a391eb8470725
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -43,11 +43,11 @@ typedef struct {
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
 } pendulum_euler_solver;
-size_t pendulum_euler_solver_size(void); /* bytes; for languages that cannot read the struct */
+size_t pendulum_euler_solver_size(void); /* in bytes, for languages that cannot read the struct */
 size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s);
 
-/* Initialise *s with x0; params = NULL means the defaults. Returns pendulum_euler_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
+/* Initialise *s with the state x0; params = NULL for the defaults. Returns pendulum_euler_BAD_ARGUMENT, with
+   *s unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM]);
 
@@ -60,8 +60,8 @@ pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double 
 pendulum_euler_status pendulum_euler_set_state(pendulum_euler_solver *s, const double x[pendulum_euler_DIM]);
 pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double change[pendulum_euler_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
-   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
+   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

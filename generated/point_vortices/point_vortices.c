@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 206d04fc122fdd3c16039ad969e282718d85e78e6f6b1ff8b867f161605ab984
+ * body-sha256: ba7a43c56ef45007d92888af250a821be36f1eab72e21f6ad2a4a1412dcaab05
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -19,7 +19,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
+#define restrict /* no keyword of C++; Microsoft's compiler refuses it in the brackets of an array */
 #endif
 
 /* ---- The model ---- */
@@ -31,7 +31,7 @@ enum { point_vortices_ROWS_OF_FLOWS = 5 }; /* rows of coefficients */
 enum { point_vortices_SIDES = 2 };         /* arrays of y: before and after a sweep */
 enum { point_vortices_MOST_SWEEPS = 200 }; /* largest number of sweeps of a stage */
 
-/* Along each axis: the smallest size. */
+/* Along each axis: the smallest number of sites. */
 static const size_t point_vortices_least[point_vortices_AXES] = { 1 };
 
 /* The sizes of the stages, as fractions of a step, one for each row of coefficients. */
@@ -64,7 +64,7 @@ typedef struct {
     double *const *varied;             /* tangent vector: a variation of x */
 } point_vortices_row;
 
-/* Before a loop over sites: tells the compiler that iterations are independent. */
+/* Stands before loops over sites: it tells the compiler that their iterations are independent. */
 #if defined(__clang__)
 #define point_vortices_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -80,11 +80,11 @@ static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrd
     const size_t n = sizes != NULL ? sizes[0] : 0;
     if (n < point_vortices_least[0] || n > SIZE_MAX / 128 / point_vortices_RESERVED) return 0;
     const size_t wide = (n + 7) / 8 * 8;
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* multiples of 512 share cache sets */
     return 1;
 }
 
-/* The whole row. */
+/* The record of the whole row. */
 static inline point_vortices_row point_vortices_row_of(const point_vortices_solver *s)
 {
     point_vortices_row row;
@@ -98,13 +98,13 @@ static inline point_vortices_row point_vortices_row_of(const point_vortices_solv
 
 enum { point_vortices_PIECE = 256 }; /* sites of a work item, for any number of threads */
 
-/* Number of segments of the row; the last one is the longest, so that halos copy from one segment only. */
+/* Number of segments of the row; the last is the longest, so that a halo copies from one segment only. */
 static size_t point_vortices_units(const point_vortices_solver *s)
 {
     return s->length < 2 * point_vortices_PIECE ? 1 : (size_t)s->length / point_vortices_PIECE;
 }
 
-/* Segment with this number, a work item of threads. */
+/* Segment number `unit` of the row, a work item of threads. */
 static inline point_vortices_row point_vortices_piece_of(const point_vortices_solver *s, size_t unit)
 {
     point_vortices_row row = point_vortices_row_of(s);
@@ -275,7 +275,7 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 /* ---- The lattice ---- */
 #define point_vortices_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
-/* Before a loop over row segments: threads share its iterations. */
+/* Stands before loops over row segments: threads share the iterations. */
 #ifdef _OPENMP
 #define point_vortices_EACH_PIECE _Pragma("omp parallel for if (s->sites > 512)")
 #define point_vortices_ONE_BY_ONE _Pragma("omp critical")
@@ -284,10 +284,10 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 #define point_vortices_ONE_BY_ONE
 #endif
 
-enum { point_vortices_BUFFER = 256 }; /* number of densities summed in one pass */
+enum { point_vortices_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 
-/* Doubles from one array to the next. Arrays start at different places of their pages: a load that has the
-   page offset of a pending store would wait for it. */
+/* Number of doubles from one array to the next. Arrays start at different offsets in memory pages, since a
+   load would wait for a pending store with the same offset. */
 static size_t point_vortices_block(size_t rows, ptrdiff_t width)
 {
     const size_t block = rows * (size_t)width, apart = 512 / point_vortices_ARRAYS / 8 * 8;
@@ -317,7 +317,7 @@ static void point_vortices_take(const point_vortices_solver *s, double *const *f
         memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
-/* Store the values of a parameter at sites, or one value for all sites. */
+/* Store a parameter at all sites: its values, or if values is NULL, `value` everywhere. */
 static void point_vortices_put_parameter(const point_vortices_solver *s, double *rows, const double *values,
     double value)
 {
@@ -387,7 +387,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     return point_vortices_OK;
 }
 
-/* Compute coefficients for the step size h, if h has changed. */
+/* Compute the coefficients for steps of size h, if h has changed. */
 static point_vortices_status point_vortices_set_step(point_vortices_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return point_vortices_BAD_ARGUMENT;
@@ -426,14 +426,16 @@ enum {
 #define point_vortices_SLOW 0.6
 #define point_vortices_NEARLY_SETTLED 0x1p-30 /* changes below this are not left to Newton's method */
 
-enum { point_vortices_WIDTH = 32 }; /* number of partial results, so that loops vectorise */
+/* number of partial results in reductions over sites, so that these loops vectorise */
+enum { point_vortices_WIDTH = 32 };
 
 static inline void point_vortices_raise(double *largest, double value)
 {
     *largest = value > *largest ? value : *largest;
 }
 
-/* Update the largest change and the largest |y| of each field by a row segment; NaN is left out. */
+/* Update the largest change of y by a sweep, and the largest |y|, of each field, by the sites of a row
+   segment. NaN is left out. */
 static void point_vortices_measure(const point_vortices_solver *s, int now, size_t unit, double *change,
     double *size)
 {
@@ -463,8 +465,8 @@ static void point_vortices_measure(const point_vortices_solver *s, int now, size
     }
 }
 
-/* Make a fixed-point sweep from s->y[now] to the other array; coef = NULL keeps what is there. Returns the
-   change of y relative to the size of each field, not finite if y is not. */
+/* Make a fixed-point sweep from s->y[now] to s->y[1 - now]; with coef = NULL, only compare the two. Returns
+   the largest change of a field relative to its size, not finite if y is not. */
 static double point_vortices_relaxed(point_vortices_solver *s, const double *coef, int now)
 {
     const size_t units = point_vortices_units(s);
@@ -484,7 +486,7 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
     return largest_change;
 }
 
-/* Predict: s->y[0] = x + extrapolated y - x, with the halo. */
+/* Predict the solution of a stage: s->y[0] = x + (extrapolation of past y - x), with the halo. */
 static void point_vortices_predict(const point_vortices_solver *s, double *const *x, int stage)
 {
     point_vortices_EACH_PIECE
@@ -535,7 +537,7 @@ static void point_vortices_remember(point_vortices_solver *s, double *const *fro
     if (predictor->count < point_vortices_DIFFERENCES) ++predictor->count;
 }
 
-/* Clear the predictors, and return to fixed-point sweeps. */
+/* Clear the predictors; the next stage is solved by fixed-point sweeps, without a prediction. */
 static void point_vortices_forget(point_vortices_solver *s)
 {
     s->stiff = 0;
@@ -549,8 +551,8 @@ static void point_vortices_forget(point_vortices_solver *s)
 /* solutions farther from x than this, relative to x and its motion, are rejected */
 #define point_vortices_PLAUSIBLE 1.5
 
-/* Scalar product of x and y, in units of the usual size of each field. Row segments are added in order: the
-   bits do not depend on threads. */
+/* Scalar product of x and y, each field divided by its usual size. Sums of row segments are added in order,
+   so that the bits do not depend on the number of threads. */
 static double point_vortices_product(const point_vortices_solver *s, double *const *x, double *const *y)
 {
     const size_t units = point_vortices_units(s);
@@ -574,7 +576,7 @@ static double point_vortices_product(const point_vortices_solver *s, double *con
     return sum;
 }
 
-/* to = a x + b y, with the halo. */
+/* Compute to = a x + b y at all sites, and the halo of `to`. */
 static void point_vortices_combine(const point_vortices_solver *s, double *const *to, double a,
     double *const *x, double b, double *const *y)
 {
@@ -591,7 +593,7 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
     }
 }
 
-/* to = v - J v, where J is the derivative of a sweep by y at s->y[now]. */
+/* Compute to = v - J v, where J is the derivative of a sweep by y at s->y[now]. */
 static void point_vortices_multiply(const point_vortices_solver *s, const double *coef, int now,
     double *const *v, double *const *to)
 {
@@ -601,9 +603,9 @@ static void point_vortices_multiply(const point_vortices_solver *s, const double
     point_vortices_combine(s, to, 1.0, v, -1.0, to);
 }
 
-/* to = from - v, where matrix(v) = s->space[0] is solved by GMRES (Y. Saad and M. H. Schultz) with
-   point_vortices_DIRECTIONS directions, without restart. The matrix is that of point_vortices_multiply.
-   Returns the norm of s->space[0], or infinity if the solution is useless. */
+/* Compute to = from - v, where v solves A v = s->space[0] with the matrix A of point_vortices_multiply, by
+   GMRES (Y. Saad and M. H. Schultz) with point_vortices_DIRECTIONS directions, without restart. Returns the
+   norm of s->space[0], or infinity if the residual is too large for v to be useful. */
 static double point_vortices_krylov(point_vortices_solver *s, const double *coef, int now,
     double *const *from, double *const *to)
 {
@@ -647,7 +649,7 @@ static double point_vortices_krylov(point_vortices_solver *s, const double *coef
 }
 
 /* ---- Newton's method, for stages that fixed-point sweeps do not solve ---- */
-/* Sum of the distances of y from x, plus added times the sum of the sizes of x. */
+/* The sum of |y - x| + added |x| over all fields and sites, for y = s->y[side]. */
 static double point_vortices_distance(const point_vortices_solver *s, int side, double added)
 {
     double sum = 0.0;
@@ -658,9 +660,9 @@ static double point_vortices_distance(const point_vortices_solver *s, int side, 
     return sum;
 }
 
-/* Correct s->y[now] by a Newton step into the other array, with the linear equations solved in a Krylov
-   space. */
-/* Returns the change relative to the size of each field; not finite on failure. */
+/* Make a Newton correction of s->y[now], by a linear equation solved in a Krylov space; s->y[1 - now]
+   receives the result. */
+/* Returns the largest change of a field relative to its size; not finite on failure. */
 static double point_vortices_corrected(point_vortices_solver *s, const double *coef, int now)
 {
     if (!isfinite(point_vortices_relaxed(s, coef, now))) return HUGE_VAL;
@@ -669,7 +671,7 @@ static double point_vortices_corrected(point_vortices_solver *s, const double *c
     return point_vortices_relaxed(s, NULL, now);
 }
 
-/* Largest distance from x at which a solution is accepted as part of the motion. */
+/* Largest accepted distance of a solution from x: farther away, solutions are unrelated to the motion. */
 static double point_vortices_range(point_vortices_solver *s, const double *coef)
 {
     point_vortices_copy(s->y[0], s->x, s);
@@ -677,8 +679,9 @@ static double point_vortices_range(point_vortices_solver *s, const double *coef)
     return point_vortices_PLAUSIBLE * point_vortices_distance(s, 1, 1.0);
 }
 
-/* Solve for y of a stage from the prediction in s->y[0], to rounding level: by fixed-point sweeps or, if
-   s->stiff, by Newton corrections, which must end within range of x. The solution is s->y[*now]. */
+/* Solve the equation of a stage for y to rounding level, from the prediction in s->y[0]: by fixed-point
+   sweeps or, if s->stiff, by Newton corrections, whose result must not be farther than range from x. The
+   solution is s->y[*now]. */
 static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, double range,
     int *now)
 {
@@ -692,7 +695,8 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
         ++s->sweeps;
         *now = 1 - *now;
         if (!isfinite(change)) return failed;
-        /* expected change by further sweeps, at the rate change / before; or rounding level */
+        /* stop if further sweeps, at the rate change / before, would change too little, or at rounding
+           level */
         if (change * change <= shrunk * point_vortices_SETTLED || (shrunk <= 0.0
             && change <= point_vortices_ROUNDING && count > 0))
             return (s->stiff ? point_vortices_distance(s, *now, 0.0) <= range : point_vortices_all_hold(s,
@@ -704,7 +708,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
     return point_vortices_NO_CONVERGENCE;
 }
 
-/* Make the stages of a step. */
+/* Make all stages of a step: solve for y, and add the increment to x. */
 static point_vortices_status point_vortices_stages(point_vortices_solver *s)
 {
     const size_t units = point_vortices_units(s);
@@ -761,7 +765,7 @@ point_vortices_status point_vortices_step(point_vortices_solver *s, double h)
 
 void point_vortices_state(const point_vortices_solver *s, double *x) { point_vortices_take(s, s->x, x); }
 
-/* Set the state to x + factor * state. */
+/* Set the state to x + factor * (present state), if all values are finite. */
 static point_vortices_status point_vortices_move(point_vortices_solver *s, const double *x, double factor)
 {
     if (s == NULL || x == NULL) return point_vortices_BAD_ARGUMENT;
@@ -797,7 +801,7 @@ point_vortices_status point_vortices_set_parameters(point_vortices_solver *s,
     if (!point_vortices_finite(coef, point_vortices_COEFFICIENTS)) return point_vortices_BAD_ARGUMENT;
     s->params = *params;
     point_vortices_put_parameters(s, params);
-    s->prepared = 0; /* so that the next step starts as with a new step size */
+    s->prepared = 0; /* so that the next step computes all coefficients */
     return point_vortices_OK;
 }
 

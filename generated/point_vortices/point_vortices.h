@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a3c50242403e62e01f75cbd1604096c7e55bd71d835034ebfbe5aaabe73822fe
+ * body-sha256: 0b21b4964373fa3dff179553136d3ebc1197890b95595c54e45ed32a83aee2ca
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -35,13 +35,14 @@ typedef enum { point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vorti
 /* Predictor of the solution y of an implicit stage: backward differences of the last values of y - x, from
    which the starting value of the iteration is extrapolated. */
 typedef struct {
-    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
+    /* number of stored differences, and number of differences whose sum is the prediction */
+    int count, order;
     double *difference[point_vortices_DIFFERENCES][point_vortices_DIM];
 } point_vortices_predictor;
 
-/* A solver, initialised by point_vortices_init. Its arrays lie in memory of the caller: a copy of the struct
-   is no independent solver. A field lies in rows, all sites along the last axis, with a halo where steps read
-   other sites: copies of the other end beside each end. Only read the struct, at any time. */
+/* A solver, initialised by point_vortices_init. Its arrays lie in memory of the caller, so a copy is no
+   independent solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a
+   halo: copies of the other end beside each end. Callers may only read the struct. */
 typedef struct {
     size_t sizes[point_vortices_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
@@ -67,7 +68,7 @@ typedef struct {
     double t_before_h;
 } point_vortices_solver;
 
-/* Bytes that point_vortices_init needs for these sizes; 0 if they are not admissible. */
+/* Number of bytes that point_vortices_init needs for these sizes; 0 if they are not admissible. */
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: cfd68cd182d606e07b5f36ad2f654c2f54143b585510c09b5a14669a6661c477
+ * body-sha256: 7474840c22dadf3a18bbd36817578ee64124f4d6a7f9999476c9bcb9d5441ce2
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -20,7 +20,7 @@
 const predator_prey_params predator_prey_default_params = { 1.0, 0.1, 0.05, 0.5 };
 
 enum { predator_prey_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
-#define predator_prey_TOLERANCE 1e-20       /* largest estimated error after an accepted correction */
+#define predator_prey_TOLERANCE 1e-20       /* largest accepted error of a solution, relative to it */
 
 static int predator_prey_allowed(const predator_prey_params *params)
 {
@@ -117,8 +117,8 @@ static int predator_prey_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
-   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
+   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static int predator_prey_advance(predator_prey_solver *s, const double *change, const double *small)
 {
     double x[predator_prey_DIM], carry[predator_prey_DIM];
@@ -170,8 +170,8 @@ static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_D
 /* ---- Predictors ---- */
 #define predator_prey_REACH 4.0 /* largest distance from the last value, relative to it */
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far
-   away, where the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
+   there the equation of a step has solutions unrelated to the motion. */
 static int predator_prey_predict(const predator_prey_history *history, double value[predator_prey_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -209,8 +209,8 @@ static void predator_prey_remember(predator_prey_history *history, const double 
 #define predator_prey_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define predator_prey_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
-   equation may have solutions far away, at another energy, unrelated to the motion. */
+/* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+   is too large may have solutions far away, at another energy, unrelated to the motion. */
 static int predator_prey_plausible(const predator_prey_solver *s, const double increment[predator_prey_DIM])
 {
     double distance = 0.0, size = 0.0, field[predator_prey_DIM], point[predator_prey_DIM], H[3];
@@ -222,7 +222,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
     predator_prey_vector_field(&s->params, s->x, field);
     for (int i = 0; i < predator_prey_DIM; ++i) size += fabs(s->h * field[i]);
     if (distance <= predator_prey_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
+    for (int k = 0; k < 3; ++k) { /* energy at the start, halfway, and at the end */
         for (int i = 0; i < predator_prey_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = predator_prey_hamiltonian(&s->params, point);
     }
@@ -238,7 +238,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 #define predator_prey_SHRINKING 0.25
 
-/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
+/* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */
 static double predator_prey_size(const double y[predator_prey_DIM], const double delta[predator_prey_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -276,7 +276,7 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
             && size > predator_prey_SHRINKING * previous;
         previous = size;
         if (!(remaining <= predator_prey_TOLERANCE || stalled)) continue;
-        double small[predator_prey_DIM] = { 0.0 }; /* correction of the increment, and compensation */
+        double small[predator_prey_DIM] = { 0.0 }; /* correction of the increment and compensation term */
         for (int i = 0; i < predator_prey_DIM; ++i)
             for (int j = 0; j < predator_prey_DIM; ++j)
                 small[i] -= slope[i * predator_prey_DIM + j] * delta[j];
@@ -290,7 +290,7 @@ static predator_prey_status predator_prey_attempt(predator_prey_solver *s)
 }
 
 /* ---- The solver ---- */
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM])
 {
@@ -309,7 +309,7 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     return predator_prey_OK;
 }
 
-/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
+/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
 static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 {
     const predator_prey_status status = predator_prey_attempt(s);
@@ -321,7 +321,7 @@ static predator_prey_status predator_prey_stage(predator_prey_solver *s)
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return predator_prey_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         predator_prey_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d371326aa04f093142be0670c59b33dc6f1ec8b56a2ec940627d4ce441b7aa8a
+ * body-sha256: 0215b1dc50b571be858eb5370844859f010b9ca3535f1578a809fc270d80690e
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -34,10 +34,11 @@ typedef enum { predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey
     predator_prey_NOT_FINITE, predator_prey_BAD_ARGUMENT } predator_prey_status;
 const char *predator_prey_status_string(predator_prey_status status); /* the meaning of a status */
 
-/* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
+/* Predictor: the last solution y and its backward differences, which extrapolate the next. For speed only. */
 typedef struct {
-    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
-    double difference[predator_prey_DIFFERENCES][predator_prey_DIM]; /* the solution, then differences */
+    int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
+    /* the last solution, then its differences */
+    double difference[predator_prey_DIFFERENCES][predator_prey_DIM];
 } predator_prey_history;
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
@@ -54,11 +55,11 @@ typedef struct {
     double t_before_h;
     predator_prey_history history; /* predictor of the starting value of the iteration */
 } predator_prey_solver;
-size_t predator_prey_solver_size(void); /* bytes; for languages that cannot read the struct */
+size_t predator_prey_solver_size(void); /* in bytes, for languages that cannot read the struct */
 size_t predator_prey_solver_steps_done(const predator_prey_solver *s);
 
-/* Initialise *s with x0; params = NULL means the defaults. Returns predator_prey_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
+/* Initialise *s with the state x0; params = NULL for the defaults. Returns predator_prey_BAD_ARGUMENT, with
+   *s unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM]);
 
@@ -71,8 +72,8 @@ predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, 
 predator_prey_status predator_prey_set_state(predator_prey_solver *s, const double x[predator_prey_DIM]);
 predator_prey_status predator_prey_kick(predator_prey_solver *s, const double change[predator_prey_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
-   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
+   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 3341a74f00a8a99a85b9ebc1676a9fe2837d1a7d79bb0a7f8abdbd1f4496bc24
+ * body-sha256: b20c6a633201bbad63022c3c76ccc28aabf2d8348f157b2838a2a28ae1db4b7e
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -290,8 +290,8 @@ static int quaternion_top_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
-   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
+   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static int quaternion_top_advance(quaternion_top_solver *s, const double *change, const double *small)
 {
     double x[quaternion_top_DIM], carry[quaternion_top_DIM];
@@ -343,8 +343,8 @@ static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_to
 /* ---- Predictors ---- */
 #define quaternion_top_REACH 4.0 /* largest distance from the last value, relative to it */
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far
-   away, where the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
+   there the equation of a step has solutions unrelated to the motion. */
 static int quaternion_top_predict(const quaternion_top_history *history, double value[quaternion_top_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -382,8 +382,8 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
 #define quaternion_top_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
-   equation may have solutions far away, at another energy, unrelated to the motion. */
+/* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+   is too large may have solutions far away, at another energy, unrelated to the motion. */
 static int quaternion_top_plausible(const quaternion_top_solver *s,
     const double increment[quaternion_top_DIM])
 {
@@ -396,7 +396,7 @@ static int quaternion_top_plausible(const quaternion_top_solver *s,
     quaternion_top_vector_field(&s->params, s->x, field);
     for (int i = 0; i < quaternion_top_DIM; ++i) size += fabs(s->h * field[i]);
     if (distance <= quaternion_top_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
+    for (int k = 0; k < 3; ++k) { /* energy at the start, halfway, and at the end */
         for (int i = 0; i < quaternion_top_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = quaternion_top_hamiltonian(&s->params, point);
     }
@@ -697,8 +697,9 @@ enum {
 /* largest reduction factor of the residual by an iteration with a useful Jacobian */
 #define quaternion_top_CONTRACTING 0.05
 
-/* Whether the slope of an expansion at a point m is pi(m) p. If not, the expansion only seems to have
-   converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value. */
+/* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to
+   have converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute
+   value. */
 static int quaternion_top_holds(const double *coef, const double p[quaternion_top_DIM],
     const double m[quaternion_top_DIM], const double slope[quaternion_top_DIM])
 {
@@ -710,9 +711,9 @@ static int quaternion_top_holds(const double *coef, const double p[quaternion_to
     return 1;
 }
 
-/* Compute the path m(t) from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start, mean the mean
-   of m - start. Terms are added until they are negligible. Returns 0 if quaternion_top_TERMS terms do not
-   suffice. */
+/* Compute the path dm/dt = pi(m) p from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start,
+   mean the mean of m - start. Terms are added until they are negligible. Returns 0 if quaternion_top_TERMS
+   terms do not suffice. */
 static int quaternion_top_piece(const double *coef, const double p[quaternion_top_DIM],
     const double start[quaternion_top_DIM], double change[quaternion_top_DIM],
     double mean[quaternion_top_DIM])
@@ -744,9 +745,10 @@ static int quaternion_top_piece(const double *coef, const double p[quaternion_to
     return 0;
 }
 
-/* Compute the whole path from x, in 1, 2, 4, ... pieces until each expansion converges: change is its end
-   minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x. Returns 0
-   if the path is too long or leaves the domain. *made counts all pieces. */
+/* Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is
+   its end minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x.
+   Returns 0 if the path is too long or leaves the domain of pi. *pieces_used increases by the number of
+   computed pieces. */
 static int quaternion_top_path(const double *coef, const double x[quaternion_top_DIM],
     const double p[quaternion_top_DIM], double change[quaternion_top_DIM], double mean[quaternion_top_DIM],
     int *pieces_used)
@@ -790,7 +792,7 @@ static int quaternion_top_residual(quaternion_top_solver *s, const double *coef,
     return 1;
 }
 
-/* Compute the Jacobian of the residual by differences, for steps so large that iterations with the
+/* Compute the Jacobian of the residual by differences. It serves for steps so large that iterations with the
    approximate Jacobian do not converge. */
 static int quaternion_top_differences(quaternion_top_solver *s, const double *coef,
     const double p[quaternion_top_DIM], const double residual[quaternion_top_DIM],
@@ -809,8 +811,9 @@ static int quaternion_top_differences(quaternion_top_solver *s, const double *co
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path. A step
-   that needs more than quaternion_top_MOST_PIECES pieces is too large for a meaningful solution. */
+/* Make one stage: solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that
+   path; S_h is the generating function. A step that needs more than quaternion_top_MOST_PIECES pieces is too
+   large for a meaningful solution. */
 static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
 {
     const double *coef = s->coef;
@@ -848,7 +851,7 @@ static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
 }
 
 /* ---- The solver ---- */
-/* For each Casimir C the c that minimises |grad H - c grad C| at the initial state; 0 if not finite. */
+/* Compute for each Casimir C the factor c that minimises |grad H - c grad C| at x; 0 if not finite. */
 static void quaternion_top_choose_gauge(const quaternion_top_params *params,
     const double x[quaternion_top_DIM], double gauge[quaternion_top_GAUGES])
 {
@@ -860,7 +863,7 @@ static void quaternion_top_choose_gauge(const quaternion_top_params *params,
     }
 }
 
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM], const double gauge[quaternion_top_GAUGES])
 {
@@ -888,7 +891,7 @@ quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quater
     return quaternion_top_init_gauge(s, params, x0, NULL);
 }
 
-/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
+/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
 static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 {
     const quaternion_top_status status = quaternion_top_attempt(s);
@@ -900,7 +903,7 @@ static quaternion_top_status quaternion_top_stage(quaternion_top_solver *s)
 quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return quaternion_top_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         quaternion_top_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;

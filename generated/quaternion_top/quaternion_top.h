@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d0ed5e437263704c9abe0a9420f03a3916094e81e3b5ad184b8c35437d76ce86
+ * body-sha256: c40ca379b08bd46ec406af7fa35967fca54221d3a88a183c77fb650bf7a19e78
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -36,10 +36,11 @@ typedef enum { quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_
     quaternion_top_NOT_FINITE, quaternion_top_BAD_ARGUMENT } quaternion_top_status;
 const char *quaternion_top_status_string(quaternion_top_status status); /* the meaning of a status */
 
-/* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
+/* Predictor: the last solution y and its backward differences, which extrapolate the next. For speed only. */
 typedef struct {
-    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
-    double difference[quaternion_top_DIFFERENCES][quaternion_top_DIM]; /* the solution, then differences */
+    int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
+    /* the last solution, then its differences */
+    double difference[quaternion_top_DIFFERENCES][quaternion_top_DIM];
 } quaternion_top_history;
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
@@ -58,15 +59,15 @@ typedef struct {
     double t_before_h;
     quaternion_top_history history; /* predictor of the starting value of the iteration */
 } quaternion_top_solver;
-size_t quaternion_top_solver_size(void); /* bytes; for languages that cannot read the struct */
+size_t quaternion_top_solver_size(void); /* in bytes, for languages that cannot read the struct */
 size_t quaternion_top_solver_steps_done(const quaternion_top_solver *s);
 
-/* Initialise *s with x0; params = NULL means the defaults. Returns quaternion_top_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
+/* Initialise *s with the state x0; params = NULL for the defaults. Returns quaternion_top_BAD_ARGUMENT, with
+   *s unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
 quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM]);
 
-/* As quaternion_top_init, with given factors of Casimirs. The step is a Poisson map for each fixed gauge. */
+/* As quaternion_top_init, with given factors of the Casimirs, whose multiples are subtracted from H. */
 quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM], const double gauge[quaternion_top_GAUGES]);
 
@@ -79,8 +80,8 @@ quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double 
 quaternion_top_status quaternion_top_set_state(quaternion_top_solver *s, const double x[quaternion_top_DIM]);
 quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double change[quaternion_top_DIM]);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
-   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
+   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
 quaternion_top_status quaternion_top_ensemble(const quaternion_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 

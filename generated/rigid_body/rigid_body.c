@@ -9,11 +9,11 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
- *   Predictors; The implicit step, by Newton's method; The choice of the gauge: multiples of Casimirs
- *   subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's method in lanes; The
- *   residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches of members: implicit
- *   steps; Ensembles
- * body-sha256: 17c6ce26cbb976a6305013a4e51ada2ed3929489889f1920d6e3009aea630207
+ *   Predictors; The implicit step, by Newton's method; The choice of the gauge: factors of Casimirs,
+ *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
+ *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
+ *   of members: implicit steps; Ensembles
+ * body-sha256: 7ac3858a92a884027b8ac4b2d6a6ec747f1258d5ea99d381843a7a421520266f
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -23,7 +23,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
+#define restrict /* no keyword of C++; Microsoft's compiler refuses it in the brackets of an array */
 #endif
 
 /* ---- The model ---- */
@@ -32,7 +32,7 @@ const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.66666666666666
 enum { rigid_body_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 enum { rigid_body_CHECKS = 8 }; /* past solutions that the recurrence is tested on, not fitted to */
 enum { rigid_body_PASSES = 2 }; /* iterations of a block that cost as much per step as one evaluation */
-#define rigid_body_TOLERANCE 1e-20 /* largest estimated error after an accepted correction */
+#define rigid_body_TOLERANCE 1e-20 /* largest accepted error of a solution, relative to it */
 
 static int rigid_body_allowed(const rigid_body_params *params)
 {
@@ -40,7 +40,7 @@ static int rigid_body_allowed(const rigid_body_params *params)
         && isfinite(params->I3) && params->I3 > 0.0;
 }
 
-/* Polynomial with these coefficients, the constant first. */
+/* Value at s of the polynomial with these coefficients, the constant first. */
 static inline double rigid_body_polynomial(const double *coefficients, int count, double s)
 {
     double value = coefficients[--count];
@@ -356,8 +356,8 @@ static int rigid_body_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
-   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
+   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static int rigid_body_advance(rigid_body_solver *s, const double *change, const double *small)
 {
     double x[rigid_body_DIM], carry[rigid_body_DIM];
@@ -423,19 +423,20 @@ static int rigid_body_solve(double matrix[rigid_body_DIM * rigid_body_DIM], doub
 /* A fit stops adding values once the residual is below this, relative to the largest value. */
 #define rigid_body_ENOUGH 3e-12
 
-/* Regularisation of the least squares: the level of rounding. */
+/* Weight of the regularisation in the least-squares fit, relative to the largest value: the level of
+   rounding. */
 #define rigid_body_RIDGE 1e-15
 
-/* Largest accepted error of a recurrence for values it was not fitted to, relative to the largest value.
-   Beyond it, the motion is chaotic or the step long, and other predictors are as good. */
+/* Largest accepted error of a recurrence for values to which it was not fitted, relative to the largest
+   value. If the error is larger, the motion is chaotic or the step long, and other predictors are as good. */
 #define rigid_body_HOPELESS 1e-7
 
 /* equations of the least-squares problem */
 enum { rigid_body_ROWS = (int)rigid_body_REMEMBERED - rigid_body_WINDOW - rigid_body_AHEAD - rigid_body_CHECKS
     + 1 };
 
-/* Subtract multiples of one column, stored in r, from eight columns, to make them orthogonal to it. If that
-   column is one of the eight, columns up to it are unchanged, and inverse becomes 1 over its squared norm.
+/* Make eight columns orthogonal to one column, by subtracting multiples of it; r receives the factors. If the
+   column is one of the eight, columns up to it are unchanged, and *inverse becomes 1 / (its squared norm).
    The number of rows is even. */
 static void rigid_body_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8],
     double r[8])
@@ -458,7 +459,7 @@ static void rigid_body_project(int rows, double (*one)[8], int column, double *i
     }
 }
 
-/* Error of the recurrences for the last of these values. */
+/* Error of the recurrences for values that were not used in the fit, at the end of the array. */
 static double rigid_body_missed(const double *value, double (*weight)[8])
 {
     enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, CHECKS = rigid_body_CHECKS };
@@ -480,7 +481,7 @@ static double rigid_body_missed(const double *value, double (*weight)[8])
 static int rigid_body_train(rigid_body_history *history, int component)
 {
     enum { AHEAD = rigid_body_AHEAD, WINDOW = rigid_body_WINDOW, ROWS = rigid_body_ROWS };
-    /* eight columns in each part */
+    /* each part has eight columns */
     double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW];
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[rigid_body_REMEMBERED], largest = 0.0,
         left = HUGE_VAL;
@@ -495,7 +496,7 @@ static int rigid_body_train(rigid_body_history *history, int component)
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
     while (terms < WINDOW && left > rigid_body_ENOUGH * largest) {
-        /* later rows of the regularisation are zero in these columns */
+        /* the other rows, of the regularisation, are 0 in these columns */
         const int part = terms / 8, rows = ROWS + terms + 8;
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
@@ -522,7 +523,7 @@ static int rigid_body_train(rigid_body_history *history, int component)
 /* ---- Predictors ---- */
 #define rigid_body_REACH 4.0 /* largest distance from the last value, relative to it */
 
-/* Whether a prediction is near the state. Far away the equation of a step has solutions unrelated to the
+/* Whether a prediction is near `last`. Far away the equation of a step has solutions unrelated to the
    motion. */
 static int rigid_body_near(const double predicted[rigid_body_DIM], const double last[rigid_body_DIM])
 {
@@ -535,9 +536,10 @@ static int rigid_body_near(const double predicted[rigid_body_DIM], const double 
 }
 
 enum {
-    rigid_body_HISTORY = 8, /* most values that the extrapolation uses; more would amplify rounding errors */
-    rigid_body_REPAY = 150, /* cost of a fit, in steps; measured */
-    rigid_body_LONG_WAIT = 20000 /* steps until the next fit of a recurrence that has needed many */
+    /* largest number of values that the extrapolation uses; more would amplify rounding errors */
+    rigid_body_HISTORY = 8,
+    rigid_body_REPAY = 150,      /* cost of fitting a recurrence, in steps; measured */
+    rigid_body_LONG_WAIT = 20000 /* largest number of slow steps until a recurrence is fitted again */
 };
 
 /* Predict the next solution from earlier ones. Returns 0 if there is no prediction. */
@@ -562,7 +564,7 @@ static int rigid_body_predict(const rigid_body_history *history, double value[ri
     return last >= 0 && rigid_body_near(value, history->past[last]);
 }
 
-/* Select the predictor that would have been best for a solution that took several iterations. */
+/* Select the predictor that would have predicted `value` best, a solution that took several iterations. */
 static void rigid_body_judge(rigid_body_history *history, const double value[rigid_body_DIM])
 {
     double row[rigid_body_HISTORY + 1][rigid_body_DIM], predicted[rigid_body_DIM], least = HUGE_VAL,
@@ -599,8 +601,8 @@ static void rigid_body_make_room(rigid_body_history *history, int values)
     history->count = rigid_body_REMEMBERED;
 }
 
-/* Fit the recurrence to the last values; the wait until the next fit grows with every fit. Returns whether
-   the recurrence predicts well. */
+/* Fit the recurrence to the stored solutions. The number of slow steps until the next fit grows with every
+   fit. Returns whether the recurrence predicts well. */
 static int rigid_body_fit(rigid_body_history *history)
 {
     int fitted = 1;
@@ -619,7 +621,7 @@ static int rigid_body_fit(rigid_body_history *history)
     return fitted;
 }
 
-/* Update the predictor with a solution and the number of iterations it took; 1 means that the prediction was
+/* Update the predictor with a solution that took this number of iterations; 1 means that the prediction was
    good. */
 static void rigid_body_remember(rigid_body_history *history, const double value[rigid_body_DIM],
     int iterations)
@@ -635,8 +637,8 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
 #define rigid_body_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
-   equation may have solutions far away, at another energy, unrelated to the motion. */
+/* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+   is too large may have solutions far away, at another energy, unrelated to the motion. */
 static int rigid_body_plausible(const rigid_body_solver *s, const double increment[rigid_body_DIM])
 {
     double distance = 0.0, size = 0.0, field[rigid_body_DIM], point[rigid_body_DIM], H[3];
@@ -648,7 +650,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
     rigid_body_vector_field(&s->params, s->x, field);
     for (int i = 0; i < rigid_body_DIM; ++i) size += fabs(s->h * field[i]);
     if (distance <= rigid_body_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
+    for (int k = 0; k < 3; ++k) { /* energy at the start, halfway, and at the end */
         for (int i = 0; i < rigid_body_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = rigid_body_hamiltonian(&s->params, point);
     }
@@ -664,7 +666,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 #define rigid_body_SHRINKING 0.25
 
-/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
+/* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */
 static double rigid_body_size(const double y[rigid_body_DIM], const double delta[rigid_body_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -700,7 +702,7 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
         const int stalled = previous < rigid_body_NEARLY_SOLVED && size > rigid_body_SHRINKING * previous;
         previous = size;
         if (!(remaining <= rigid_body_TOLERANCE || stalled)) continue;
-        double small[rigid_body_DIM] = { 0.0 }; /* correction of the increment, and compensation */
+        double small[rigid_body_DIM] = { 0.0 }; /* correction of the increment and compensation term */
         for (int i = 0; i < rigid_body_DIM; ++i)
             for (int j = 0; j < rigid_body_DIM; ++j) small[i] -= slope[i * rigid_body_DIM + j] * delta[j];
         for (int i = 0; i < rigid_body_DIM; ++i) small[i] += s->carry[i];
@@ -712,7 +714,7 @@ static rigid_body_status rigid_body_attempt(rigid_body_solver *s)
     return rigid_body_NO_CONVERGENCE;
 }
 
-/* ---- The choice of the gauge: multiples of Casimirs subtracted from H ---- */
+/* ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ---- */
 enum {
     rigid_body_SAMPLES = 32, /* number of states along a short piece of the trajectory */
     /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
@@ -728,7 +730,7 @@ enum {
 /* errors that differ less than this, relative to all on a line, are equal: rounding must not decide */
 #define rigid_body_CLOSE_CALL 1e-12
 
-/* Direction of the motion at a point, a unit vector; 0 at equilibria. */
+/* Compute the direction of the vector field at a point, a unit vector; 0 at equilibria. */
 static void rigid_body_direction(const rigid_body_params *params, const double at[rigid_body_DIM],
     double direction[rigid_body_DIM])
 {
@@ -757,7 +759,8 @@ static void rigid_body_sample(const rigid_body_params *params, const double x[ri
     }
 }
 
-/* The sum of |pi grad S_3|^2 over the samples, where S_3 is the leading error of the method. */
+/* The leading error of the method with this gauge: the sum of |pi grad S_3|^2 over the samples, where S_3 is
+   the first error term of the modified Hamiltonian. */
 static double rigid_body_gauge_error(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
     double samples[][rigid_body_DIM])
 {
@@ -769,7 +772,8 @@ static double rigid_body_gauge_error(const rigid_body_params *params, const doub
     return sum;
 }
 
-/* Value of the error polynomial at centre + t width, by Newton's formula from forward differences. */
+/* Value of the error, a polynomial in one factor of the gauge, at centre + t width, by Newton's formula from
+   its forward differences. */
 static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1], double t)
 {
     double error = difference[rigid_body_DEGREE];
@@ -778,7 +782,7 @@ static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1],
     return error;
 }
 
-/* Return the shift of gauge[c], in units of width, that minimises the error, from its values on successively
+/* Return the shift of gauge[c], in units of width, that minimises the error, by a search on successively
    finer grids. */
 static double rigid_body_least_on_line(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
     int c, double width, double samples[][rigid_body_DIM])
@@ -807,9 +811,9 @@ static double rigid_body_least_on_line(const rigid_body_params *params, const do
     return best;
 }
 
-/* Multiples that minimise the leading error along a short piece of the trajectory, one after the other,
-   starting from the least-squares solution of grad H = sum of multiples of grad C. Zero where a result is not
-   finite. */
+/* Compute the gauge: factors of Casimirs C that minimise the leading error along a short piece of the
+   trajectory from x. Each is optimised after the other, starting from the least-squares solution of grad H =
+   sum of gauge[c] grad C_c; 0 where a result is not finite. */
 static void rigid_body_choose_gauge(const rigid_body_params *params, const double x[rigid_body_DIM],
     double gauge[rigid_body_GAUGES])
 {
@@ -839,7 +843,7 @@ static void rigid_body_choose_gauge(const rigid_body_params *params, const doubl
 }
 
 /* ---- The solver ---- */
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES])
 {
@@ -867,7 +871,7 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
     return rigid_body_init_gauge(s, params, x0, NULL);
 }
 
-/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
+/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
 static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 {
     const rigid_body_status status = rigid_body_attempt(s);
@@ -880,7 +884,7 @@ static rigid_body_status rigid_body_stage(rigid_body_solver *s)
 static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         rigid_body_prepare(&s->params, s->gauge, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;
@@ -903,10 +907,10 @@ static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h,
 /* largest relative change of the state after which predictors are shifted rather than cleared */
 #define rigid_body_NEAR_BY 0.125
 
-/* Shift the predictors with the state, for as many past values as the extrapolation needs: a motion through x
-   would have had past values that differ by the change of the state and by the difference of the slopes.
-   Recurrences are dropped, as they were fitted to the former motion. After a large change, the next step
-   clears the predictors. */
+/* Shift the past solutions that the extrapolation needs, after a change of the state: past solutions of a
+   motion through the new x differ by the change of the state, and by the change of the vector field times the
+   time since then. Recurrences are dropped, since they were fitted to the former motion. After a large
+   change, the next step clears the predictors. */
 static void rigid_body_shift_predictors(rigid_body_solver *s, const double from[rigid_body_DIM])
 {
     double distance = 0.0, size = 0.0, before[rigid_body_DIM], slope[rigid_body_DIM];
@@ -958,7 +962,7 @@ rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_bo
     if (s == NULL || params == NULL) return rigid_body_BAD_ARGUMENT;
     rigid_body_solver changed = *s;
     changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step starts as with a new step size */
+    changed.h = (double)NAN; /* so that the next step computes all coefficients */
     rigid_body_prepare(&changed.params, changed.gauge, rigid_body_PROBE_STEP, changed.coef);
     if (!rigid_body_finite(changed.x, rigid_body_DIM) || !rigid_body_allowed(&changed.params)
         || !rigid_body_finite(changed.coef, rigid_body_COEFFICIENTS))
@@ -993,7 +997,7 @@ typedef double rigid_body_lanes[rigid_body_LANES] __attribute__((aligned(64))); 
 typedef double rigid_body_lanes[rigid_body_LANES];
 #endif
 
-/* Before a loop over lanes: tells the compiler that iterations are independent. */
+/* Stands before loops over lanes: it tells the compiler that their iterations are independent. */
 #if defined(__clang__)
 #define rigid_body_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic push
@@ -1197,7 +1201,7 @@ static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_b
 }
 
 /* ---- Newton's method in lanes ---- */
-/* Linearisation of a stage around y, in all lanes. */
+/* Linear model of a stage around its points y, in all lanes. */
 typedef struct {
     rigid_body_lanes y[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM],
         residual[rigid_body_DIM];
@@ -1205,8 +1209,8 @@ typedef struct {
     rigid_body_lanes inverse[rigid_body_DIM * rigid_body_DIM], gain[rigid_body_DIM * rigid_body_DIM];
 } rigid_body_model;
 
-/* Units in which corrections of y are measured, so that matrices are reused down to the same relative
-   accuracy as in rigid_body_size: the smallest magnitude of each component in the stages. */
+/* Compute the weights of corrections of y: 1 / (the smallest magnitude of a component of y in all stages),
+   with a bound for small components. So the accuracy of solutions is relative, as in single steps. */
 static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM])
 {
     rigid_body_lanes norm = { 0.0 };
@@ -1226,7 +1230,8 @@ static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes u
     }
 }
 
-/* Subtract a correction from y; returns its size, summed over the components. */
+/* Subtract the correction delta from y; size receives the sum of the magnitudes of its components times their
+   weights, unit. */
 static void rigid_body_take(rigid_body_model *model, rigid_body_lanes delta[restrict rigid_body_DIM],
     rigid_body_lanes unit[restrict rigid_body_DIM], rigid_body_lanes size)
 {
@@ -1240,8 +1245,8 @@ static void rigid_body_take(rigid_body_model *model, rigid_body_lanes delta[rest
     }
 }
 
-/* Largest value over the lanes, none of which is negative; infinite if one is not finite. The bits of such
-   numbers have the same order as integers, and those of NaN are larger still. */
+/* Largest value over the lanes, none of which may be negative; infinite if one is not finite. The bits of
+   positive numbers, read as integers, have the order of the numbers, and those of NaN are larger still. */
 static double rigid_body_largest(const rigid_body_lanes size)
 {
     uint64_t bits[rigid_body_LANES], most = 0;
@@ -1252,7 +1257,7 @@ static double rigid_body_largest(const rigid_body_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* Replace each lane of most by the larger value, in the same order. */
+/* Replace each lane of most by the larger of most and size, where NaN counts as larger than all numbers. */
 static void rigid_body_update_largest(rigid_body_lanes most, const rigid_body_lanes size)
 {
     uint64_t bits[rigid_body_LANES], bits_of_most[rigid_body_LANES];
@@ -1263,7 +1268,7 @@ static void rigid_body_update_largest(rigid_body_lanes most, const rigid_body_la
     memcpy(most, bits_of_most, sizeof bits);
 }
 
-/* Product of a matrix and a vector. */
+/* Compute the product of a matrix and a vector in all lanes. */
 static void rigid_body_apply(rigid_body_lanes matrix[restrict rigid_body_DIM * rigid_body_DIM],
     rigid_body_lanes vector[restrict rigid_body_DIM], rigid_body_lanes product[restrict rigid_body_DIM])
 {
@@ -1278,14 +1283,15 @@ static void rigid_body_apply(rigid_body_lanes matrix[restrict rigid_body_DIM * r
     }
 }
 
-/* Compute the corrections of the increment from the residual. */
+/* Compute the correction of the increment that a residual of the equation for y causes, in all lanes. */
 static void rigid_body_gain(rigid_body_model *model, rigid_body_lanes residual[restrict rigid_body_DIM],
     rigid_body_lanes gained[restrict rigid_body_DIM])
 {
     rigid_body_apply(model->gain, residual, gained);
 }
 
-/* Correct y by the residuals, with the inverse of the Newton matrix, and measure the corrections. */
+/* Correct y by its residuals, with the inverse of the Newton matrix; size receives the sizes of the
+   corrections. */
 static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
     rigid_body_lanes size)
 {
@@ -1294,16 +1300,17 @@ static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes unit[re
     rigid_body_take(model, delta, unit, size);
 }
 
-/* After corrections below rigid_body_FROZEN the matrices are reused. After a correction below
-   rigid_body_SMALL, whose square is rounding, one below rigid_body_BLOCK_ROUNDING is the last. */
+/* Relative sizes of corrections. After one below rigid_body_FROZEN, the matrices are reused. After one below
+   rigid_body_SMALL, whose square is below rounding, a correction below rigid_body_BLOCK_ROUNDING is the
+   last. */
 #define rigid_body_FROZEN 1e-4
 #define rigid_body_SMALL 1e-8
 #define rigid_body_BLOCK_ROUNDING 1e-10
 /* reused matrices contract half as fast as new ones; the factor 32 is a wide safety margin */
 #define rigid_body_CAUTION 32.0
 
-/* Expected next correction: the square of the first; later the latest times the ratio of the latest to the
-   one before. 0 at rounding level. */
+/* Estimate the size of the next correction from the last one, `size`, and the one before it: the square of
+   the first; later size times the ratio size / before, with a safety margin. It is 0 at rounding level. */
 static void rigid_body_leave(const rigid_body_lanes size, const rigid_body_lanes before,
     rigid_body_lanes left)
 {
@@ -1332,7 +1339,8 @@ static void rigid_body_linearise_stage(rigid_body_lanes coef[restrict], rigid_bo
     }
 }
 
-/* Evaluate a stage at the points y, with new matrices or with those of the last iteration. */
+/* Evaluate a stage at the points y; matrices = 1 computes new matrices, 0 keeps those of the last
+   iteration. */
 static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model *model, int matrices)
 {
     if (matrices) rigid_body_linearise_stage(coef, model);
@@ -1340,9 +1348,10 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 }
 
 /* ---- The residuals of a block ---- */
-/* Advance x + carry through the steps of a block in order, each by the linear model of its lane: a step adds
-   increment - gain residual. The residual of the next step follows from that of a step, without the sum. most
-   is the largest correction in each lane. */
+/* Advance x + carry through the steps of a block in order. In the linear model of its lane, a step adds
+   increment - gain residual, where the residual is that of the equation for y. The residual of the next step
+   follows from that of the present step, without the new x. most receives the largest correction of y in each
+   lane. */
 static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
     double x[rigid_body_DIM], double carry[rigid_body_DIM], rigid_body_lanes most)
 {
@@ -1354,7 +1363,7 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
     }
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         const int after = (lane + 1) % rigid_body_LANES;
-        /* two partial sums shorten the chain of dependent additions */
+        /* two partial sums of gain residual, since additions in one sum wait for each other */
         double even[rigid_body_DIM] = { 0.0 }, odd[rigid_body_DIM] = { 0.0 };
         for (int i = 0; i < rigid_body_DIM; ++i) {
             model->residual[i][lane] = residual[i];
@@ -1380,14 +1389,14 @@ static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[rest
 }
 
 /* ---- Blocks of steps ---- */
-/* Data shared by all blocks: coefficients, equal in all lanes, and the recurrences that predict the
+/* Data for all blocks of steps: the coefficients in each lane, and the recurrences that predict the
    solutions. */
 typedef struct {
     int fits; /* number of the fit that resulted in weight; -1 if there is none */
     rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];
 } rigid_body_table;
 
-/* rigid_body_near for the points of all stages and lanes, relative to one reference value. */
+/* Whether the predicted points of all stages and lanes are near the state `last`. */
 static int rigid_body_near_lanes(rigid_body_model *model, const double last[rigid_body_DIM])
 {
     rigid_body_lanes most = { 0.0 };
@@ -1403,8 +1412,7 @@ static int rigid_body_near_lanes(rigid_body_model *model, const double last[rigi
     return rigid_body_largest(most) <= rigid_body_REACH * size;
 }
 
-/* Update the table of a stage: its coefficients, and the weights of its recurrences if they were fitted
-   since. */
+/* Update the table of a stage, after a new fit of its recurrences: their weights, and the coefficients. */
 static void rigid_body_refresh(const rigid_body_solver *s, rigid_body_table *table)
 {
     if (table->fits == s->history.fits) return;
@@ -1434,7 +1442,7 @@ static void rigid_body_foresee(const rigid_body_history *history,
     }
 }
 
-/* Append the solutions of all lanes to the history, in order of time. */
+/* Append the solutions in all lanes to the history; lane 0 is the earliest step. */
 static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lanes y[restrict rigid_body_DIM])
 {
     rigid_body_make_room(history, rigid_body_LANES);
@@ -1450,7 +1458,8 @@ static void rigid_body_slope(const rigid_body_solver *s, const double x[rigid_bo
     rigid_body_vector_field(&s->params, x, slope);
 }
 
-/* Step of size h by the classical Runge-Kutta method. x becomes the end of the step, mean the mean slope. */
+/* Make a step of size h by the classical Runge-Kutta method. x becomes the end of the step, mean its
+   increment / h. */
 static void rigid_body_runge_kutta(const rigid_body_solver *s, double h, double x[rigid_body_DIM],
     double mean[rigid_body_DIM])
 {
@@ -1469,7 +1478,7 @@ static void rigid_body_runge_kutta(const rigid_body_solver *s, double h, double 
     for (int i = 0; i < rigid_body_DIM; ++i) x[i] += h * mean[i];
 }
 
-/* Replace y by the points for which y is the mean of alpha and beta, to leading order. */
+/* Replace each y by the point at which (alpha + beta)/2 equals that y, to leading order in the step size. */
 static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
     rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -1480,8 +1489,8 @@ static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_mo
     }
 }
 
-/* Predictor without recurrences: points for which the mean of alpha and beta is, to leading order, that of
-   start and end of a classical Runge-Kutta step. */
+/* Predict the solutions of a block without recurrences: by points at which (alpha + beta)/2 is, to leading
+   order, the mean of start and end of a classical Runge-Kutta step. */
 static void rigid_body_predict_by_march(const rigid_body_solver *s, rigid_body_table *table,
     rigid_body_model *model)
 {
@@ -1497,8 +1506,8 @@ static void rigid_body_predict_by_march(const rigid_body_solver *s, rigid_body_t
     rigid_body_from_means(table->coef, model);
 }
 
-/* Predict the solutions of all stages and steps, by recurrences or else by approximate integration. Returns 0
-   if they are not near the state. */
+/* Predict the solutions of all stages of the steps of a block, by recurrences or else by approximate
+   integration. Returns 0 if a prediction is not near the state. */
 static int rigid_body_predict_block(rigid_body_solver *s, rigid_body_table *table, rigid_body_model *model)
 {
     if (!s->blocks.use_recurrences) rigid_body_predict_by_march(s, table, model);
@@ -1507,8 +1516,8 @@ static int rigid_body_predict_block(rigid_body_solver *s, rigid_body_table *tabl
 }
 
 /* Make rigid_body_LANES steps at once: predict the solutions of all, and correct them together until the
-   remaining error is as small as after a single step. Returns the number of iterations, or 0, with the solver
-   unchanged, if it exceeds most. */
+   remaining error is as small as after a single step. Returns the number of iterations. If more than `most`
+   would be needed, it returns 0, and the state is unchanged. */
 static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int most)
 {
     rigid_body_model model;
@@ -1548,15 +1557,15 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
 }
 
 enum {
-    /* steps that repay a fit for blocks; first wait without recurrences */
+    /* number of steps whose savings repay the fits; also the first wait after recurrences failed */
     rigid_body_REPAY_BLOCKS = 4 * rigid_body_REPAY,
-    rigid_body_MOST_SINGLE_STEPS = 1000, /* most single steps after a failed block */
-    /* no recurrences after a failed block and more single steps than this */
+    rigid_body_MOST_SINGLE_STEPS = 1000, /* largest number of single steps after a failed block */
+    /* recurrences are abandoned if a failed block leads to more single steps than this */
     rigid_body_TOO_MANY = 5 * rigid_body_LANES
 };
-#define rigid_body_LATEST 0.125 /* weight of the latest step in the running mean of evaluations */
+#define rigid_body_LATEST 0.125 /* weight of the latest single step in the running mean of its evaluations */
 
-/* Stop using recurrences for a while, which doubles with every failure. */
+/* Stop using recurrences. The number of steps until they are tried again doubles with every failure. */
 static void rigid_body_give_up(rigid_body_solver *s)
 {
     s->blocks.use_recurrences = s->blocks.last_single_steps = s->blocks.single_steps = 0;
@@ -1564,8 +1573,8 @@ static void rigid_body_give_up(rigid_body_solver *s)
     s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
 }
 
-/* Choose the predictor of the next block: recurrences, fitted as soon as the steps to come, or those already
-   made, are enough to repay the fit. */
+/* Choose the predictor of the next block. Recurrences are fitted as soon as the number of steps to come, or
+   of steps already made, is large enough for them to repay the fit. */
 static void rigid_body_choose_predictor(rigid_body_solver *s, size_t steps)
 {
     if (s->history.count < rigid_body_REMEMBERED) {
@@ -1580,9 +1589,9 @@ static void rigid_body_choose_predictor(rigid_body_solver *s, size_t steps)
     if (!s->blocks.use_recurrences) rigid_body_give_up(s);
 }
 
-/* Update the measurements after a block. After a failed one, single steps are made, more with every failure.
-   Recurrences that fail repeatedly, or need more iterations than Runge-Kutta predictions did, are
-   abandoned. */
+/* Update the measurements after a block that took `passes` iterations; 0 means that it failed. After a failed
+   block, single steps are made, more with every failure. Recurrences are abandoned if they fail repeatedly,
+   or need more iterations than Runge-Kutta predictions did. */
 static void rigid_body_learn_from(rigid_body_solver *s, int passes)
 {
     if (passes > 0) {
@@ -1601,7 +1610,7 @@ static void rigid_body_learn_from(rigid_body_solver *s, int passes)
     }
 }
 
-/* Make a single step, and update the running mean of evaluations for each of its stages. */
+/* Make a single step, and update the running mean of the number of evaluations in a stage. */
 static rigid_body_status rigid_body_single(rigid_body_solver *s)
 {
     const size_t before = s->evaluations;
@@ -1611,12 +1620,13 @@ static rigid_body_status rigid_body_single(rigid_body_solver *s)
     return status;
 }
 
-/* Solve steps in blocks while that costs less than single steps, with at most rigid_body_PASSES iterations of
-   a block for each evaluation in a single step. Results differ from single steps by round-off only. */
+/* Make steps in blocks as long as blocks cost less than single steps: a block may take at most
+   rigid_body_PASSES times as many iterations as a single step takes evaluations. Results differ from those of
+   single steps by round-off only. */
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps)
 {
     rigid_body_table table;
-    /* so that all coefficients for h are computed */
+    /* 0 steps: computes all coefficients for h */
     rigid_body_status status = rigid_body_single_steps(s, h, 0);
     table.fits = -1;
     while (status == rigid_body_OK && steps > 0) {
@@ -1644,7 +1654,7 @@ rigid_body_status rigid_body_step(rigid_body_solver *s, double h)
 
 /* ---- Members of an ensemble ---- */
 /* Arguments of an ensemble. per_member = 1: member m has the parameters params[m] and the step h[m];
-   per_member = 0: all have those of member 0. */
+   per_member = 0: all members have params[0] and h[0]. */
 typedef struct {
     double *x;
     size_t members, steps, per_member;
@@ -1670,7 +1680,8 @@ static rigid_body_members rigid_body_asked(const rigid_body_params *params, doub
     return all;
 }
 
-/* Initialise a member at a state, with its parameters and all coefficients for its step size. */
+/* Initialise a solver for member m at the state x, with its parameters and all coefficients for its step
+   size. */
 static rigid_body_status rigid_body_begin_member(const rigid_body_members *all, size_t m,
     const double x[rigid_body_DIM], const double *gauge, rigid_body_solver *s)
 {
@@ -1679,7 +1690,7 @@ static rigid_body_status rigid_body_begin_member(const rigid_body_members *all, 
     return status == rigid_body_OK ? rigid_body_integrate(s, all->h[m * all->per_member], 0) : status;
 }
 
-/* Initialise a member at its state in the ensemble, which is copied to x. */
+/* Initialise a solver for member m at its state in the ensemble, which is copied to x. */
 static rigid_body_status rigid_body_take_member(const rigid_body_members *all, size_t m,
     double x[rigid_body_DIM], rigid_body_solver *s)
 {
@@ -1696,7 +1707,7 @@ static size_t rigid_body_to_frame(const rigid_body_members *all, size_t done)
         : left;
 }
 
-/* Write the frame of a member, if one is due after this number of steps: x, or NaN if x is NULL. */
+/* If a frame is due after `done` steps, write x to it, or NaN if x is NULL, for a member that has failed. */
 static void rigid_body_put_frame(const rigid_body_members *all, size_t m, size_t done, const double *x)
 {
     for (size_t i = 0; i < rigid_body_DIM && all->frames != NULL && done % all->stride == 0; ++i)
@@ -1704,7 +1715,8 @@ static void rigid_body_put_frame(const rigid_body_members *all, size_t m, size_t
             : (double)NAN;
 }
 
-/* Make the remaining steps of a member, one by one. */
+/* Make the remaining steps of member m by itself; `done` steps have been made, status is the present
+   status. */
 static rigid_body_status rigid_body_end_member(const rigid_body_members *all, size_t m, size_t done,
     rigid_body_solver *s, rigid_body_status status)
 {
@@ -1727,34 +1739,37 @@ static void rigid_body_put_member(const rigid_body_members *all, size_t m, const
 
 /* ---- SIMD batches of members: implicit steps ---- */
 enum {
-    rigid_body_GROUP = rigid_body_LANES, /* members, one in each lane */
+    rigid_body_GROUP = rigid_body_LANES, /* number of members, one in each lane */
     rigid_body_FEWEST = 3,               /* measured: fewer members are faster one by one */
-    /* steps to repay a fit; it predicts one value only, where a fit for a block predicts eight */
+    /* steps that repay a fit; measured. They are many, since it predicts one solution, and not eight as in a
+       block */
     rigid_body_GROUP_REPAY = 5000 * rigid_body_DIM,
-    /* steps until recurrences that did not help are fitted again */
+    /* slow steps until recurrences that did not help are fitted again */
     rigid_body_HOPELESS_WAIT = 100 * rigid_body_REPAY
 };
 
 /* Members of an ensemble, one in each lane. */
 typedef struct {
     rigid_body_lanes x[rigid_body_DIM], carry[rigid_body_DIM], coef[rigid_body_COEFFICIENTS];
-    rigid_body_lanes past[rigid_body_REMEMBERED][rigid_body_DIM]; /* solutions, in a ring buffer */
-    /* coefficients of the recurrences, for the latest solution first */
+    /* past solutions of each stage, in a ring buffer */
+    rigid_body_lanes past[rigid_body_REMEMBERED][rigid_body_DIM];
+    /* weights of past solutions in the recurrences, the latest solution first */
     rigid_body_lanes weight[rigid_body_WINDOW][rigid_body_DIM];
-    int latest; /* row of the latest solutions */
-    int count; /* rows in use */
-    int extrapolation_order; /* number of solutions that the extrapolation uses */
-    int recurrence_terms; /* number of solutions that the recurrences use */
-    int use_recurrences; /* whether recurrences predict better */
-    int fits; /* number of fits of the recurrences */
-    int slow_steps; /* recent steps that took more than one iteration */
-    int slow_steps_allowed; /* slow_steps at which recurrences are fitted again */
+    int latest;                   /* index of the latest solutions in past */
+    int count;                    /* number of solutions in past */
+    int extrapolation_order;      /* number of solutions that the extrapolation uses */
+    int recurrence_terms;         /* number of solutions that the recurrences use */
+    int use_recurrences;          /* whether recurrences predict better than the extrapolation */
+    int fits;                     /* number of fits of the recurrences */
+    int slow_steps;               /* recent steps that took more than one iteration */
+    int slow_steps_allowed;       /* value of slow_steps at which the recurrences are fitted again */
     int active[rigid_body_LANES]; /* whether the lane holds a member that has not failed */
-    size_t steps_left[rigid_body_LANES]; /* steps left to make, for active lanes */
+    /* number of steps that the member has still to make outside of the group */
+    size_t steps_left[rigid_body_LANES];
     double gauge[rigid_body_LANES][rigid_body_GAUGES]; /* of each member */
 } rigid_body_group;
 
-/* The past solutions of a stage, the latest for k = 0. */
+/* The solutions of a stage k steps before the last one. */
 static rigid_body_lanes *rigid_body_group_past(rigid_body_group *group, int k)
 {
     const int row = group->latest + k;
@@ -1774,7 +1789,7 @@ static void rigid_body_group_foresee(rigid_body_group *group, rigid_body_lanes y
     }
 }
 
-/* Extrapolate the solutions of a stage. */
+/* Predict the solutions of a stage by polynomial extrapolation of past ones, or by x if there are none. */
 static void rigid_body_group_extrapolate(rigid_body_group *group, rigid_body_lanes y[restrict rigid_body_DIM])
 {
     const int order = group->extrapolation_order;
@@ -1791,7 +1806,7 @@ static void rigid_body_group_extrapolate(rigid_body_group *group, rigid_body_lan
     }
 }
 
-/* Sum over members of the absolute values of all components. */
+/* Sum of the absolute values of all components of y, over the active members. */
 static double rigid_body_group_sum(const rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
     double sum = 0.0;
@@ -1810,7 +1825,7 @@ static void rigid_body_group_subtract(rigid_body_lanes y[restrict rigid_body_DIM
     }
 }
 
-/* Select the predictor that would have been best for these solutions. */
+/* Select the predictor of a stage: the one that would have predicted its solutions y best. */
 static void rigid_body_group_judge(rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
     rigid_body_lanes row[rigid_body_HISTORY + 1][rigid_body_DIM];
@@ -1833,8 +1848,8 @@ static void rigid_body_group_judge(rigid_body_group *group, rigid_body_lanes y[r
     group->use_recurrences = rigid_body_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members. The wait until the next fit grows with every fit, and is long if a fit
-   did not help. */
+/* Fit the recurrences of all members. The number of slow steps until the next fit grows with every fit, and
+   is large if the last fit did not help. */
 static void rigid_body_group_fit(rigid_body_group *group)
 {
     rigid_body_history member;
@@ -1859,8 +1874,8 @@ static void rigid_body_group_fit(rigid_body_group *group)
         ? 2 * group->slow_steps_allowed + rigid_body_REPAY : rigid_body_HOPELESS_WAIT;
 }
 
-/* Replace, lane by lane, predictions that are not near the last solutions (rigid_body_near) by the given
-   values. */
+/* In each lane whose prediction y is not near the values `last`, replace it by these: far away the equation
+   of a step has solutions unrelated to the motion. */
 static void rigid_body_stay_near(rigid_body_lanes y[restrict rigid_body_DIM],
     rigid_body_lanes last[restrict rigid_body_DIM])
 {
@@ -1879,8 +1894,8 @@ static void rigid_body_stay_near(rigid_body_lanes y[restrict rigid_body_DIM],
     }
 }
 
-/* Number of lanes whose corrections are still above the tolerance. Lanes with values that are not finite
-   leave the group. */
+/* Number of active lanes whose expected corrections are still above the tolerance. Lanes with values that are
+   not finite become inactive. */
 static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes size,
     const rigid_body_lanes left)
 {
@@ -1893,8 +1908,8 @@ static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes
     return open;
 }
 
-/* Predict the solution of a stage: by recurrences or extrapolation, or by the state where the prediction is
-   not near it. */
+/* Predict the solutions of a stage, by recurrences or extrapolation. Where the prediction is not near the
+   state, the state takes its place. */
 static void rigid_body_group_predict(rigid_body_group *group, rigid_body_lanes y[rigid_body_DIM])
 {
     if (group->use_recurrences) rigid_body_group_foresee(group, y);
@@ -1902,8 +1917,8 @@ static void rigid_body_group_predict(rigid_body_group *group, rigid_body_lanes y
     rigid_body_stay_near(y, group->x);
 }
 
-/* Newton's method for a stage, until all lanes have converged. Returns the number of iterations; if that is
-   the maximum, lanes that have not converged leave the group. */
+/* Solve the equation of a stage by Newton's method, until all lanes have converged. Returns the number of
+   iterations. After the largest allowed number, lanes that have not converged become inactive. */
 static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *model)
 {
     rigid_body_lanes unit[rigid_body_DIM], size, before, left;
@@ -1933,7 +1948,8 @@ static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *mod
     return iterations;
 }
 
-/* Add the increments, corrected to first order, in compensated arithmetic, as in a single step. */
+/* Add the increments of a stage to x in compensated arithmetic. The effect of the last correction of y on the
+   increment is included to first order. */
 static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM],
     rigid_body_lanes carry[restrict rigid_body_DIM], rigid_body_model *model)
 {
@@ -1951,8 +1967,8 @@ static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM]
     }
 }
 
-/* Members that failed, or whose new state is not finite or not near the old one, keep the old state and leave
-   the group. Returns the number of active members. */
+/* Give the old state x back to members that failed, or whose new state is not finite or not near the old one;
+   they become inactive. Returns the number of active members. */
 static int rigid_body_group_leave(rigid_body_group *group, rigid_body_lanes x[rigid_body_DIM],
     rigid_body_lanes carry[rigid_body_DIM], size_t remaining)
 {
@@ -2021,7 +2037,7 @@ static rigid_body_status rigid_body_group_join(rigid_body_group *group, int lane
     return status;
 }
 
-/* Write the frames of active members after a number of steps. */
+/* Write the states of active members to their frames, if frames are due after `done` steps. */
 static void rigid_body_group_frame(const rigid_body_group *group, const rigid_body_members *all, size_t first,
     size_t done)
 {
@@ -2032,7 +2048,7 @@ static void rigid_body_group_frame(const rigid_body_group *group, const rigid_bo
     }
 }
 
-/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
+/* Write the results of a member. Steps that it did not make in the group are made first, one by one. */
 static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int lane,
     const rigid_body_members *all, size_t m, rigid_body_status status)
 {
@@ -2075,7 +2091,8 @@ static rigid_body_status rigid_body_group_run(const rigid_body_members *all, siz
     return result;
 }
 
-/* Report a failure as the result, unless an earlier member has failed. */
+/* Set *result to the status of member m if it is a failure, unless an earlier member has failed. *earliest is
+   the number of the first failed member so far. */
 static void rigid_body_report_first(rigid_body_status status, size_t m, size_t *earliest,
     rigid_body_status *result)
 {

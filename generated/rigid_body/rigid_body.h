@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 27d7229cf825d3eaf1302b743d4cbee434a7ebfdf1fe5bd6880af5c75cac45bd
+ * body-sha256: eed74248a12636c05d5071bd27dc6cabc8ad7f6e2ce791a22cab3cea383981ab
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -38,8 +38,8 @@ const char *rigid_body_status_string(rigid_body_status status); /* the meaning o
 
 enum { rigid_body_STORED_VALUES = 2 * rigid_body_REMEMBERED };
 
-/* Predictor: recent solutions of the implicit equation, from which the starting value of the next iteration
-   follows by extrapolation, or by a linear recurrence fitted to the last rigid_body_REMEMBERED solutions. It
+/* Predictor: recent solutions of the implicit equation. They give the starting value of the next iteration by
+   extrapolation, or by a linear recurrence that is fitted to the last rigid_body_REMEMBERED solutions. It
    affects the speed only. */
 typedef struct {
     int count; /* number of solutions in past */
@@ -50,21 +50,21 @@ typedef struct {
     int slow_steps; /* recent steps that took more than one iteration */
     int slow_steps_allowed; /* value of slow_steps at which the recurrence is fitted again */
     double past[rigid_body_STORED_VALUES][rigid_body_DIM]; /* solutions, the latest last */
-    /* coefficients of the recurrences for the next solutions, by the latest solution first */
+    /* weights of past solutions, the latest first, in the next rigid_body_AHEAD solutions */
     double weight[rigid_body_WINDOW][rigid_body_DIM][rigid_body_AHEAD];
 } rigid_body_history;
 
-/* Measurements that decide when several steps are solved together, as a block in SIMD registers, and when one
+/* Measurements that decide whether the next steps are solved together, as a block in SIMD registers, or one
    by one. They affect the speed only. */
 typedef struct {
-    double evaluations_per_stage; /* number of evaluations in single steps */
-    int single_steps;             /* single steps to make before the next block */
-    /* single_steps after the last failure, halved by each successful block */
+    double evaluations_per_stage; /* running mean of the evaluations in a stage of a single step */
+    int single_steps;             /* number of single steps to make before the next block */
+    /* value of single_steps after the last failed block, halved by each successful block */
     int last_single_steps;
     int use_recurrences;              /* 1 if recurrences predict blocks, 0 if Runge-Kutta steps do */
     int passes_without_recurrences;   /* iterations of the last block predicted by Runge-Kutta steps */
     size_t steps_without_recurrences; /* steps to wait before recurrences are tried again */
-    size_t recurrences_from_step;     /* number of the step from which they are tried again */
+    size_t recurrences_from_step;     /* number of the step from which recurrences are tried again */
 } rigid_body_block_measurements;
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
@@ -83,15 +83,15 @@ typedef struct {
     rigid_body_history history;           /* predictor of the starting value of the iteration */
     rigid_body_block_measurements blocks; /* measurements that decide when steps are made in blocks */
 } rigid_body_solver;
-size_t rigid_body_solver_size(void); /* bytes; for languages that cannot read the struct */
+size_t rigid_body_solver_size(void); /* in bytes, for languages that cannot read the struct */
 size_t rigid_body_solver_steps_done(const rigid_body_solver *s);
 
-/* Initialise *s with x0; params = NULL means the defaults. Returns rigid_body_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
+/* Initialise *s with the state x0; params = NULL for the defaults. Returns rigid_body_BAD_ARGUMENT, with *s
+   unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
 rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM]);
 
-/* As rigid_body_init, with given factors of Casimirs. The step is a Poisson map for each fixed gauge. */
+/* As rigid_body_init, with given factors of the Casimirs, whose multiples are subtracted from H. */
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES]);
 
@@ -109,9 +109,9 @@ rigid_body_status rigid_body_kick(rigid_body_solver *s, const double change[rigi
 /* The gauge is unchanged. */
 rigid_body_status rigid_body_set_parameters(rigid_body_solver *s, const rigid_body_params *params);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
-   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
-/* Members are integrated in SIMD batches; with OpenMP, batches in parallel. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
+   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
+/* Members are integrated in SIMD batches; with OpenMP, the batches are integrated in parallel. */
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
 

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: baea6bb40e460ed5afdcbc1aa349c294d796b849c0348810a01dd5148f75cb16
+ * body-sha256: 0efb03223e14bca8fc96c48bc552fea8c12fc49984ea091a252fd8a283bc3415
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -29,9 +29,9 @@ const thermal_spin_params thermal_spin_default_params = { 1.0, 0.5, 0.1 };
 
 enum { thermal_spin_PREPARED = 7 };        /* first coefficients, which depend on params and h only */
 enum { thermal_spin_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
-#define thermal_spin_TOLERANCE 1e-20       /* largest estimated error after an accepted correction */
+#define thermal_spin_TOLERANCE 1e-20       /* largest accepted error of a solution, relative to it */
 
-#define thermal_spin_BOUND 6.0 /* bound of normal variates: rare large ones would make steps fail */
+#define thermal_spin_BOUND 6.0 /* truncation of normal variates: rare large ones make steps fail */
 
 static int thermal_spin_allowed(const thermal_spin_params *params)
 {
@@ -39,7 +39,7 @@ static int thermal_spin_allowed(const thermal_spin_params *params)
         && params->damping_rate > 0.0;
 }
 
-/* Polynomial with these coefficients, the constant first. */
+/* Value at s of the polynomial with these coefficients, the constant first. */
 static inline double thermal_spin_polynomial(const double *coefficients, int count, double s)
 {
     double value = coefficients[--count];
@@ -211,8 +211,8 @@ static int thermal_spin_finite(const double *values, int count)
     return count == 0;
 }
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms:
-   rounded together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that
+   are small compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static int thermal_spin_advance(thermal_spin_solver *s, const double *change, const double *small)
 {
     double x[thermal_spin_DIM], carry[thermal_spin_DIM];
@@ -262,8 +262,8 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
 #define thermal_spin_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
 #define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
 
-/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
-   equation may have solutions far away, at another energy, unrelated to the motion. */
+/* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+   is too large may have solutions far away, at another energy, unrelated to the motion. */
 static int thermal_spin_plausible(const thermal_spin_solver *s, const double increment[thermal_spin_DIM])
 {
     double distance = 0.0, size = 0.0, field[thermal_spin_DIM], point[thermal_spin_DIM], H[3];
@@ -279,7 +279,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
     for (int k = 0; k < thermal_spin_SOURCES * thermal_spin_DIM; ++k)
         size += fabs(s->dw[k / thermal_spin_DIM] * fields[k]);
     if (distance <= thermal_spin_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
+    for (int k = 0; k < 3; ++k) { /* energy at the start, halfway, and at the end */
         for (int i = 0; i < thermal_spin_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = thermal_spin_hamiltonian(&s->params, point);
     }
@@ -295,7 +295,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */
 #define thermal_spin_SHRINKING 0.25
 
-/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
+/* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */
 static double thermal_spin_size(const double y[thermal_spin_DIM], const double delta[thermal_spin_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -332,7 +332,7 @@ static thermal_spin_status thermal_spin_attempt(thermal_spin_solver *s)
         const int stalled = previous < thermal_spin_NEARLY_SOLVED && size > thermal_spin_SHRINKING * previous;
         previous = size;
         if (!(remaining <= thermal_spin_TOLERANCE || stalled)) continue;
-        double small[thermal_spin_DIM] = { 0.0 }; /* correction of the increment, and compensation */
+        double small[thermal_spin_DIM] = { 0.0 }; /* correction of the increment and compensation term */
         for (int i = 0; i < thermal_spin_DIM; ++i)
             for (int j = 0; j < thermal_spin_DIM; ++j) small[i] -= slope[i * thermal_spin_DIM + j] * delta[j];
         for (int i = 0; i < thermal_spin_DIM; ++i) small[i] += s->carry[i];
@@ -344,8 +344,8 @@ static thermal_spin_status thermal_spin_attempt(thermal_spin_solver *s)
 }
 
 /* ---- Random numbers ---- */
-/* Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3
-   (2011): the counter becomes four random words. */
+/* Replace a counter of four words by four random words: Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D.
+   Shaw, Parallel random numbers: as easy as 1, 2, 3 (2011). */
 static void thermal_spin_philox(uint32_t counter[4], uint32_t key0, uint32_t key1)
 {
     for (int round = 0; round < 10; ++round) {
@@ -360,7 +360,7 @@ static void thermal_spin_philox(uint32_t counter[4], uint32_t key0, uint32_t key
     }
 }
 
-/* A number from 0 up to, but not including, 2^53, from 53 bits of two words. */
+/* A random integer from 0 to 2^53 - 1, from 53 bits of two words. */
 static double thermal_spin_bits(uint32_t high, uint32_t low)
 {
     return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
@@ -378,7 +378,7 @@ static void thermal_spin_two_normals(uint64_t seed, uint32_t c[4], double normal
 }
 
 /* ---- Noise ---- */
-/* Draw independent normal variates of variance 1. */
+/* Draw independent normal variates of mean 0 and variance 1: a function of seed, member and step. */
 static void thermal_spin_normals(uint64_t seed, uint32_t member, uint64_t step,
     double normals[thermal_spin_DRAWS])
 {
@@ -391,15 +391,15 @@ static void thermal_spin_normals(uint64_t seed, uint32_t member, uint64_t step,
     }
 }
 
-/* Set the increments of the noise in the next step to the given ones, or for NULL to random ones. Returns 0
-   if one is not finite. */
+/* Set the increments of the noise in the next step: to those of the caller, or if increments is NULL, to
+   random ones. Returns 0 if one is not finite. */
 static int thermal_spin_draw(thermal_spin_solver *s, const double *increments)
 {
     if (increments != NULL) {
         memmove(s->dw, increments, sizeof s->dw);
     } else {
         thermal_spin_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
-        /* so that a step of -h inverts one of h */
+        /* with the sign of h, so that a step of -h inverts a step of h */
         const double size = copysign(sqrt(fabs(s->h) / (double)thermal_spin_PARTS), s->h);
         for (int k = 0; k < thermal_spin_DRAWS; ++k) s->dw[k] *= size;
     }
@@ -424,7 +424,7 @@ thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, siz
 }
 
 /* ---- The solver ---- */
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin_params *params,
     const double x0[thermal_spin_DIM])
 {
@@ -449,14 +449,14 @@ static void thermal_spin_renew(thermal_spin_solver *s)
     thermal_spin_at_step(s->coef, s->dw, s->coef + thermal_spin_PREPARED);
 }
 
-/* Make one stage. */
+/* Make one stage of a step. */
 static thermal_spin_status thermal_spin_stage(thermal_spin_solver *s) { return thermal_spin_attempt(s); }
 
 thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double h, size_t steps,
     const double *dw)
 {
     if (s == NULL || !isfinite(h)) return thermal_spin_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         thermal_spin_prepare(&s->params, h, s->coef);
         s->h = h;
         s->t_before_h = s->t;
@@ -509,7 +509,8 @@ const char *thermal_spin_status_string(thermal_spin_status status)
 size_t thermal_spin_solver_size(void) { return sizeof(thermal_spin_solver); }
 size_t thermal_spin_solver_steps_done(const thermal_spin_solver *s) { return s->steps; }
 
-/* Report a failure as the result, unless an earlier member has failed. */
+/* Set *result to the status of member m if it is a failure, unless an earlier member has failed. *earliest is
+   the number of the first failed member so far. */
 static void thermal_spin_report_first(thermal_spin_status status, size_t m, size_t *earliest,
     thermal_spin_status *result)
 {

@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7b67f89c001635b84177ba7f396875e7d6a54a89047319746611f50f5a27d6b5
+ * body-sha256: e88a82fa52168ab9e9dc7ac90cd7ef29fca1dcaf94d2d7fdbd7a820c1bd7509f
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -56,17 +56,17 @@ typedef struct {
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
 } thermal_spin_solver;
-size_t thermal_spin_solver_size(void); /* bytes; for languages that cannot read the struct */
+size_t thermal_spin_solver_size(void); /* in bytes, for languages that cannot read the struct */
 size_t thermal_spin_solver_steps_done(const thermal_spin_solver *s);
 
-/* Initialise *s with x0; params = NULL means the defaults. Returns thermal_spin_BAD_ARGUMENT, with *s
-   unchanged, if a value or a coefficient is not finite, or a parameter that must be positive is not. */
+/* Initialise *s with the state x0; params = NULL for the defaults. Returns thermal_spin_BAD_ARGUMENT, with *s
+   unchanged, if a value or coefficient is not finite, or a parameter that must be positive is not. */
 thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin_params *params,
     const double x0[thermal_spin_DIM]);
 
-/* Select the random numbers of the next steps. They are a function of the seed, the member and the number of
-   the step only; thermal_spin_init sets all three to 0. Each increment of the noise is normal with variance
-   |h|, truncated at thermal_spin_BOUND sqrt(|h|). */
+/* Select the random numbers of the next steps. They are a function of seed, ensemble member and number of the
+   step, which is `step` for the next one; thermal_spin_init sets all three to 0. Each increment of the noise
+   is normal with variance |h|, truncated at thermal_spin_BOUND sqrt(|h|). */
 thermal_spin_status thermal_spin_set_noise(thermal_spin_solver *s, uint64_t seed, uint32_t member,
     uint64_t step);
 
@@ -79,19 +79,19 @@ thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, siz
 thermal_spin_status thermal_spin_set_state(thermal_spin_solver *s, const double x[thermal_spin_DIM]);
 thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double change[thermal_spin_DIM]);
 
-/* As thermal_spin_integrate, with given increments of the noise: dw[k * thermal_spin_DRAWS + i] is that of
-   source i in step k. NULL for random ones. */
+/* As thermal_spin_integrate, with increments of the noise from the caller: dw[k * thermal_spin_DRAWS + i] is
+   increment i of step k. NULL for random increments. */
 thermal_spin_status thermal_spin_integrate_along(thermal_spin_solver *s, double h, size_t steps,
     const double *dw);
 
-/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members keep the
-   last good state. status, if not NULL, receives the status of each. Returns the first that is not OK. */
+/* Integrate an ensemble in place: x[i * members + m] is coordinate i of member m. Failed members get their
+   last good state; status, if not NULL, the status of each member. Returns the first failure, or OK. */
 thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
 
-/* thermal_spin_ensemble with given random numbers: member m has those of seed and first_member + m, from the
-   step first_step on. thermal_spin_ensemble sets all three to 0. With OpenMP, members are integrated in
-   parallel; the results do not depend on the number of threads. */
+/* thermal_spin_ensemble with other random numbers: member m has those of `seed` and member number
+   first_member + m, from the step number first_step on. In thermal_spin_ensemble all three are 0. With
+   OpenMP, members are integrated in parallel; the results do not depend on the number of threads. */
 thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
 

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 46bd92f34937f56aa3048e95d5811dc6b7cbfb5ccb6f7b4ad1223c64f1f30507
+ * body-sha256: 890687747c3cd476126a99603892e397c8187904a33c460193a66d69d7d4eca2
  */
 #include "toda.h"
 #include <math.h>
@@ -16,7 +16,7 @@
 #include <string.h>
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
-#define restrict /* not a keyword in C++, nor in the brackets of an array for Microsoft's compiler */
+#define restrict /* no keyword of C++; Microsoft's compiler refuses it in the brackets of an array */
 #endif
 
 /* ---- The model ---- */
@@ -29,7 +29,7 @@ enum { toda_ROW = 2 };            /* coefficients of one flow */
 enum { toda_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { toda_FLOWS = 13 };         /* flows in a step */
 
-/* Along each axis: the smallest size. */
+/* Along each axis: the smallest number of sites. */
 static const size_t toda_least[toda_AXES] = { 2 };
 
 /* Times of the flows, as fractions of a step, one for each row of coefficients; the last merges two flows. */
@@ -38,7 +38,7 @@ static const double toda_times[toda_ROWS_OF_FLOWS] = { 0.08298440641740498, 0.24
     -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711,
     0.08298440641740498, 0.16596881283480996 };
 
-/* The part of H of each flow. */
+/* For each row of coefficients, the part of H whose flow uses it. */
 static const unsigned char toda_flow_parts[toda_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 1 };
 
 /* Whether all parameters are finite and within their bounds. */
@@ -64,7 +64,7 @@ typedef struct {
     ptrdiff_t from, to; /* first site of the segment, and the one after the last */
 } toda_row;
 
-/* Before a loop over sites: tells the compiler that iterations are independent. */
+/* Stands before loops over sites: it tells the compiler that their iterations are independent. */
 #if defined(__clang__)
 #define toda_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -74,7 +74,7 @@ typedef struct {
 #define toda_EACH_SITE
 #endif
 
-/* Update the halo for the sites from..to: copies of the other end, or mirrored values of weight 0. */
+/* Update the halo for changed sites from ... to - 1: copies of the other end, or mirrored (weight 0). */
 static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     if (from == 0)
@@ -89,11 +89,11 @@ static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
     const size_t n = sizes != NULL ? sizes[0] : 0;
     if (n < toda_least[0] || n > SIZE_MAX / 128 / toda_RESERVED) return 0;
     const size_t wide = toda_LEAD + ((n + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* multiples of 512 share cache sets */
     return 1;
 }
 
-/* The whole row. */
+/* The record of the whole row. */
 static inline toda_row toda_row_of(const toda_solver *s)
 {
     toda_row row;
@@ -106,13 +106,13 @@ static inline toda_row toda_row_of(const toda_solver *s)
 
 enum { toda_PIECE = 1024 }; /* sites of a work item, for any number of threads */
 
-/* Number of segments of the row; the last one is the longest, so that halos copy from one segment only. */
+/* Number of segments of the row; the last is the longest, so that a halo copies from one segment only. */
 static size_t toda_units(const toda_solver *s)
 {
     return s->length < 2 * toda_PIECE ? 1 : (size_t)s->length / toda_PIECE;
 }
 
-/* Segment with this number, a work item of threads. */
+/* Segment number `unit` of the row, a work item of threads. */
 static inline toda_row toda_piece_of(const toda_solver *s, size_t unit)
 {
     toda_row row = toda_row_of(s);
@@ -121,14 +121,14 @@ static inline toda_row toda_piece_of(const toda_solver *s, size_t unit)
     return row;
 }
 
-#define toda_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
+#define toda_ROUNDER 6755399441055744.0 /* 1.5 * 2^52: adding it rounds to integers */
 
-/* exp(u) - 2^k, and 2^k, where u = k log 2 + r; branch-free. */
+/* Compute exp(u) - 2^k and *power = 2^k, where k is the integer nearest to u / log 2; branch-free. */
 static inline double toda_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + toda_ROUNDER, k = shifted - toda_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the last bits of shifted are k */
+    uint64_t bits; /* of shifted, whose last bits are k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
@@ -238,9 +238,9 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 /* ---- The lattice ---- */
 #define toda_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
 
-enum { toda_BUFFER = 256 }; /* number of densities summed in one pass */
+enum { toda_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 
-/* Doubles from one array to the next. */
+/* Number of doubles from one array to the next. */
 static size_t toda_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t toda_work_size(const size_t sizes[toda_AXES])
@@ -307,7 +307,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     return toda_OK;
 }
 
-/* Compute coefficients for the step size h, if h has changed. */
+/* Compute the coefficients for steps of size h, if h has changed. */
 static toda_status toda_set_step(toda_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return toda_BAD_ARGUMENT;
@@ -339,14 +339,14 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 /* ---- The flows ---- */
 enum { toda_STRETCH = 32 }; /* steps between checks for finite values */
 
-/* Apply flow `number` of a step; number toda_FLOWS is the last merged with the first. */
+/* Apply flow `number` of a step; toda_FLOWS means the last flow merged with the first one. */
 static void toda_apply_flow(const toda_solver *s, size_t steps, int number)
 {
     (void)steps;
     toda_sweep_part(s, toda_flow_parts[number], s->coef + number * toda_ROW);
 }
 
-/* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
+/* Make some steps but for the last flow, which the next step merges; 0 steps: make the last flow alone. */
 static void toda_steps(const toda_solver *s, size_t steps)
 {
     if (steps == 0) toda_apply_flow(s, s->steps - 1, toda_FLOWS - 1);
@@ -356,7 +356,7 @@ static void toda_steps(const toda_solver *s, size_t steps)
     }
 }
 
-/* Make some steps from the state in s->before, or restore it and return 0 if values are not finite. */
+/* Make some steps from the state in s->before. If values are not finite, restore this state and return 0. */
 static int toda_try(toda_solver *s, size_t steps)
 {
     toda_steps(s, steps);
@@ -365,8 +365,8 @@ static int toda_try(toda_solver *s, size_t steps)
     return 0;
 }
 
-/* Make steps from s->before, equal to s->x, without the last flow of the last step. Values are checked after
-   several steps; if they are not finite, these steps are repeated one by one. */
+/* Make steps from the state s->before, which equals s->x, except for the last flow of the last step. Values
+   are checked after several steps; if they are not finite, these steps are repeated one by one. */
 static toda_status toda_march(toda_solver *s, size_t steps)
 {
     const size_t end = s->steps + steps;
@@ -388,10 +388,10 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
     toda_status status = toda_set_step(s, h);
     if (status != toda_OK || steps == 0) return status;
-    /* an open flow is merged with the next */
+    /* if the last flow is still to be merged with the next, the state is s->before */
     toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = toda_march(s, steps);
-    if (s->open && !toda_try(s, 0)) { /* the last flow of the last step; s->before stays before it */
+    if (s->open && !toda_try(s, 0)) { /* makes the last flow; s->before remains before it */
         status = toda_NOT_FINITE;
         s->open = 0;
         --s->steps;

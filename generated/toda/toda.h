@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 13af0ddc5745a106d04c5ced75cda5db4f0e7addbdc85e63dcbb86f9042b6477
+ * body-sha256: 31e3a3d8176ca88cae60954e635b8df95c5e769dcfc2cdc5920e5155c535dac2
  */
 #ifndef TODA_H
 #define TODA_H
@@ -28,9 +28,9 @@ enum { toda_COEFFICIENTS = 28 }; /* numbers that are functions of params and h *
 typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
     toda_BAD_ARGUMENT } toda_status;
 
-/* A solver, initialised by toda_init. Its arrays lie in memory of the caller: a copy of the struct is no
-   independent solver. A field lies in rows, all sites along the last axis, with a halo where steps read other
-   sites: copies of the other end beside each end. Only read the struct, at any time. */
+/* A solver, initialised by toda_init. Its arrays lie in memory of the caller, so a copy is no independent
+   solver. Fields are stored in rows along the last axis. If steps read neighbours, a row has a halo: copies
+   of the other end beside each end. Callers may only read the struct. */
 typedef struct {
     size_t sizes[toda_AXES]; /* number of sites along each axis */
     size_t sites, rows; /* number of all sites, and of rows */
@@ -49,7 +49,7 @@ typedef struct {
     double t_before_h;
 } toda_solver;
 
-/* Bytes that toda_init needs for these sizes; 0 if they are not admissible. */
+/* Number of bytes that toda_init needs for these sizes; 0 if they are not admissible. */
 size_t toda_work_size(const size_t sizes[toda_AXES]);
 
 /* Initialise *s with the state x0[field][site], the last axis fastest. work has toda_work_size(sizes) bytes,
@@ -68,9 +68,9 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 /* Copy the state to x[field][site]. */
 void toda_state(const toda_solver *s, double *x);
 
-/* Save and restore a run with the same bits: toda_saved writes far and arrays x[field][site], and returns
-   their number, at most that of fields, with compensated steps three times that. toda_resume takes all three
-   after toda_init with the state. */
+/* Save and restore a run: it continues with the same bits. toda_saved writes far and arrays x[array][site],
+   and returns their number: at most that of fields, or three times that with compensated steps. To restore,
+   call toda_resume with these after toda_init. */
 size_t toda_saved(const toda_solver *s, double *x, size_t *far);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t fields, size_t far);
 

@@ -10,7 +10,7 @@
 #include "solver.c"
 #include "adjoint_lanes.c"
 
-/* Set all members of *s but the state to their values before the last step. */
+/* Set all members of *s except the state, such as time and number of steps, to their values before the last step. */
 static void phi_rewind(phi_solver *s)
 {
     --s->steps;
@@ -18,7 +18,7 @@ static void phi_rewind(phi_solver *s)
     phi_renew(s);
 }
 
-/* If a row is written after done steps, add the derivatives of L by it. */
+/* If the state after done steps is an output row, add the derivatives of L by this row to the cotangent of the state. */
 static void phi_join(phi_cotangent *bar, const double *rows_bar, size_t done, size_t steps, size_t stride)
 {
     if (done != steps && done % stride != 0) return;
@@ -33,8 +33,8 @@ static void phi_join(phi_cotangent *bar, const double *rows_bar, size_t done, si
 #include "adjoint_tape_gauss.c"
 #include "adjoint_tape_explicit.c"
 
-/* Make steps and write their tape. rows, if not NULL, receives the states after stride, 2 * stride, ... steps and at
-   the end. */
+/* Make steps and write their tape, the data for the reverse pass. rows, if not NULL, receives the states after stride,
+   2 * stride, ... steps and at the end. */
 static phi_status phi_record_run(phi_solver *s, size_t steps, size_t stride, double *rows,
     phi_step_tape *tape)
 {
@@ -61,7 +61,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 {
     if (s == NULL || rows_bar == NULL || x0_bar == NULL || trail == NULL || stride == 0) return PHI_BAD_ARGUMENT;
     const phi_solver before = *s;
-    phi_status status = phi_integrate(s, h, 0); /* so that all coefficients for h are computed */
+    phi_status status = phi_integrate(s, h, 0); /* 0 steps: computes all coefficients for h */
     if (status != PHI_OK) return status;
     phi_step_tape *tape = (phi_step_tape *)trail;
     phi_cotangent bar;

@@ -2,8 +2,8 @@
 #define PHI_FILE_ADJOINT_BACK
 #include "adjoint.c"
 
-/* Reverse pass of the step that led to s, from its tape. All members of *s but the state get their values before the
-   step. */
+/* Pull the cotangent *bar back through the step that led to *s, by the tape of the step. All members of *s except the
+   state get their values before the step. */
 static phi_status phi_back_step(phi_solver *s, phi_step_tape tape, phi_cotangent *bar)
 {
     phi_rewind(s);
@@ -12,7 +12,7 @@ static phi_status phi_back_step(phi_solver *s, phi_step_tape tape, phi_cotangent
     return status;
 }
 
-/* Reverse pass of the steps that led to s, from their tape. */
+/* Pull the cotangent *bar back through the steps that led to *s, by their tape, and add the derivatives by output rows. */
 static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const double *rows_bar,
     phi_step_tape *tape, phi_cotangent *bar)
 {

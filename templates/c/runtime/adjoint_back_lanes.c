@@ -5,14 +5,15 @@
 
 #include "adjoint.c"
 
-/* Reverse pass of the steps that led to s, from their tape, vectorised over stages. */
+/* Pull the cotangent *bar back through the steps that led to *s, by their tape, and add the derivatives by output rows.
+   Several stages are linearised at once, one in each lane. */
 static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const double *rows_bar,
     phi_step_tape *tape, phi_cotangent *bar)
 {
     phi_traced g;
     phi_lanes coef[PHI_COEFFICIENTS], slopes[PHI_COEFFICIENTS];
     phi_status status = PHI_OK;
-    size_t at = steps; /* the step after the one being processed */
+    size_t at = steps; /* number of steps before the next stage to load */
     g.coef = coef;
     memset(g.after, 0, sizeof g.after);
     memset(g.change, 0, sizeof g.change);

@@ -9,17 +9,17 @@
 #include "solver.c"
 
 /* ---- Gradients of SIMD batches of members ---- */
-/* Reverse pass of a SIMD batch: one member of the ensemble in each lane. */
+/* A batch of the reverse pass has PHI_BACK_PACKS vectors, with one member of the ensemble in each lane. */
 enum { PHI_BACK_GROUP = (int)PHI_BACK_PACKS * PHI_LANES };
 
 #include "adjoint_segment.h"
 
-/* Derivatives of L, as in phi_cotangent, one member in each lane. */
+/* Derivatives of a number L by state, coefficients and parameters, with one member of the ensemble in each lane. */
 typedef struct {
 #include "state_of_back_group.h"
 } phi_back_group;
 
-/* Add a number to all lanes. */
+/* Add more to sum, lane by lane. */
 static inline void phi_gain_lanes(double sum[restrict PHI_LANES], const double more[restrict PHI_LANES])
 {
     PHI_EACH_LANE
@@ -29,7 +29,7 @@ static inline void phi_gain_lanes(double sum[restrict PHI_LANES], const double m
 #include "adjoint_join_groups.c"
 #include "adjoint_join_batches.c"
 
-/* If a row is written after done steps: write the states of the members, or add the cotangents of the row. */
+/* If the states after done steps are an output row, write the states of the members to it. */
 static void phi_pull_rows(const phi_group *group, int count, const phi_pulled *all, size_t first, size_t done)
 {
     const size_t row = (done + all->stride - 1) / all->stride - 1;

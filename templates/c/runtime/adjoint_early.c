@@ -4,8 +4,8 @@
 
 #include "adjoint_stage.c"
 
-/* Add the derivatives by time-dependent coefficients, times their derivatives by the other coefficients of the row, to
-   the derivatives by these. */
+/* Time-dependent coefficients are functions of the time and of the other coefficients of their row. By the chain rule, add
+   the derivatives by time-dependent coefficients to the derivatives by the other coefficients. */
 static void phi_early(const double *coef, double *coef_bar, double t)
 {
     double bar_of_prepared[PHI_PREPARED + 1];

@@ -2,7 +2,8 @@
 #define PHI_FILE_ADJOINT_EARLY_STAGES
 #include "adjoint_early.c"
 
-/* Apply the reverse pass of time-dependent coefficients to all rows of a step that begins at the time of s. */
+/* Pull the cotangents of time-dependent coefficients back to the other coefficients, for all stages of a step that begins
+   at the time of s. */
 static void phi_all_early(const phi_solver *s, phi_cotangent *bar)
 {
     PHI_EACH_STAGE

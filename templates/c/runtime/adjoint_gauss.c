@@ -10,7 +10,7 @@
 
 #include "gauss_adjoint_policy.h"
 
-/* Cotangents of the unknowns at all stages, from those of the stage increments: the transpose of phi_slopes. */
+/* Compute the cotangents of the unknowns z at all stages from the cotangents of the stage increments. */
 static void phi_unknowns_bar(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
     phi_lanes *increments_bar, phi_lanes *z_bar)
 {
@@ -27,14 +27,14 @@ static void phi_unknowns_bar(const phi_solver *s, double point[PHI_POINT], phi_l
 #endif
 }
 
-/* Add the contributions of all stages to the cotangents of the start of the step and of the coefficients, from the
-   cotangents of the stage increments. */
+/* Add to the cotangents of the start of the step and of the coefficients what they get from the stage increments, whose
+   cotangents are given. */
 static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z,
     phi_lanes *increments_bar, phi_cotangent *bar)
 {
 #if PHI_STAGED
     phi_lanes x[PHI_DIM], coef[PHI_COEFFICIENTS];
-    memset(coef, 0, sizeof coef); /* the field at a stage may depend on no coefficient */
+    memset(coef, 0, sizeof coef); /* in case the vector field depends on no coefficient */
     phi_stage_start_adjoint_lanes(s->coef, point, z, weights, increments_bar, x, coef);
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_DIM; ++k) bar->x[k] += x[k][i];
@@ -52,8 +52,8 @@ static void phi_add_stages(const phi_solver *s, double point[PHI_POINT], phi_lan
 #endif
 }
 
-/* Cotangents of the stage increments, from those of their sum and of the unknowns: sums with the transposes of mu and 1
-   - mu. */
+/* Compute the cotangents of the stage increments. The increments enter the step by their sum, whose cotangent is end_bar,
+   and by the unknowns of the stages, whose cotangents are z_bar; mu_ij = 1 - mu_ji gives the transpose of the matrix mu. */
 static void phi_mixed_back(const double end_bar[PHI_UNKNOWNS], phi_lanes *z_bar, phi_lanes *increments_bar)
 {
     phi_mixed(phi_mixing, z_bar, increments_bar);
@@ -65,7 +65,8 @@ static void phi_mixed_back(const double end_bar[PHI_UNKNOWNS], phi_lanes *z_bar,
     }
 }
 
-/* Largest change of a cotangent at any stage, as sums of magnitudes: squares could underflow. */
+/* Largest change of the cotangents at any stage: the sum of |after - before| over the unknowns, since squares could
+   underflow. */
 static double phi_change_back(phi_lanes *before, phi_lanes *after)
 {
     double largest = 0.0;
@@ -81,8 +82,8 @@ static double phi_change_back(phi_lanes *before, phi_lanes *after)
 }
 
 #if PHI_FRAMED
-/* Transform cotangents of unknowns from the frame of the end of the step to that of its start: multiply them by the
-   transpose of the change of frame, whose columns are the images of unit vectors. */
+/* Transform cotangents of unknowns from the frame at the end of the step to the frame at its start: multiply them by the
+   transpose of the matrix of the change of frame, whose columns are the images of unit vectors. */
 static void phi_see_back(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *bar)
 {
     phi_lanes next_frame_bar[PHI_UNKNOWNS], unit[PHI_UNKNOWNS];
@@ -101,8 +102,8 @@ static void phi_see_back(const phi_solver *s, double point[PHI_POINT], const dou
 }
 
 #endif
-/* Starting values for the cotangents of the stage increments, from the cotangents of the unknowns in the step after: the
-   predictor of steps, with the stages in the opposite order. */
+/* Compute starting values for the cotangents of the stage increments from the cotangents of the unknowns in the next step,
+   by the predictor of steps with the stages in reverse order. */
 static void phi_predict_back(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS],
     const double end_bar[PHI_UNKNOWNS], const phi_cotangent *bar, phi_lanes *increments_bar)
 {
@@ -132,7 +133,7 @@ static phi_status phi_collocate_back(const phi_solver *s, double point[PHI_POINT
     phi_lanes z_bar[PHI_UNKNOWNS], next[PHI_UNKNOWNS];
     double last = HUGE_VAL, size = 0.0;
     int stalls = 0;
-    const int first = bar->chained; /* the first sweep whose change shows the rate: a prediction has no z_bar */
+    const int first = bar->chained; /* the first sweep whose change shows the rate of convergence: 1 after a prediction */
     for (int k = 0; k < PHI_UNKNOWNS; ++k) size += fabs(end_bar[k]);
     memset(z_bar, 0, sizeof z_bar);
     memset(next, 0, sizeof next);

@@ -28,8 +28,8 @@ static int phi_pull_end(const phi_back_group *bar, int m, const phi_pulled *all,
     return 1;
 }
 
-/* Reverse pass of one batch, from member first on. Members whose lane fails, or that vectorised code cannot treat, are
-   repeated one by one. Returns the first status that is not OK. */
+/* Forward and reverse pass of one batch, from member first on. Members whose lane fails, or that vectorised code cannot
+   treat, are repeated one by one. Returns the first status that is not OK. */
 PHI_APART static phi_status phi_pull_group(const phi_pulled *all, size_t first)
 {
     phi_group group;
@@ -37,7 +37,7 @@ PHI_APART static phi_status phi_pull_group(const phi_pulled *all, size_t first)
     phi_status result = PHI_OK;
     int good[PHI_BACK_GROUP];
     const int count = all->members - first < PHI_BACK_GROUP ? (int)(all->members - first) : PHI_BACK_GROUP;
-    int together = count > 2; /* measured: smaller batches are faster one member at a time */
+    int together = count > 2; /* measured: one or two members are faster one at a time */
     memset(&group, 0, sizeof group);
     memset(bar.x, 0, sizeof bar.x);
     memset(bar.coef, 0, sizeof bar.coef);

@@ -6,7 +6,8 @@
 
 #define PHI_AT_ONCE ((size_t)1) /* number of steps after which their solutions are read from the predictor */
 
-/* Read the solution of the last step from the predictor of a stage. Returns 0 if more than one step is asked for. */
+/* Write the solution of a stage in the last step, which its predictor stores, to the tape. Returns 0 if it is not stored,
+   or for more than one step. */
 static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_step_tape *tape)
 {
     if (steps > 1) return 0;

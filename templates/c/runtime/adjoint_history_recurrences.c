@@ -6,7 +6,7 @@
 
 #define PHI_AT_ONCE ((size_t)PHI_REMEMBERED) /* number of steps after which their solutions are read from the predictor */
 
-/* Read the solutions of the last steps from the predictor of a stage. Returns 0 if it stores fewer. */
+/* Write the solutions of a stage in the last steps, which its predictor stores, to the tape. Returns 0 if it stores fewer. */
 static int phi_read_history(const phi_history *history, size_t steps PHI_AND_INT_STAGE, phi_step_tape *tape)
 {
     const size_t count = (size_t)history->count;

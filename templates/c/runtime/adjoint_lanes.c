@@ -10,9 +10,9 @@
 #include "solver.c"
 
 /* ---- Reverse pass, vectorised over stages ---- */
-/* The tape gives the points at which stages are linearised, before any cotangent is known. So the derivatives of
-   several stages are computed together, one in each lane; then the cotangent passes through them one after the other,
-   as a product with a small matrix. */
+/* The tape gives the points at which stages are linearised, before any cotangent is known. So the derivatives of several
+   stages are computed together, one in each lane. Then the cotangent is pulled back through the stages one after the
+   other, by a product with a small matrix for each. */
 
 /* Linearised stages, one in each lane. jacobian and gain are the transposes of the derivatives of alpha(y) and of the
    increment. The cotangent `after` at the end of a stage becomes after + change, where jacobian change = gain after.
@@ -60,7 +60,7 @@ static void phi_solve_lanes(phi_lanes *matrix, phi_lanes *sides, int count, phi_
 #include "adjoint_newton_lanes.c"
 #include "adjoint_path_lanes.c"
 
-/* Load one stage of the step before *at from the tape into a lane. */
+/* Load one stage of a step into a lane: y is its solution on the tape, *at the solver after the step. */
 static void phi_load(phi_traced *g, int lane, const phi_solver *at PHI_AND_INT_STAGE, const double y[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) g->y[i][lane] = y[i];
@@ -68,8 +68,8 @@ static void phi_load(phi_traced *g, int lane, const phi_solver *at PHI_AND_INT_S
     PHI_NOTE_TIME_OF_LANE(g, at)
 }
 
-/* Pull a cotangent back through a linearised stage; where its lane failed, through the stage by itself, with
-   pivoting. */
+/* Pull a cotangent back through the linearised stage in a lane. If its elimination failed, the stage is linearised again,
+   with pivoting. */
 static phi_status phi_through(phi_traced *g, int lane, phi_cotangent *bar, double coef_bar[PHI_COEFFICIENTS])
 {
     double change[PHI_DIM] = { 0.0 };

@@ -4,7 +4,8 @@
 
 #include "solver.h"
 
-/* Subtract the part of the derivatives by the parameters of H that acts through e = -H. */
+/* Add the derivatives that act through the energy level e = -H: subtract e_bar times slope, the derivatives of H by the
+   parameters, from *params_bar. */
 static void phi_subtract_level(phi_params *params_bar, double e_bar, const double slope[])
 {
     double sums[sizeof(phi_params) / sizeof(double)];

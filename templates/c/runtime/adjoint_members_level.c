@@ -2,7 +2,8 @@
 #define PHI_FILE_ADJOINT_MEMBERS_LEVEL
 #include "adjoint_members.c"
 
-/* Add the derivatives that act through the energy level e of a member, if e = -H(x0). */
+/* Add the derivatives that act through the energy level e of a member to those by its initial state and parameters, unless
+   the caller gives e. */
 static void phi_pull_level(const phi_pulled *all, size_t m, double e_bar)
 {
     const phi_params *params = all->params != NULL ? all->params + m : NULL;

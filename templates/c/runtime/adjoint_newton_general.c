@@ -5,7 +5,7 @@
 #include "adjoint_lanes.c"
 #include "adjoint_newton_sparse.c"
 
-/* Linearise the stages at their solutions. */
+/* Linearise the stages in all lanes at their solutions y. */
 static void phi_linearise_back(phi_traced *g)
 {
     phi_lanes displacement[PHI_DIM], increment[PHI_DIM], jacobian[PHI_DIM * PHI_DIM];

@@ -7,7 +7,8 @@
 #include "adjoint_newton_centred.c"
 #include "adjoint_newton_general.c"
 
-/* Cotangents of the coefficients, from those of the ends of stages and of the residuals. */
+/* Compute the cotangents of the coefficients of all stages from the cotangents of the ends of the stages and of the
+   residuals of their equations. */
 static void phi_slopes_back(phi_traced *g, phi_lanes slopes[restrict PHI_COEFFICIENTS])
 {
     phi_lanes minus[PHI_DIM];

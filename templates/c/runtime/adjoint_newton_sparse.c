@@ -4,7 +4,7 @@
 
 #include "adjoint_lanes.c"
 
-/* Set matrices to 0: the generated kernels write non-zero entries only. */
+/* Set the matrices to 0, since the kernels write only entries that can be different from 0. */
 static void phi_clear_zeros(phi_lanes jacobian[PHI_DIM * PHI_DIM], phi_lanes slope[PHI_DIM * PHI_DIM])
 {
     memset(jacobian, 0, PHI_DIM * PHI_DIM * sizeof jacobian[0]);

@@ -6,20 +6,20 @@
 #include "adjoint_stage.c"
 #include "adjoint_path.h"
 
-#define PHI_BACK_NEGLIGIBLE 1e-18    /* largest terms that rounding hides in their sum, relative to start and sum */
-#define PHI_BACK_ROUNDED_SLOPE 1e-13 /* rounding of slopes, relative to the path and its slope */
-#define PHI_ANCHORED 8               /* most corrections of the end of a path, so that its mean is the solution y */
+#define PHI_BACK_NEGLIGIBLE 1e-18    /* terms of a series below this are negligible, relative to start and sum */
+#define PHI_BACK_ROUNDED_SLOPE 1e-13 /* accepted error of the slope of a series, relative to the path and its slope */
+#define PHI_ANCHORED 8               /* largest number of corrections of the end of a path, so that its mean is the solution y */
 #define PHI_ANCHORED_TO 1e-15        /* accuracy of the mean after these corrections, relative to the state */
 
-/* Offsets of the groups of quantities in a path that is integrated backward: the state, its cotangent, and the
-   cotangents of p and of the coefficients. */
+/* Sum the magnitudes of each group of quantities of a path that is integrated backward: of the state, of its cotangent, of
+   the cotangent of p, and of the cotangents of the coefficients. */
 static void phi_back_sizes(const double values[PHI_BACK], double sizes[4])
 {
     for (int g = 0; g < 4; ++g) sizes[g] = 0.0;
     for (int i = 0; i < PHI_BACK; ++i) sizes[i < 3 * PHI_DIM ? i / PHI_DIM : 3] += fabs(values[i]);
 }
 
-/* Whether the slope of an expansion at m is that of the equation of a path integrated backward. */
+/* Whether the slope of the Taylor series at m satisfies the differential equation of a path integrated backward. */
 static int phi_back_holds(const double *coef, const double p[PHI_BACK], const double m[PHI_BACK],
     const double slope[PHI_BACK])
 {
@@ -69,8 +69,9 @@ static int phi_back_piece(const double *coef, const double p[PHI_BACK], const do
     return 0;
 }
 
-/* Cotangents of the start of a path, of p and of the coefficients that it depends on (found, after the state), from
-   those of its end and of its mean. Returns 0 if the path cannot be followed. */
+/* Integrate a path backward from its end, to compute the cotangents of its start, of p and of the coefficients from those,
+   bar of its end and mean_bar of its mean. cotangents receives the start, then these cotangents. Returns 0 if the path
+   cannot be followed. */
 static int phi_traced_back(const double *coef, const double end[PHI_DIM], const double p[PHI_DIM],
     const double bar[PHI_DIM], const double mean_bar[PHI_DIM], double cotangents[PHI_BACK])
 {
@@ -120,8 +121,9 @@ static int phi_anchor(const double *coef, const double p[PHI_DIM], const double 
     return 1;
 }
 
-/* Pull a cotangent back through a stage whose path had the mean y. With p = grad S_h(y), the cotangent w of p is b + B
-   H w. Here b comes from the cotangent of the end of the path, B from that of its mean, and H is the Hessian of S_h. */
+/* Pull a cotangent back through a stage whose path had the mean y. Its covector is p = grad S_h(y), with the generating
+   function S_h and its Hessian H. The cotangent w of p solves w = b + B H w, where b comes from the cotangent of the end of
+   the path, and B from its mean. */
 static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM], phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {

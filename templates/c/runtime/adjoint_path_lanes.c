@@ -4,11 +4,12 @@
 #include <string.h>
 #include "adjoint_lanes.c"
 
-#define PHI_BACK_SETTLED 1e-15  /* accuracy of the middles of paths */
-#define PHI_BACK_ACCURACY 1e-17 /* accuracy of the derivatives of paths */
+#define PHI_BACK_SETTLED 1e-15  /* relative accuracy of the middles of paths, m at half time */
+#define PHI_BACK_ACCURACY 1e-17 /* relative accuracy of the derivatives of paths */
 
 #if PHI_ALONG
-/* Compute the derivatives of the paths by the coefficients that pi depends on, to as many orders as those by p. */
+/* Compute the Taylor series of the derivatives of the paths by the coefficients that pi depends on, to the order of the
+   derivatives by p. */
 static void phi_vary_coefficients(phi_expansion *e)
 {
     memset(e->w[0], 0, sizeof e->w[0]);
@@ -35,8 +36,8 @@ static void phi_vary_coefficients(phi_expansion *e)
 }
 
 #endif
-/* Compute the derivatives of the start and the change of the paths, by their middles and p, from the sums of the even
-   and of the odd terms. */
+/* Compute the derivatives of the starts and changes of the paths by their middles and by p, from the sums of the even and
+   of the odd terms of their series. */
 static void phi_ends_of_slopes(phi_expansion *e)
 {
     for (int i = 0; i < 2 * PHI_DIM * PHI_DIM; ++i) {
@@ -48,7 +49,7 @@ static void phi_ends_of_slopes(phi_expansion *e)
     }
 }
 
-/* Integrate the paths with mean y and covector p, and their derivatives. */
+/* Compute the paths with mean y and covector p in all lanes, and their derivatives. */
 static void phi_trace(phi_traced *g, phi_lanes hessian[restrict PHI_DIM * PHI_DIM])
 {
     phi_lanes middle[PHI_DIM];
@@ -73,8 +74,9 @@ static void phi_trace(phi_traced *g, phi_lanes hessian[restrict PHI_DIM * PHI_DI
     }
 }
 
-/* Linearise the stages. M and N are the derivatives of the mean by the middle and by p = grad S_h(y), H is the Hessian
-   of S_h. The derivative of the middle by y is M^-1 (1 - N H); those of the start and of the change follow from it. */
+/* Linearise the stages in all lanes. M and N are the derivatives of the mean of a path by its middle and by its covector
+   p = grad S_h(y), H is the Hessian of S_h. The derivative of the middle by y is M^-1 (1 - N H), from which the derivatives
+   of start and change of the path follow. */
 static void phi_linearise_back(phi_traced *g)
 {
     phi_lanes hessian[PHI_DIM * PHI_DIM], matrix[PHI_DIM * PHI_DIM], follows[PHI_DIM * PHI_DIM];
@@ -108,11 +110,11 @@ static void phi_linearise_back(phi_traced *g)
         }
 }
 
-/* Cotangents of the coefficients from those of ends and starts: first the cotangent of p, then contributions through p
-   and through the paths. */
+/* Compute the cotangents of the coefficients from the cotangents of ends and starts of paths. Coefficients act through p,
+   whose cotangent is computed first, and through the paths. */
 static void phi_slopes_back(phi_traced *g, phi_lanes slopes[restrict PHI_COEFFICIENTS])
 {
-    phi_lanes matrix[PHI_DIM * PHI_DIM], mean[PHI_DIM], covector[PHI_DIM], known = { 0.0 }; /* reuses the pivots of the factorisation */
+    phi_lanes matrix[PHI_DIM * PHI_DIM], mean[PHI_DIM], covector[PHI_DIM], known = { 0.0 }; /* pivots are not checked again: g->wrong has the result */
     const phi_expansion *e = &g->e;
     for (int i = 0; i < PHI_DIM; ++i) {
         phi_lanes along_m = { 0.0 }, along_p = { 0.0 };

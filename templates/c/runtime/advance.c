@@ -5,8 +5,8 @@
 
 #include "model.h"
 
-/* Add change + small to x in compensated arithmetic. small holds the compensation term and other small terms: rounded
-   together with change, they would drift. Returns 0, with x unchanged, if the sum is not finite. */
+/* Add change + small to x by compensated summation. small holds the compensation term and other terms that are small
+   compared with change. Returns 0, with x unchanged, if the sum is not finite. */
 static int phi_advance(phi_solver *s, const double *change, const double *small)
 {
     double x[PHI_DIM], carry[PHI_DIM];

@@ -11,11 +11,10 @@
 #include "attitude_position.c"
 #include "attitude_gauge.c"
 
-/* Multiply the group element of the attitude by 1 + factor, the attitude increment of a step, in compensated arithmetic.
-   */
+/* Multiply s->turned, the group element of the attitude, by 1 + factor, the attitude increment of a step or stage, in
+   compensated arithmetic. */
 #if PHI_RATE_OF_GAUGE
-/* The group element `aside` of the gauge rotation, the same in every step, multiplies from the other side. It may be
-   NULL. */
+/* Then multiply it from the other side by 1 + aside, the gauge rotation in the time of the step; NULL for none. */
 #endif
 static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND_DOUBLE_ASIDE)
 {
@@ -35,7 +34,7 @@ static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT] PHI_AND
 #include "attitude_element.c"
 #include "attitude_covector.c"
 
-/* Compute the product of two attitude increments; all three are stored minus the identity. */
+/* Compute the product of two attitude increments. Factors and product are stored as their differences from the identity. */
 static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_ELEMENT], double both[PHI_ELEMENT])
 {
     double element_of_first[PHI_ELEMENT], change[PHI_ELEMENT];
@@ -45,15 +44,15 @@ static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_
     for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = first[i] + change[i];
 }
 
-/* Multiply the attitude by the increments of all stages in a block, in order of time; they are overwritten. */
+/* Multiply the attitude by the increments of all stages in a block of steps, in order of time. sequence is overwritten. */
 static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int count)
 {
-    for (; count % 2 == 0; count /= 2) /* products of neighbours first: they do not depend on each other */
+    for (; count % 2 == 0; count /= 2) /* products of pairs first, since they do not wait for each other */
         for (int k = 0; k < count / 2; ++k) phi_joined(sequence[2 * k], sequence[2 * k + 1], sequence[k]);
     for (int k = 0; k < count; ++k) phi_turn_by(s, sequence[k] PHI_AND_ASIDE_OF_BLOCK);
 }
 
-/* Initialise the group element at the present state. */
+/* Initialise the attitude of the present state with the group element first. */
 static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
 {
     memset(s->turned_carry, 0, sizeof s->turned_carry);
@@ -62,7 +61,7 @@ static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
     phi_read_attitude(s);
 }
 
-/* Compute the rotation rate of the gauge anew, after a change of the state or the parameters. */
+/* Compute the rate of the gauge rotation anew, after a change of the state or of the parameters. */
 static void phi_renew_rate(phi_solver *s)
 {
 #if PHI_MATRICES

@@ -4,10 +4,10 @@
 #include "attitude_matrices.c"
 #include "attitude_quaternions.c"
 
-/* ---- Gauge rotation: in the frame where momenta are constant, subtracting multiples of Casimirs from H adds a uniform
-   rotation of the body ---- */
-/* Add to an element and to its compensation term the change of s->turned by multiplication by 1 + aside, the gauge
-   rotation of a step; NULL for none. */
+/* ---- Gauge rotation: subtracting multiples of Casimirs from H adds a uniform rotation of the body, with a constant rate
+   in the frame where the momenta are constant ---- */
+/* Multiply s->turned by 1 + aside, the gauge rotation of a step, and add its change to element and to carry. NULL for no
+   rotation. */
 static inline void phi_add_aside(phi_solver *s, const double *aside, double element[PHI_ELEMENT], double carry[PHI_ELEMENT])
 {
     double change[PHI_ELEMENT];
@@ -24,7 +24,7 @@ static void phi_set_aside(phi_solver *s)
     PHI_SET_ASIDE_OF_BLOCK(s)
 }
 
-/* Compute the rate of the gauge rotation after x or the attitude has been set. */
+/* Compute the rate of the gauge rotation, after the state or the attitude has been set. */
 static void phi_take_rate(phi_solver *s)
 {
     phi_rate(&s->params PHI_AND_GAUGE(s->gauge), s->x, s->rate);

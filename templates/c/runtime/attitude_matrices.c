@@ -17,7 +17,7 @@ static void phi_group_product(const double a[PHI_ELEMENT], const double b[PHI_EL
         }
 }
 
-/* Add the identity to an element. */
+/* Add the identity matrix to a matrix. */
 static inline void phi_add_identity(double element[PHI_ELEMENT])
 {
     for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) element[i] += 1.0;
@@ -25,7 +25,7 @@ static inline void phi_add_identity(double element[PHI_ELEMENT])
 
 #include "attitude_orthogonal.c"
 
-/* Number of halvings after which the exponential of P is a short sum. */
+/* Number of times that a matrix must be halved until its norm is at most 1/2; square is the square of its norm. */
 static int phi_doublings(double square)
 {
     int doublings = 0;
@@ -33,12 +33,12 @@ static int phi_doublings(double square)
     return doublings;
 }
 
-/* Compute exp(P) - 1 for the matrix P of a covector: exp(P/2^k) is squared k times. Each squaring doubles rounding
-   errors; orthogonal matrices are made orthogonal again after it. */
+/* Compute exp(P) - 1 for the matrix P that the numbers p define: exp(P/2^k) is squared k times. Each squaring doubles
+   rounding errors, so orthogonal matrices are made orthogonal again after it. */
 static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[PHI_ELEMENT])
 {
     double small[PHI_COVECTOR], square[PHI_ELEMENT];
-    int doublings = phi_doublings(p[PHI_COVECTOR - 1]); /* bound for the squared norm of P */
+    int doublings = phi_doublings(p[PHI_COVECTOR - 1]); /* the last number of p bounds the squared norm of P */
     if (doublings == 0) {
         phi_exponential(p, element);
         return;
@@ -52,7 +52,7 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
     }
 }
 
-/* Compute the element of the motion with a constant rate for the time t, minus 1. */
+/* Compute the group element of a motion for the time t with a constant rate; element is its difference from the identity. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     double p[PHI_RATE];
@@ -61,7 +61,7 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     phi_matrix_exponential(p, element);
 }
 
-/* Set the initial element; s->turned, the product of all later increments, becomes the identity. */
+/* Set the initial attitude s->first; s->turned, the product of all later increments, becomes the identity. */
 static void phi_take_element(phi_solver *s, const double first[PHI_ELEMENT])
 {
     memmove(s->first, first, sizeof s->first);
@@ -69,6 +69,6 @@ static void phi_take_element(phi_solver *s, const double first[PHI_ELEMENT])
     phi_add_identity(s->turned);
 }
 
-/* Update the public attitude. */
+/* Update s->attitude, which users read. */
 static void phi_read_attitude(phi_solver *s) { PHI_READ_PRODUCT(s) }
 #endif

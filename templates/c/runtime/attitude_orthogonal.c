@@ -4,8 +4,8 @@
 
 #include "attitude_matrices.c"
 
-/* Correct the attitude increment 1 + factor, in place of factor, so that its product with the nearly orthogonal matrix g
-   is nearer to an orthogonal one. */
+/* Correct the attitude increment 1 + factor so that its product with the nearly orthogonal matrix g is nearer to an
+   orthogonal matrix. factor is overwritten. */
 static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT])
 {
     enum { N = PHI_ROWS_OF_ATTITUDE };
@@ -20,7 +20,7 @@ static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT
     for (int i = 0; i < PHI_ELEMENT; ++i) factor[i] -= excess[i] + change[i];
 }
 
-/* Change an element so that 1 + element, a nearly orthogonal matrix, is nearer to an orthogonal one. */
+/* Correct a matrix so that 1 + element, which is nearly orthogonal, is nearer to an orthogonal matrix. */
 static void phi_make_orthogonal(double element[PHI_ELEMENT])
 {
     double full_element[PHI_ELEMENT];

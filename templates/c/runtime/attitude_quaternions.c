@@ -18,7 +18,7 @@ static inline void phi_group_product(const double a[4], const double b[4], doubl
     product[3] = (a[0] * b[3] + a[3] * b[0]) + (a[1] * b[2] - a[2] * b[1]);
 }
 
-/* Compute the change of a vector under rotation by a quaternion. */
+/* Compute the change of the vector v when it is rotated by the quaternion q. */
 static void phi_rotation(const double q[4], const double v[3], double change[3])
 {
     const double x = q[2] * v[2] - q[3] * v[1], y = q[3] * v[0] - q[1] * v[2], z = q[1] * v[1] - q[2] * v[0];
@@ -27,7 +27,7 @@ static void phi_rotation(const double q[4], const double v[3], double change[3])
     change[2] = 2.0 * (q[0] * z + (q[1] * y - q[2] * x));
 }
 
-/* Compute the change of an element by multiplication by 1 + factor from the left. */
+/* Compute the change of a group element when it is multiplied by 1 + factor from the left. */
 static inline void phi_added_left(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
     double change[PHI_ELEMENT])
 {
@@ -37,7 +37,7 @@ static inline void phi_added_left(const double element[PHI_ELEMENT], const doubl
     for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
-/* Compute the change of an element by multiplication by 1 + factor from the right. */
+/* Compute the change of a group element when it is multiplied by 1 + factor from the right. */
 static inline void phi_added_right(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
     double change[PHI_ELEMENT])
 {
@@ -46,7 +46,7 @@ static inline void phi_added_right(const double element[PHI_ELEMENT], const doub
     for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
-/* Compute the element of the motion with a constant rate for the time t, minus 1. */
+/* Compute the group element of a motion for the time t with a constant rate; element is its difference from the identity. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     const double speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2])), quarter = 0.25 * (t * speed);
@@ -56,7 +56,7 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     phi_uniform_position(rate, t, speed, scale, element);
 }
 
-/* Rotate a rate into the frame where momenta are constant, by the element of the attitude. */
+/* Rotate the rate of the gauge rotation into the frame where momenta are constant; element is that of the attitude. */
 static void phi_carry_rate(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     double change[3];
@@ -78,20 +78,20 @@ static inline double phi_excess(const double q[4])
 #include "attitude_direction.c"
 #include "attitude_length.c"
 
-/* Add the identity to an element. */
+/* Add the identity, the quaternion 1, to a group element. */
 static inline void phi_add_identity(double element[PHI_ELEMENT]) { element[0] += 1.0; }
 
-/* Set the initial element. */
+/* Set the group element of the attitude. */
 static void phi_take_element(phi_solver *s, const double first[PHI_ELEMENT]) { memcpy(s->turned, first, sizeof s->turned); }
 
-/* Update the public attitude. */
+/* Update s->attitude, which users read. */
 static void phi_read_attitude(phi_solver *s)
 {
     memcpy(s->attitude, s->turned, sizeof s->attitude);
     phi_read_position(s);
 }
 
-/* Divide a quaternion by its length, unless that is 1 to round-off; size is the magnitude of its largest number. */
+/* Divide a quaternion by its length, unless the length is 1 to round-off. size is the magnitude of its largest component. */
 static void phi_make_unit(double quaternion[PHI_ELEMENT], double size)
 {
     double square = 0.0;

@@ -2,7 +2,8 @@
 #define PHI_FILE_ATTITUDE_VELOCITY_FIRST
 #include "model.h"
 
-/* Velocity of a point fixed in the body, in body coordinates: before the rate is rotated into these. */
+/* Before the rate is rotated into body coordinates: change its velocity, rate[3..5], from that of the space point at the
+   origin to that of the body point at the position of the body. */
 static inline void phi_leave_position(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     const double *p = element + 4, *w = rate;

@@ -2,7 +2,8 @@
 #define PHI_FILE_ATTITUDE_VELOCITY_LAST
 #include "model.h"
 
-/* Velocity of a point fixed in the body, in space coordinates: after the rate has been rotated into these. */
+/* After the rate has been rotated into space coordinates: change its velocity, rate[3..5], from that of the body point at
+   the position of the body to that of the space point at the origin. */
 static inline void phi_reach_position(const double element[PHI_ELEMENT], double rate[PHI_RATE])
 {
     const double *p = element + 4, *w = rate;

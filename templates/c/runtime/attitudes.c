@@ -9,7 +9,7 @@
 #include "noise.c"
 
 /* ---- Members with attitudes ---- */
-/* Initialise a member with its attitude and random numbers in the ensemble. */
+/* Initialise a solver for member m: its state, its attitude and its random numbers. */
 static phi_status phi_take_turned(const phi_members *all, size_t m, double x[PHI_DIM], phi_solver *s)
 {
     double element[PHI_ELEMENT];
@@ -22,7 +22,7 @@ static phi_status phi_take_turned(const phi_members *all, size_t m, double x[PHI
     return status;
 }
 
-/* Integrate one member from start to end. */
+/* Integrate member m from start to end, and write its last state and attitude. */
 static phi_status phi_turn_member(const phi_members *all, size_t m)
 {
     phi_solver s;
@@ -36,7 +36,7 @@ static phi_status phi_turn_member(const phi_members *all, size_t m)
     return status;
 }
 
-/* Arguments in the order of phi_ensemble_each and phi_ensemble_of. */
+/* The arguments have the order of phi_ensemble_each and phi_ensemble_of. */
 phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *attitude, size_t members,
     PHI_OWN_POINTER
     const double *h, size_t steps,

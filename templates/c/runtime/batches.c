@@ -10,7 +10,7 @@
 
 /* ---- SIMD batches of members: explicit steps ---- */
 enum {
-    PHI_PACK_COUNT = 4, /* batches in a group: the latency of one is hidden by the others */
+    PHI_PACK_COUNT = 4, /* batches in a group: while one waits for results, the processor works on the others */
     PHI_GROUP = PHI_PACK_COUNT * PHI_LANES,
     PHI_STRETCH = 32   /* steps between checks for finite values */
 };
@@ -19,7 +19,7 @@ enum {
 typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM];
 #if PHI_SPLITTING
-    phi_lanes start[PHI_DIM]; /* x at the start of the step; within a step, carry holds the sum of increments */
+    phi_lanes start[PHI_DIM]; /* x at the start of the step; during a step, carry holds the sum of its increments */
 #endif
 } phi_pack;
 
@@ -27,17 +27,17 @@ typedef struct {
 typedef struct {
     phi_pack pack[PHI_PACK_COUNT];
     phi_lanes PHI_OF(coef[PHI_PACK_COUNT], PHI_STAGES)[PHI_COEFFICIENTS];
-    int packs;    /* batches in use */
+    int packs;    /* number of batches in use */
     int distinct_coef;      /* whether members have different coefficients */
-    int prepared; /* whether the shared coefficients are set */
+    int prepared; /* whether coefficients that all members share have been computed */
 #if PHI_FAR
-    int far; /* whether full-range functions are needed */
+    int far; /* whether an argument is too large for the fast functions, which need small arguments */
 #endif
     int active[PHI_GROUP];       /* whether the lane holds a member that has not failed */
-    size_t steps_left[PHI_GROUP]; /* steps left to make */
+    size_t steps_left[PHI_GROUP]; /* number of steps that the member has still to make */
 } phi_group;
 
-/* phi_add for one coordinate in all lanes. */
+/* Add change to one coordinate within a step, in all lanes: displacement is the sum of the changes so far. */
 static inline void phi_add_lanes(double x[restrict PHI_LANES], double displacement[restrict PHI_LANES],
     const double start[restrict PHI_LANES], const double change[restrict PHI_LANES])
 {
@@ -48,7 +48,7 @@ static inline void phi_add_lanes(double x[restrict PHI_LANES], double displaceme
     }
 }
 
-/* phi_settle for one coordinate in all lanes. */
+/* At the end of a step, add the displacement in carry to one coordinate, in all lanes; carry becomes the rounding error. */
 static inline void phi_settle_lanes(double x[restrict PHI_LANES], double carry[restrict PHI_LANES],
     const double start[restrict PHI_LANES])
 {
@@ -66,7 +66,7 @@ static inline void phi_settle_lanes(double x[restrict PHI_LANES], double carry[r
 #include "batches_splitting.c"
 
 #if PHI_FAR
-/* As phi_steps_lanes, with full-range functions. */
+/* Make steps of a group with functions that accept arguments of any size. */
 PHI_APART static void phi_steps_far_lanes(phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step) {
@@ -77,7 +77,7 @@ PHI_APART static void phi_steps_far_lanes(phi_group *group, int steps)
 }
 
 #endif
-/* Number of active members with values that are not finite; lost marks them. */
+/* Number of active members with values that are not finite; lost[m] is 1 for these members. */
 static int phi_group_lost(const phi_group *group, int lost[PHI_GROUP])
 {
     int count = 0;
@@ -99,15 +99,15 @@ static void phi_pack_copy(phi_pack *to, const phi_pack *from, int lane)
     }
 }
 
-/* Make some steps of all members, with small-argument functions. */
+/* Make some steps of all members, with fast functions, which give NaN if an argument is too large. */
 static void phi_group_advance(phi_group *group, int steps)
 {
     if (group->distinct_coef) phi_steps_lanes(1, group, steps);
     else phi_steps_lanes(0, group, steps);
 }
 
-/* Make some steps of all members. A member whose values are not finite then leaves, with its state before these steps.
-   Returns the number of active members. */
+/* Make some steps of all members. A member whose values are not finite gets its state before these steps, and becomes
+   inactive. Returns the number of active members. */
 static int phi_group_steps(phi_group *group, int steps)
 {
     phi_pack before[PHI_PACK_COUNT];
@@ -134,7 +134,7 @@ static int phi_group_steps(phi_group *group, int steps)
     return active;
 }
 
-/* Assign a member to a lane, with its coefficients; if all members share coefficients, the first sets them. */
+/* Assign a member to a lane, with its coefficients. If all members share their coefficients, the first member sets them. */
 static phi_status phi_group_join(phi_group *group, int m, const phi_members *all, size_t first)
 {
     phi_solver s;
@@ -160,7 +160,7 @@ static phi_status phi_group_join(phi_group *group, int m, const phi_members *all
     return PHI_OK;
 }
 
-/* Write the frames of active members after a number of steps. */
+/* Write the states of active members to their frames, if frames are due after `done` steps. */
 static void phi_group_frame(const phi_group *group, const phi_members *all, size_t first, size_t done)
 {
     double x[PHI_DIM];
@@ -170,7 +170,7 @@ static void phi_group_frame(const phi_group *group, const phi_members *all, size
     }
 }
 
-/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
+/* Write the results of a member. Steps that it did not make in the group are made first, one by one. */
 static phi_status phi_group_end(const phi_group *group, int m, const phi_members *all, size_t first,
     phi_status status)
 {

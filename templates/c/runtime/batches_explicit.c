@@ -4,7 +4,7 @@
 #include <string.h>
 #include "batches.c"
 
-/* phi_stage for a batch of members, with sums compensated as in phi_advance. */
+/* Make one stage, x + increment(x), for a batch of members, in compensated arithmetic. */
 PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int distinct_coef, phi_pack *pack)
 {
     phi_lanes increment[PHI_DIM];
@@ -21,8 +21,8 @@ PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int distinct_co
     }
 }
 
-/* Make steps of a group: each stage for all batches. distinct_coef = 0: all members have the coefficients of the first
-   lane. */
+/* Make steps of a group: each stage for all batches before the next stage. distinct_coef = 0: all members have the
+   coefficients of the first lane. */
 PHI_IN_PLACE static inline void phi_steps_lanes(int distinct_coef, phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step)

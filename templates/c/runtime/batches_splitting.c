@@ -4,13 +4,13 @@
 #include <string.h>
 #include "batches.c"
 
-/* Start a step, before its flows. */
+/* Start a step of all members, before its flows: store x. */
 static void phi_begin_lanes(phi_group *group)
 {
     for (int k = 0; k < group->packs; ++k) memcpy(group->pack[k].start, group->pack[k].x, sizeof group->pack[k].x);
 }
 
-/* End a step, after its flows. */
+/* End a step of all members, after its flows: add the sum of the increments to the stored x. */
 static void phi_end_lanes(phi_group *group)
 {
     for (int k = 0; k < group->packs; ++k) {
@@ -19,7 +19,7 @@ static void phi_end_lanes(phi_group *group)
     }
 }
 
-/* Make steps of a group as in phi_stages: each flow for all batches. distinct_coef = 0: all members have the
+/* Make steps of a group: each flow for all batches before the next flow. distinct_coef = 0: all members have the
    coefficients of the first lane. */
 PHI_IN_PLACE static inline void phi_steps_lanes(int distinct_coef, phi_group *group, int steps)
 {

@@ -12,12 +12,12 @@
 /* ---- Blocks of steps ---- */
 #include "blocks_slopes.h"
 
-/* Data shared by all blocks: coefficients, equal in all lanes, and the recurrences that predict the solutions. */
+/* Data for all blocks of steps: the coefficients in each lane, and the recurrences that predict the solutions. */
 typedef struct {
 #include "state_of_table.h"
 } phi_table;
 
-/* phi_near for the points of all stages and lanes, relative to one reference value. */
+/* Whether the predicted points of all stages and lanes are near the state `last`. */
 static int phi_near_lanes(phi_model *model, const double last[PHI_DIM])
 {
     phi_lanes most = { 0.0 };
@@ -34,7 +34,7 @@ static int phi_near_lanes(phi_model *model, const double last[PHI_DIM])
     return phi_largest(most) <= PHI_REACH * size;
 }
 
-/* Update the table of a stage: its coefficients, and the weights of its recurrences if they were fitted since. */
+/* Update the table of a stage, after a new fit of its recurrences: their weights, and the coefficients. */
 static void phi_refresh(const phi_solver *s PHI_AND_INT_STAGE, phi_table *table)
 {
     if (PHI_OF(table->fits, stage) == PHI_OF(s->history, stage).fits) return;
@@ -66,7 +66,7 @@ static void phi_foresee(const phi_history *history, phi_lanes weight[restrict][P
     }
 }
 
-/* Append the solutions of all lanes to the history, in order of time. */
+/* Append the solutions in all lanes to the history; lane 0 is the earliest step. */
 static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM])
 {
     phi_make_room(history, PHI_LANES);
@@ -86,7 +86,7 @@ static void phi_slope(const phi_solver *s PHI_AND_DOUBLE_T, const double x[PHI_D
     phi_make_per_tau(&s->params, x, slope);
 }
 
-/* Step of size h by the classical Runge-Kutta method. x becomes the end of the step, mean the mean slope. */
+/* Make a step of size h by the classical Runge-Kutta method. x becomes the end of the step, mean its increment / h. */
 static void phi_runge_kutta(const phi_solver *s PHI_AND_DOUBLE_T, double h, double x[PHI_DIM], double mean[PHI_DIM])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
@@ -107,8 +107,8 @@ static void phi_runge_kutta(const phi_solver *s PHI_AND_DOUBLE_T, double h, doub
 #include "blocks_adams.c"
 #include "blocks_prediction.c"
 
-/* Predict the solutions of all stages and steps, by recurrences or else by approximate integration. Returns 0 if they
-   are not near the state. */
+/* Predict the solutions of all stages of the steps of a block, by recurrences or else by approximate integration. Returns
+   0 if a prediction is not near the state. */
 static int phi_predict_block(phi_solver *s, phi_table *table, phi_model *model)
 {
     if (!s->blocks.use_recurrences) phi_predict_by_march(s, table, model);
@@ -123,8 +123,8 @@ static int phi_predict_block(phi_solver *s, phi_table *table, phi_model *model)
 #include "blocks_attitude.c"
 
 /* Make PHI_LANES steps at once: predict the solutions of all, and correct them together until the remaining error is as
-   small as after a single step. Returns the number of iterations, or 0, with the solver unchanged, if it exceeds most.
-   */
+   small as after a single step. Returns the number of iterations. If more than `most` would be needed, it returns 0, and
+   the state is unchanged. */
 static int phi_block(phi_solver *s, phi_table *table, int most)
 {
     phi_model PHI_OF(model, PHI_STAGES);
@@ -171,13 +171,13 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 }
 
 enum {
-    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* steps that repay a fit for blocks; first wait without recurrences */
-    PHI_MOST_SINGLE_STEPS = 1000,     /* most single steps after a failed block */
-    PHI_TOO_MANY = 5 * PHI_LANES      /* no recurrences after a failed block and more single steps than this */
+    PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* number of steps whose savings repay the fits; also the first wait after recurrences failed */
+    PHI_MOST_SINGLE_STEPS = 1000,     /* largest number of single steps after a failed block */
+    PHI_TOO_MANY = 5 * PHI_LANES      /* recurrences are abandoned if a failed block leads to more single steps than this */
 };
-#define PHI_LATEST 0.125 /* weight of the latest step in the running mean of evaluations */
+#define PHI_LATEST 0.125 /* weight of the latest single step in the running mean of its evaluations */
 
-/* Stop using recurrences for a while, which doubles with every failure. */
+/* Stop using recurrences. The number of steps until they are tried again doubles with every failure. */
 static void phi_give_up(phi_solver *s)
 {
     s->blocks.use_recurrences = s->blocks.last_single_steps = s->blocks.single_steps = 0;
@@ -185,8 +185,8 @@ static void phi_give_up(phi_solver *s)
     s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
 }
 
-/* Choose the predictor of the next block: recurrences, fitted as soon as the steps to come, or those already made, are
-   enough to repay the fit. */
+/* Choose the predictor of the next block. Recurrences are fitted as soon as the number of steps to come, or of steps
+   already made, is large enough for them to repay the fit. */
 static void phi_choose_predictor(phi_solver *s, size_t steps)
 {
     PHI_EACH_STAGE
@@ -202,8 +202,9 @@ static void phi_choose_predictor(phi_solver *s, size_t steps)
     if (!s->blocks.use_recurrences) phi_give_up(s);
 }
 
-/* Update the measurements after a block. After a failed one, single steps are made, more with every failure.
-   Recurrences that fail repeatedly, or need more iterations than Runge-Kutta predictions did, are abandoned. */
+/* Update the measurements after a block that took `passes` iterations; 0 means that it failed. After a failed block, single
+   steps are made, more with every failure. Recurrences are abandoned if they fail repeatedly, or need more iterations than
+   Runge-Kutta predictions did. */
 static void phi_learn_from(phi_solver *s, int passes)
 {
     if (passes > 0) {
@@ -220,7 +221,7 @@ static void phi_learn_from(phi_solver *s, int passes)
     }
 }
 
-/* Make a single step, and update the running mean of evaluations for each of its stages. */
+/* Make a single step, and update the running mean of the number of evaluations in a stage. */
 static phi_status phi_single(phi_solver *s)
 {
     const size_t before = s->evaluations;
@@ -230,12 +231,12 @@ static phi_status phi_single(phi_solver *s)
     return status;
 }
 
-/* Solve steps in blocks while that costs less than single steps, with at most PHI_PASSES iterations of a block for each
-   evaluation in a single step. Results differ from single steps by round-off only. */
+/* Make steps in blocks as long as blocks cost less than single steps: a block may take at most PHI_PASSES times as many
+   iterations as a single step takes evaluations. Results differ from those of single steps by round-off only. */
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_table table;
-    phi_status status = phi_single_steps(s, h, 0); /* so that all coefficients for h are computed */
+    phi_status status = phi_single_steps(s, h, 0); /* 0 steps: computes all coefficients for h */
     PHI_EACH_STAGE PHI_OF(table.fits, stage) = -1;
     phi_end_march(&table);
     while (status == PHI_OK && steps > 0) {

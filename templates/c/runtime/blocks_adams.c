@@ -5,17 +5,17 @@
 #include "blocks.c"
 
 enum {
-    PHI_STRIDES = 2, /* factor of the Runge-Kutta error, which all stages of a step share */
-    PHI_MEETINGS = 2 /* evaluations of a stage until its point nearly satisfies alpha(y) = x; the first stage takes one more */
+    PHI_STRIDES = 2, /* Runge-Kutta steps in place of one step */
+    PHI_MEETINGS = 2 /* iterations of a stage until its point y nearly satisfies alpha(y) = x; the first stage takes one more */
 };
 
-#define PHI_ASTRAY 1e-3 /* largest difference of prediction and correction, relative to value and increment; measured */
-#define PHI_FADING 0.4  /* weight of the earlier stages in the fitted factor, per stage; measured */
+#define PHI_ASTRAY 1e-3 /* largest accepted difference of predicted and corrected x, relative to |x| + |increment|; measured */
+#define PHI_FADING 0.4  /* factor per stage by which earlier stages count less in the fit of the prediction error; measured */
 
-/* Called if the next steps are not a block: the next block computes its slopes anew. */
+/* Note that the next steps do not continue a block, so the next block computes all slopes anew. */
 static void phi_end_march(phi_table *table) { table->marching = 0; }
 
-/* Runge-Kutta step of size h from the time t. */
+/* Integrate x from the time t over the time h, by PHI_STRIDES Runge-Kutta steps. */
 static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM])
 {
     double mean[PHI_DIM];
@@ -24,7 +24,7 @@ static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM
         phi_runge_kutta(s PHI_AND_T(t + part * h / (double)PHI_STRIDES), h / (double)PHI_STRIDES, x, mean);
 }
 
-/* Store the vector field at x after done steps, counted from the first slope in the table. */
+/* Store the vector field at x as slope number `done` of the table; slope PHI_PAST is that at the present state. */
 static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, const double x[PHI_DIM])
 {
     double here[PHI_DIM];
@@ -32,9 +32,9 @@ static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES
     for (int i = 0; i < PHI_DIM; ++i) slope[i][done] = here[i];
 }
 
-/* Make a step of Adams' method of order 9 from x after done steps, with a prediction of order 8. Returns 0, with x
-   unchanged, if the results of both orders differ much, since the step is too long for the method. Slopes up to x must be
-   known; the slope at the prediction is stored. */
+/* Make a step of Adams' method of order 9 from x, with a prediction of order 8. Slope number `done` is that at x; this and
+   the slopes before must be known, and the slope at the prediction is stored as the next. Returns 0, with x unchanged, if
+   prediction and result differ much, since the step is then too long for the method. */
 static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, double x[PHI_DIM])
 {
     static const double predict[PHI_PAST] = { -36799.0 / 120960.0, 295767.0 / 120960.0, -1041723.0 / 120960.0,
@@ -62,7 +62,7 @@ static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int
     return 1;
 }
 
-/* Compute the slopes at the ends of earlier steps of this size, by integrating backward from the state. */
+/* Compute the slopes at the starts of the last PHI_PAST steps, as if they had the present size, by integrating backward. */
 static void phi_look_back(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES])
 {
     double x[PHI_DIM];
@@ -73,8 +73,8 @@ static void phi_look_back(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES]
     }
 }
 
-/* Compute the starts of all steps of a block, one after the other: by Adams' method while it is accurate enough, else by
-   the Runge-Kutta method. */
+/* Predict the states at the starts of all steps of a block, one after the other: by Adams' method while it is accurate
+   enough, then by the Runge-Kutta method. */
 static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI_DIM])
 {
     double x[PHI_DIM];
@@ -93,7 +93,7 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI
     table->marching = 1;
 }
 
-/* Compute the increment of the exact motion over one stage, in all lanes, from the slopes. */
+/* Approximate the increment of the exact motion over one stage by a weighted sum of slopes, for the step in each lane. */
 static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lanes predicted[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {
@@ -107,8 +107,8 @@ static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lan
     }
 }
 
-/* Set the points of a stage to its begin plus half of the increment of the exact motion, minus the expected error of
-   this approximation. */
+/* Set the points y of a stage to its start `begin` plus half the increment of the exact motion, minus the expected error
+   of this approximation. */
 static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM], phi_lanes predicted[restrict PHI_DIM],
     phi_lanes missed[restrict PHI_DIM], double part)
 {
@@ -119,7 +119,7 @@ static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM],
     }
 }
 
-/* Fixed-point iteration of alpha(y) = begin for the points of a stage. */
+/* Make one fixed-point iteration for alpha(y) = begin, the equation of the points y of a stage. */
 static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin[restrict PHI_DIM])
 {
     phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -129,9 +129,10 @@ static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin
     }
 }
 
-/* Predictor without recurrences. From the approximate starts of all steps, each lane iterates the stages of its own
-   step. The error of half the exact increment is of third order in the size of a stage where y is the mean of its ends,
-   else of second order; its factor is fitted to the stages before. */
+/* Predict the solutions of a block without recurrences. The states at the starts of all steps are predicted first; then
+   each lane iterates the stages of its step. The starting value of y in a stage is its start plus half the exact increment.
+   Its error is of third order in the size of the stage if y is the mean of its ends, else of second order, with a factor
+   that is fitted to the earlier stages of the step. */
 static void phi_predict_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     phi_lanes begin[PHI_DIM], predicted[PHI_DIM], missed[PHI_DIM];

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "blocks.c"
 
-/* Store the attitude increments of a stage in all lanes, in order of time. */
+/* Copy the attitude increments of a stage from all lanes into the sequence of all increments, in order of time. */
 static void phi_take_stage(phi_lanes turns[PHI_ELEMENT] PHI_AND_INT_STAGE, double sequence[][PHI_ELEMENT])
 {
     for (int lane = 0; lane < PHI_LANES; ++lane)
@@ -14,7 +14,7 @@ static void phi_take_stage(phi_lanes turns[PHI_ELEMENT] PHI_AND_INT_STAGE, doubl
 #include "blocks_covector.c"
 #include "blocks_element.c"
 
-/* Multiply the attitude by the increments of a solved block, in order of time. */
+/* Multiply the attitude by the increments of all stages of a solved block, in order of time. */
 static void phi_turn_block(phi_solver *s, phi_table *table, phi_model *model)
 {
     phi_lanes turns[PHI_ELEMENT];

@@ -2,7 +2,7 @@
 #define PHI_FILE_BLOCKS_COVECTOR
 #include "blocks.c"
 
-/* phi_matrix_exponential in all lanes. */
+/* Compute exp(P) - 1 in all lanes, for the matrices P that the numbers p define. */
 static void phi_matrix_exponential_lanes(phi_lanes p[PHI_COVECTOR], phi_lanes element[PHI_ELEMENT])
 {
     const int doublings = phi_doublings(phi_largest(p[PHI_COVECTOR - 1]));
@@ -18,7 +18,7 @@ static void phi_matrix_exponential_lanes(phi_lanes p[PHI_COVECTOR], phi_lanes el
     }
 }
 
-/* Attitude increments of a stage in all lanes. */
+/* Compute the attitude increments of a stage in all lanes, as differences from the identity. */
 static void phi_factor_lanes(phi_lanes *coef, phi_lanes *y, phi_lanes turns[PHI_ELEMENT])
 {
     phi_lanes p[PHI_COVECTOR];

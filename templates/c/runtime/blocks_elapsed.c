@@ -4,8 +4,8 @@
 #include <string.h>
 #include "blocks.c"
 
-/* Physical times of the steps of a block, from the points of their stages, and the compensation terms of their sums.
-   Returns 0 unless the time of every stage has the sign of the stage. */
+/* Compute the physical time of the step in each lane, a compensated sum over its stages: elapsed is the sum, lost its
+   compensation term. Returns 0 if the time of a stage does not have the sign of the step. */
 static int phi_elapse(const phi_solver *s, phi_table *table, phi_model *model, phi_lanes elapsed, phi_lanes lost)
 {
     phi_lanes wrong = { 0.0 };
@@ -26,7 +26,7 @@ static int phi_elapse(const phi_solver *s, phi_table *table, phi_model *model, p
     return !(phi_largest(wrong) > 0.0);
 }
 
-/* Add the times of the steps of a block to the physical time, in their order. */
+/* Add the physical times of the steps of a block to the time of the solver, in order. */
 static void phi_pass_lanes(phi_solver *s, phi_lanes elapsed, phi_lanes lost)
 {
     for (int lane = 0; lane < PHI_LANES; ++lane) {

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "blocks.c"
 
-/* Replace y by the points for which y is the mean of alpha and beta, to leading order. */
+/* Replace each y by the point at which (alpha + beta)/2 equals that y, to leading order in the step size. */
 static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 {
     phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
@@ -15,8 +15,8 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
     }
 }
 
-/* Predictor without recurrences: points for which the mean of alpha and beta is, to leading order, that of start and end
-   of a classical Runge-Kutta step. */
+/* Predict the solutions of a block without recurrences: by points at which (alpha + beta)/2 is, to leading order, the mean
+   of start and end of a classical Runge-Kutta step. */
 static void phi_predict_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     double x[PHI_DIM], mean[PHI_DIM];

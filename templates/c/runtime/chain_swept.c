@@ -4,8 +4,8 @@
 #include "model.h"
 #include "newton_lanes.c"
 
-/* Compute the matrices that multiply the residual of the first stage of a step to give that of the next step: products
-   of 1 + gain over the stages. */
+/* Compute for the step in each lane the matrix that maps the residual of its first stage to its contribution to the
+   residual of the first stage of the next step: the product of 1 + gain over the stages. */
 static void phi_turn_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM])
 {
     memset(turn, 0, PHI_DIM * PHI_DIM * sizeof turn[0]);
@@ -26,8 +26,8 @@ static void phi_turn_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM
     }
 }
 
-/* Difference between the residuals of successive stages, except for the factor 1 + gain. The last stage of a lane is
-   followed by the first of the next lane; the value of the last lane is unused. */
+/* The residual of the next stage is (1 + gain) residual + shift. Compute shift for a stage in all lanes. The last stage of
+   a lane is followed by the first stage of the next lane; the last lane then gets a value that is unused. */
 static void phi_shift(const phi_model *model, int stage, phi_lanes shift[restrict PHI_DIM])
 {
     const phi_model *this_stage = model + stage, *next_stage = model + (stage + 1) % PHI_STAGES;
@@ -48,7 +48,7 @@ static void phi_shift(const phi_model *model, int stage, phi_lanes shift[restric
     }
 }
 
-/* Residuals of the first stages of all steps, by the affine maps from step to step. */
+/* Compute the residuals of the first stages of all steps, one after the other, by the affine maps from step to step. */
 static void phi_first_residuals(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], const double x[PHI_DIM],
     const double carry[PHI_DIM], phi_lanes residual[restrict PHI_DIM])
 {
@@ -77,7 +77,7 @@ static void phi_first_residuals(phi_model *model, phi_lanes turn[restrict PHI_DI
     }
 }
 
-/* Corrections of y and of the increment by a residual. */
+/* Compute the Newton corrections of y (delta) and of the increment (gained) of a stage from its residual. */
 static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes delta[restrict PHI_DIM],
     phi_lanes gained[restrict PHI_DIM])
 {
@@ -92,9 +92,9 @@ static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], p
 #endif
 }
 
-/* Correct the points of all stages by their residuals, along their linear models, and advance x + carry through all
-   steps: a stage adds increment - gain residual. The residual of the next stage follows from that of a stage, without the
-   sum. most is the largest correction in each lane. */
+/* Correct the points y of all stages by their residuals, and advance x + carry through all steps. In its linear model, a
+   stage adds increment - gain residual. The residual of the next stage follows from that of the present stage, without the
+   new x. most receives the largest correction of y in each lane. */
 static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], phi_lanes unit[restrict PHI_DIM],
     double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
 {

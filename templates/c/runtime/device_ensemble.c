@@ -6,24 +6,24 @@
 #include "device_common.c"
 
 /* ---- The kernel of ensembles ---- */
-/* Each work item integrates one member; work items beyond members do nothing, so that any size of work groups or blocks
-   gives the same results. x[i * members + m] is coordinate i of member m, first at the start, then at the end; failed
-   members have the last good state. If params_per_member is 1, member m has the parameters params[m]; if it is 0, all have
-   params[0]. h_per_member selects h[m] or h[0] likewise. */
+/* Work item m integrates member m; work items from m = members on do nothing, so that any size of work groups or blocks
+   gives the same results. x[i * members + m] is coordinate i of member m: its initial state, which the final state
+   replaces; failed members get their last good state. Member m has the parameters params[m] if params_per_member is 1, and
+   params[0] if it is 0; the step size is h[m] if h_per_member is 1, and h[0] if it is 0. */
 #if PHI_TIMED
-/* start_per_member selects t0[m] or t0[0] likewise. */
+/* The initial time of member m is t0[m] if start_per_member is 1, and t0[0] if it is 0. */
 #elif PHI_GAUGE
-/* start_per_member selects the PHI_GAUGES numbers of each member, or those of member 0, in gauge. NULL: gauges chosen at the
-   initial states. */
+/* gauge has PHI_GAUGES numbers for each member if start_per_member is 1, and for all members together if it is 0. NULL for
+   gauges chosen at the initial states. */
 #endif
 /* frames, if not NULL, receives the states after every stride-th step: frames[(k * PHI_DIM + i) * members + m] is
    coordinate i of member m after (k + 1) * stride steps, NaN if the member failed before. status[m] is a phi_status. */
 #if PHI_COMMON
-/* If PHI_COMMON is defined, the first argument is the coefficients of all members: params_per_member and
-   h_per_member are 0. */
+/* If PHI_COMMON is defined, the first argument has the coefficients that all members share; params_per_member and
+   h_per_member must then be 0. */
 #endif
 #if PHI_NOISE
-/* Member m has the random numbers of first_member + m, from the step first_step on, as in phi_ensemble_of. */
+/* Member m has the random numbers of seed and member number first_member + m, from the step number first_step on. */
 #endif
 PHI_KERNEL void phi_ensemble_kernel(PHI_COMMON_ARGUMENT uint64_t members, PHI_GLOBAL const phi_params *params, int params_per_member,
     PHI_GLOBAL double *x,

@@ -4,7 +4,7 @@
 #include "gauge_formula.c"
 #include "level.c"
 
-/* Gauge of a member; for NULL the gauge chosen at its initial state. */
+/* Copy the gauge of a member from global memory; NULL: choose it at the initial state x0. */
 static void phi_gauge_of(const phi_params *params, const double x0[PHI_DIM], PHI_GLOBAL const double *gauge_of_member,
     double gauge[PHI_GAUGES])
 {

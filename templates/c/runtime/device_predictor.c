@@ -3,15 +3,15 @@
 #include "model.h"
 #include "predictor_policy.h"
 
-/* Index of entry i of difference k in the shared memory of a work group. */
+/* Index of component i of difference k in the shared memory of a work group, from the first number of a work item on. */
 static int phi_place_of(int k, int i) { return (k * PHI_DIM + i) * PHI_GROUP; }
 
 
-/* All loops have constant bounds, and selections in place of branches, so that a compiler can keep all values in
+/* The loops below have constant bounds, and selections in place of branches, so that a compiler can keep all values in
    registers. */
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far away, where
-   the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution by the sum of the last one and its differences. Returns 0 if there is no prediction, or if it
+   is far away, where the equation of a step has solutions unrelated to the motion. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;

@@ -15,18 +15,18 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 /* As phi_init, at the time t0; phi_init starts at the time 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[PHI_DIM], double t0);
 
-/* As phi_init, with a given gauge: see PHI_GAUGES. phi_init chooses the gauge. */
+/* As phi_init, with the numbers that PHI_GAUGES counts; phi_init chooses them at x0. */
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
     const double gauge[PHI_GAUGES]);
 
-/* Make steps of size h, of either sign. If one fails, s->x is the state before it, after s->steps steps. */
+/* Make steps of size h, which may be negative. If a step fails, s->x is the state before it, after s->steps steps. */
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
-/* As phi_integrate, with given increments of the noise: dw[k * PHI_DRAWS + i] is that of source i in step k. NULL for
-   random ones. */
+/* As phi_integrate, with given increments of the noise: dw[k * PHI_DRAWS + i] is increment i of step k. NULL for random
+   increments. */
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw);
 
-/* Select the random numbers of the next steps. They are a function of the seed, the member and the number of the step
-   only; phi_init sets all three to 0. */
+/* Select the random numbers of the next steps. They are a function of seed, member and the number of the step, which is
+   `step` for the next one; phi_init sets all three to 0. */
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
 #endif

@@ -2,14 +2,14 @@
 #define PHI_FILE_DEVICE_STAGE
 #include "device_solver.h"
 
-/* Clear the predictors of all stages. */
+/* Clear the predictor of a stage. */
 static void phi_forget(phi_history *history)
 {
     history->count = 0;
     PHI_FORGET_ORDER(history)
 }
 
-/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
+/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
 static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
     phi_status status = PHI_OK;

@@ -12,30 +12,31 @@
 
 /* ---- Paths in lanes ---- */
 enum {
-    PHI_TERMS_OF_LANES = 16, /* most iterations of the expansion of a path from its middle */
-    PHI_ROUNDS = 12          /* most iterations for the middle, each of which gains some digits */
+    PHI_TERMS_OF_LANES = 16, /* largest number of terms in the Taylor series of a path about its middle */
+    PHI_ROUNDS = 12          /* largest number of iterations for the middle, each of which gains some digits */
 };
 
-#define PHI_GAIN_OF_ROUND 1e-4 /* smallest factor by which an iteration reduces the error; it sets the length of the expansion */
+#define PHI_GAIN_OF_ROUND 1e-4 /* terms are added until they are smaller than the error of the middle by this factor */
 
-/* Paths of all lanes as Taylor series about their middle, for half of p: so the time goes from -1 to 1, and fewer terms
-   are needed than from their start. s[i][k] is coefficient k of series i. The coordinates come first; slope continues
-   with the entries of d(pi p)/dm and of pi, from which v, the derivatives by middle and p, follows row by row. */
+/* The path dm/dt = pi(m) p in each lane, as Taylor series about its middle. With half of p, its time goes from -1 to 1, and
+   fewer terms are needed than from its start. s[i][k] is coefficient k of series i, and the coordinates are the first
+   series. slope has the series of the entries of d(pi p)/dm and of pi; they give v, the derivatives of the path by its
+   middle and p, row by row. */
 typedef struct {
     phi_lanes p[PHI_DIM], fixed[PHI_FIXED], slope_fixed[PHI_SLOPE_FIXED], value[PHI_SERIES];
     phi_lanes s[PHI_SERIES][PHI_TERMS_OF_LANES + 1], slope[PHI_SLOPE_SERIES][PHI_SLOPE_TERMS + 1];
     phi_lanes v[PHI_SLOPE_TERMS + 1][2 * PHI_DIM * PHI_DIM];
-    phi_lanes even[PHI_DIM], odd[PHI_DIM], mean[PHI_DIM]; /* sums of terms; those of even order also as means over time */
+    phi_lanes even[PHI_DIM], odd[PHI_DIM], mean[PHI_DIM]; /* sums of the terms of even and of odd order; mean of the even terms over the time */
     phi_lanes v_even[2 * PHI_DIM * PHI_DIM], v_odd[2 * PHI_DIM * PHI_DIM], v_mean[2 * PHI_DIM * PHI_DIM];
 #if PHI_ALONG
-    phi_lanes w[PHI_SLOPE_TERMS + 1][PHI_DIM * PHI_USED]; /* derivatives by coefficients */
+    phi_lanes w[PHI_SLOPE_TERMS + 1][PHI_DIM * PHI_USED]; /* derivatives of the path by coefficients */
     phi_lanes w_even[PHI_DIM * PHI_USED], w_odd[PHI_DIM * PHI_USED], w_mean[PHI_DIM * PHI_USED];
 #endif
     phi_lanes unit[PHI_DIM]; /* weights of the terms in the error estimate */
-    int terms, varied; /* known orders of the paths and of their derivatives */
+    int terms, varied; /* number of known orders of the paths, and of their derivatives */
 } phi_expansion;
 
-/* Largest value over the lanes. Lanes that are not finite have failed and are left out. */
+/* Largest of the values in the lanes. Values that are not finite belong to failed lanes and are left out. */
 static double phi_largest_finite(const phi_lanes size)
 {
     phi_lanes finite;
@@ -81,7 +82,7 @@ static void phi_begin(phi_lanes coef[restrict], phi_expansion *e, phi_lanes m[re
     }
 }
 
-/* Add the terms of the odd order k and of the next order; returns their size. */
+/* Add the terms of the odd order k and of the even order k + 1 to the sums; returns the largest size over the lanes. */
 static double phi_add_terms(phi_expansion *e, int k)
 {
     phi_lanes size = { 0.0 };
@@ -99,8 +100,8 @@ static double phi_add_terms(phi_expansion *e, int k)
     return phi_largest_finite(size);
 }
 
-/* Extend by two orders at a time, until the terms are below accuracy in all finite lanes or PHI_TERMS_OF_LANES are
-   known. The equations at the ends check whether the terms suffice. */
+/* Extend the series of the paths by two orders at a time, until the terms are below accuracy in all finite lanes, or
+   PHI_TERMS_OF_LANES orders are known. phi_check_ends checks whether these terms suffice. */
 static void phi_extend(phi_lanes coef[restrict], phi_expansion *e, double accuracy)
 {
     double size = HUGE_VAL;
@@ -111,8 +112,8 @@ static void phi_extend(phi_lanes coef[restrict], phi_expansion *e, double accura
     }
 }
 
-/* phi_holds in all lanes, at one end of the paths, where the expansions have the given slope. wrong becomes infinite in
-   lanes where the equation does not hold. */
+/* Check the equation dm/dt = pi(m) p at one end m of the paths, where their series have the given slopes. wrong becomes
+   infinite in lanes where it does not hold. */
 static void phi_check_end(phi_lanes coef[restrict], phi_expansion *e, phi_lanes m[restrict PHI_DIM],
     phi_lanes slope[restrict PHI_DIM], phi_lanes wrong)
 {
@@ -131,7 +132,7 @@ static void phi_check_end(phi_lanes coef[restrict], phi_expansion *e, phi_lanes 
     }
 }
 
-/* Check the equation at both ends of the paths. */
+/* Check the equation dm/dt = pi(m) p at start and end of the paths. wrong becomes infinite in lanes where it does not hold. */
 static void phi_check_ends(phi_lanes coef[restrict], phi_expansion *e, phi_lanes wrong)
 {
     phi_lanes start[PHI_DIM], end[PHI_DIM], start_slope[PHI_DIM], end_slope[PHI_DIM];
@@ -156,7 +157,7 @@ static void phi_check_ends(phi_lanes coef[restrict], phi_expansion *e, phi_lanes
     phi_check_end(coef, e, end, end_slope, wrong);
 }
 
-/* Start the expansions of the paths with mean y, from the best known middles. */
+/* Start the expansions of the paths with mean y at their best known middles, y + middle. */
 static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
     phi_expansion *e)
 {
@@ -168,8 +169,8 @@ static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM]
     phi_begin(coef, e, m);
 }
 
-/* Find the middles of the paths with mean y by iteration. Each iteration gains some digits and expands no further than
-   these digits need; the last expansion can be extended. Lanes that do not converge to the accuracy become infinite. */
+/* Find the middles y + middle of the paths with mean y by iteration. Each iteration gains some digits, and sums no more
+   terms than these digits need; the last expansion can be extended. middle becomes infinite in lanes that do not converge. */
 static void phi_find_middles(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
     phi_expansion *e, double accuracy)
 {
@@ -201,7 +202,7 @@ static void phi_find_middles(phi_lanes coef[restrict], phi_lanes y[restrict PHI_
         if (!(size[lane] <= accuracy)) middle[0][lane] = HUGE_VAL;
 }
 
-/* Half of p, since the time of paths goes from -1 to 1. */
+/* Halve p, since the time of the paths goes from -1 to 1. */
 static void phi_halve(phi_lanes p[restrict PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) {
@@ -210,7 +211,7 @@ static void phi_halve(phi_lanes p[restrict PHI_DIM])
     }
 }
 
-/* Order k + 1 of the derivatives; order 0 is 1 for the middle, and 0 for p. */
+/* Compute order k + 1 of the series of the derivatives by middle and p; order 0 is 1 for the middle, and 0 for p. */
 static void phi_vary_order(phi_expansion *e, int k)
 {
     memset(e->v[k + 1], 0, 2 * PHI_DIM * PHI_DIM * sizeof e->v[0][0]);
@@ -218,8 +219,8 @@ static void phi_vary_order(phi_expansion *e, int k)
     for (int j = 0; j < k; ++j) phi_vary_by(e, j, k);
 }
 
-/* Add the terms of the odd order k of the derivatives and of the next order, and measure them: those by the middle
-   relative to 1, those by p relative to the first. */
+/* Add the terms of the odd order k and of the even order k + 1 of the derivatives to the sums. size receives their
+   magnitudes: of the derivatives by the middle as they are, of those by p relative to their terms of order 1. */
 static void phi_add_slopes(phi_expansion *e, int k, phi_lanes size)
 {
     phi_lanes parts[2] = { { 0.0 } }, first = { 0.0 };
@@ -241,11 +242,12 @@ static void phi_add_slopes(phi_expansion *e, int k, phi_lanes size)
         size[lane] = parts[0][lane] + parts[1][lane] / (first[lane] + DBL_MIN);
 }
 
-/* Derivatives of the paths by their middles and p. Infinite where PHI_SLOPE_TERMS terms do not suffice. */
+/* Compute the derivatives of the paths by their middles and by p. They become infinite in lanes where PHI_SLOPE_TERMS
+   terms do not suffice. */
 static void phi_vary(phi_lanes coef[restrict], phi_expansion *e, double accuracy)
 {
     phi_lanes slope[PHI_SLOPE_SERIES], size;
-    double largest = 1.0, next = 1.0; /* the last two orders, and the expected next one */
+    double largest = 1.0, next = 1.0; /* size of the last two orders, and expected size of the next two */
     phi_slope_values_lanes(coef, e->p, e->value, e->fixed, slope, e->slope_fixed);
     for (int i = 0; i < PHI_SLOPE_SERIES; ++i) memcpy(e->slope[i][0], slope[i], sizeof slope[i]);
     memset(e->v_even, 0, sizeof e->v_even);

@@ -3,7 +3,7 @@
 #include "algebra.c"
 #include "model.h"
 
-/* One explicit stage: x + increment(x). */
+/* Make one explicit stage: x + increment(x). */
 static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
     double increment[PHI_DIM];

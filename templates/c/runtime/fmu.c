@@ -9,8 +9,8 @@
 #include "solver.h"
 #include "fmu_model.h"
 
-/* ---- Types of FMI, unless headers of the standard are included before; other names of C types, such as fmi3Float64 of
-   double, are written as these C types ---- */
+/* ---- Types of FMI, unless the headers of the standard are included before. C types are written directly, such as double
+   for fmi3Float64 ---- */
 
 #ifndef fmi3Functions_h
 typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
@@ -37,16 +37,16 @@ typedef struct {
 
 /* ---- The model between communication points ---- */
 
-static const double phi_fmu_slack = 1e-9;     /* fraction of a step that counts as rounding of a communication point */
-static const double phi_fmu_most_steps = 1e9; /* most whole steps in a communication step; it fits any size_t */
+static const double phi_fmu_slack = 1e-9;     /* a communication point may miss a time by this fraction of a step, due to rounding */
+static const double phi_fmu_most_steps = 1e9; /* largest number of whole steps in a communication step; it fits any size_t */
 
-/* Modes of an FMU, as bits: a call may be allowed in several modes. */
+/* Modes of an FMU, as bits, so that a sum of modes says in which of them a call is allowed. */
 enum { PHI_INSTANTIATED = 1, PHI_INITIALISING = 2, PHI_STEPPING = 4, PHI_AT_EVENT = 8, PHI_TERMINATED = 16 };
 
-/* Complete state of an FMU, without pointers: a copy is an FMU state. */
+/* Complete state of an FMU. It has no pointers, so a copy of it is an FMU state in the sense of FMI. */
 typedef struct {
-    phi_solver grid; /* state on the grid of whole steps, at the communication point or before */
-    phi_solver now;  /* state at the communication point */
+    phi_solver grid; /* solver after the last whole step, at the communication point or before */
+    phi_solver now;  /* solver at the communication point, whose values are the outputs */
     double origin;   /* time of the environment minus that of the solver */
     double time;     /* time of the communication point */
     double stop;     /* no communication step may end after this time; infinity if the environment names none */
@@ -72,14 +72,14 @@ static void phi_fmu_reset(phi_fmu_state *f)
 /* Time of the environment for the state of a solver. */
 static double phi_fmu_time(const phi_fmu_state *f, const phi_solver *s) { return f->origin + (double)PHI_TIME_OF(s); }
 
-/* Let the grid of whole steps begin at the communication point. */
+/* Let whole steps begin at the present communication point. */
 static void phi_fmu_begin_grid(phi_fmu_state *f)
 {
     f->origin += f->time - phi_fmu_time(f, &f->now);
     f->grid = f->now;
 }
 
-/* Initialise at f->time with the values that have been set. */
+/* Initialise the solver at the time f->time with the initial values and parameters that the environment has set. */
 static phi_status phi_fmu_start(phi_fmu_state *f)
 {
     phi_solver fresh;
@@ -96,7 +96,7 @@ static phi_status phi_fmu_start(phi_fmu_state *f)
     return PHI_OK;
 }
 
-/* Largest distance from the target at which a time counts as the target. */
+/* Largest distance at which a time counts as the target, due to rounding. */
 static double phi_fmu_tolerance(const phi_fmu_state *f, double target)
 {
     const double roundoff = (sizeof(phi_real) == sizeof(double) ? 1e-15 : 5e-7) * fmax(fabs(target), fabs(f->origin));
@@ -109,7 +109,7 @@ static phi_status phi_fmu_whole_steps(phi_fmu_state *f, double target, double mo
 #if PHI_MONITOR
     for (double count = 0.0; count < most; ++count) {
         phi_solver next = f->grid;
-        if (phi_step(&next, (phi_real)f->step) != PHI_OK) return PHI_OK; /* part of the step may succeed */
+        if (phi_step(&next, (phi_real)f->step) != PHI_OK) return PHI_OK; /* a part of this step may succeed */
         if (phi_fmu_time(f, &next) > target + phi_fmu_tolerance(f, target)) return PHI_OK;
         if (!(phi_fmu_time(f, &next) > phi_fmu_time(f, &f->grid))) return PHI_NO_CONVERGENCE; /* time does not advance */
         f->grid = next;
@@ -123,8 +123,8 @@ static phi_status phi_fmu_whole_steps(phi_fmu_state *f, double target, double mo
 #endif
 }
 
-/* Move the output state from the grid to the target, by part of a step. Newton's iteration finds the part from dt/dtau;
-   if steps are equal in time, its first result is exact. */
+/* Advance f->now from the last whole step to the target, by part of a step. Newton's iteration finds the size of the part
+   from dt/dtau; if steps are equal in time, its first result is exact. */
 static phi_status phi_fmu_part(phi_fmu_state *f, double target)
 {
     double part = 0.0;
@@ -148,7 +148,7 @@ static bool phi_fmu_within(uint32_t variable, uint32_t first, uint32_t end) { re
 /* Whether a variable is the seed of the noise, the only variable that is a whole number. */
 static bool phi_fmu_is_whole(uint32_t variable) { return phi_fmu_within(variable, PHI_FMU_SEED, PHI_FMU_ATTITUDE); }
 
-/* Return the place of a variable that the state stores as a number of the solver; NULL for other variables. */
+/* Return the address of a variable that is stored as a number of the solver; NULL for other variables. */
 static phi_real *phi_fmu_place(phi_fmu_state *f, uint32_t variable)
 {
     if (phi_fmu_within(variable, PHI_FMU_STATE, PHI_FMU_PARAMETER)) return &f->now.x[variable - PHI_FMU_STATE];
@@ -163,7 +163,7 @@ static phi_real *phi_fmu_place(phi_fmu_state *f, uint32_t variable)
     return NULL;
 }
 
-/* Read a variable of the model. Returns false if no variable has this number. */
+/* Read a variable of the model by its value reference. Returns false if there is no such variable. */
 static bool phi_fmu_get(phi_fmu_state *f, uint32_t variable, double *value)
 {
     const phi_solver *s = &f->now;
@@ -214,7 +214,7 @@ static uint64_t phi_fmu_checksum(const unsigned char *state)
 
 /* ---- Instances ---- */
 
-/* Functions of the environment, NULL for those that it does not have. */
+/* Functions of the environment that the FMU may call; NULL for missing ones. */
 typedef struct {
     void *environment;        /* the first argument of each function */
     fmi2CallbackLogger log_2; /* logger for FMI 2.0 */
@@ -229,14 +229,14 @@ typedef struct {
     bool logging, may_return_early;
 } phi_fmu;
 
-/* Report the reason of a failed call to the environment. */
+/* Send a message to the logger of the environment; name is that of the instance. */
 static void phi_fmu_say(const phi_fmu_callbacks *to, const char *name, const char *message)
 {
     if (to->log_2 != NULL) to->log_2(to->environment, name, fmi2Error, "logStatusError", "%s", message);
     if (to->log_3 != NULL) to->log_3(to->environment, fmi3Error, "logStatusError", message);
 }
 
-/* Allocate an instance, with its name behind it. Returns NULL without memory, or if the token is that of another FMU. */
+/* Allocate an instance and a copy of its name. Returns NULL without memory, or if the token is that of another FMU. */
 static phi_fmu *phi_fmu_instantiate(const char *name, const char *token, const phi_fmu_callbacks *callbacks, bool logging)
 {
     const size_t letters = name == NULL ? 0 : strlen(name);
@@ -254,7 +254,8 @@ static phi_fmu *phi_fmu_instantiate(const char *name, const char *token, const p
     return instance;
 }
 
-/* Whether a communication step may start at this time, the present communication point, and ends by the stop time. */
+/* Whether a communication step of this size may start at the time `from`: it must be the present communication point, and
+   the step must end by the stop time. */
 static bool phi_fmu_may_step(const phi_fmu_state *f, double from, double size)
 {
     if (f->mode != PHI_STEPPING || !isfinite(from) || !(size >= 0.0) || !isfinite(size)) return false;
@@ -262,7 +263,7 @@ static bool phi_fmu_may_step(const phi_fmu_state *f, double from, double size)
     return fabs(from - f->time) <= tolerance && from + size <= f->stop + tolerance;
 }
 
-/* Report a whole step to the environment; return whether it ends the communication step there. */
+/* Report the end of a whole step to the environment; returns whether the environment ends the communication step there. */
 static bool phi_fmu_ends(const phi_fmu *instance, double time)
 {
     const phi_fmu_callbacks *to = &instance->callbacks;
@@ -272,7 +273,7 @@ static bool phi_fmu_ends(const phi_fmu *instance, double time)
     return early && instance->may_return_early && until <= time;
 }
 
-/* Make a communication step. If it fails, the state is unchanged. */
+/* Make a communication step to the time target. If it fails, the state is unchanged. */
 static phi_status phi_fmu_do_step(phi_fmu *instance, double target)
 {
     phi_fmu_state *f = &instance->state;

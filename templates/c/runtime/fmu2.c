@@ -1,7 +1,7 @@
 #ifndef PHI_FILE_FMU2
 #define PHI_FILE_FMU2
 
-/* ---- FMI 2.0, by the functions of FMI 3.0. The statuses of both have the same numbers. ---- */
+/* ---- FMI 2.0, by the functions of FMI 3.0. Statuses have the same numbers in both versions. ---- */
 
 #if defined(FMI2_FUNCTION_PREFIX) && !defined(FMI2_OVERRIDE_FUNCTION_PREFIX)
 #define FMI2_NAME(name) FMI_PREFIXED(FMI2_FUNCTION_PREFIX, fmi2##name)
@@ -25,7 +25,7 @@ FMI_SHARED void *FMI2_NAME(Instantiate)(const char *name, fmi2Type type, const c
 
 FMI_SHARED void FMI2_NAME(FreeInstance)(void *of) { free(of); }
 
-/* The times are those of fmi3EnterInitializationMode, which FMI 2.0 sets before the call for the mode. */
+/* FMI 2.0 sets the start and stop times here, FMI 3.0 in EnterInitializationMode. */
 FMI2_STATUS(SetupExperiment)(void *of, int has_tolerance, double tolerance, double start, int has_stop, double stop)
 {
     const fmi3Status status =
@@ -36,7 +36,7 @@ FMI2_STATUS(SetupExperiment)(void *of, int has_tolerance, double tolerance, doub
 
 FMI2_STATUS(EnterInitializationMode)(void *of) { return (fmi2Status)phi_fmi3_enter(of, PHI_INSTANTIATED, PHI_INITIALISING); }
 
-/* Functions of both versions: name in 2.0, name in 3.0, parameters, arguments. */
+/* Define a function that calls the function of FMI 3.0 with the same meaning. */
 #define FMI2_SAME(name, name3, parameters, arguments) \
     FMI2_STATUS(name) parameters { return (fmi2Status)FMI3_NAME(name3) arguments; }
 #define FMI2_VARIABLES void *of, const unsigned v[], size_t n
@@ -57,7 +57,7 @@ FMI2_SAME(SerializeFMUstate, SerializeFMUState, (void *of, void *state, char byt
 FMI2_SAME(DeSerializeFMUstate, DeserializeFMUState, (void *of, const char bytes[], size_t size, void **state),
     (of, (const uint8_t *)bytes, size, state))
 
-/* Types without variables, and derivatives: calls for 0 variables succeed, all others fail. */
+/* Functions for derivatives, and for types of which there are no variables: calls for 0 variables succeed, others fail. */
 #define FMI2_NONE(name, parameters) \
     FMI2_STATUS(name) parameters { return (fmi2Status)phi_fmi3_none(of, n); }
 FMI2_NONE(GetBoolean, (FMI2_VARIABLES, int x[]))
@@ -91,7 +91,7 @@ FMI2_STATUS(GetBooleanStatus)(void *of, const fmi2StatusKind kind, int *value)
     return fmi2OK;
 }
 
-/* Statuses of asynchronous steps. */
+/* Statuses of asynchronous steps, which this FMU does not have. */
 FMI2_STATUS(GetStatus)(void *of, const fmi2StatusKind kind, fmi2Status *value) { return fmi2Discard; }
 FMI2_STATUS(GetIntegerStatus)(void *of, const fmi2StatusKind kind, int *value) { return fmi2Discard; }
 FMI2_STATUS(GetStringStatus)(void *of, const fmi2StatusKind kind, const char **value) { return fmi2Discard; }

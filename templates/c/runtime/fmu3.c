@@ -8,7 +8,7 @@
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
-/* Exported names: plain in a library, with a prefix if several FMUs are linked into one program. */
+/* Exported functions have plain names in a library, and a prefix if several FMUs are linked into one program. */
 #define FMI_JOINED(prefix, name) prefix##name
 #define FMI_PREFIXED(prefix, name) FMI_JOINED(prefix, name)
 #if defined(FMI3_FUNCTION_PREFIX) && !defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
@@ -27,7 +27,7 @@
 
 FMI_SHARED const char *FMI3_NAME(GetVersion)(void) { return "3.0"; }
 
-/* Return OK if a condition holds; else report the reason why a call failed. */
+/* Return fmi3OK if a condition holds; else report the reason to the environment and return fmi3Error. */
 static fmi3Status phi_fmi3_demand(bool condition, void *of, const char *reason)
 {
     const phi_fmu *instance = (const phi_fmu *)of;
@@ -37,7 +37,7 @@ static fmi3Status phi_fmi3_demand(bool condition, void *of, const char *reason)
 
 static phi_fmu_state *phi_fmi3_state(void *of) { return &((phi_fmu *)of)->state; }
 
-/* Change from one of several modes to another one. The call is refused in all other modes. */
+/* Change to the mode `to` if the present mode is one of `from`, a sum of modes; else refuse the call. */
 static fmi3Status phi_fmi3_enter(void *of, int from, int to)
 {
     const bool allowed = of != NULL && (phi_fmi3_state(of)->mode & from) != 0;
@@ -61,7 +61,7 @@ FMI_SHARED void *FMI3_NAME(InstantiateCoSimulation)(const char *name, const char
     return instance;
 }
 
-/* There are no instances of other kinds. */
+/* Define functions that refuse instances for model exchange and for scheduled execution. */
 #define FMI3_NO_INSTANCE(kind, parameters) \
     FMI_SHARED void *FMI3_NAME(Instantiate##kind) parameters { return NULL; }
 #define FMI3_INSTANCE const char *name, const char *token, const char *resources, bool visible, bool logging
@@ -82,7 +82,7 @@ FMI3_STATUS(EnterInitializationMode)(void *of, bool has_tolerance, double tolera
     return fmi3OK;
 }
 
-/* If this fails, values may be set, and initialisation computed again. */
+/* If this fails, the environment may set other values and call it again. */
 FMI3_STATUS(ExitInitializationMode)(void *of)
 {
     if (phi_fmi3_enter(of, PHI_INITIALISING, PHI_INITIALISING) != fmi3OK) return fmi3Error;
@@ -93,7 +93,7 @@ FMI3_STATUS(ExitInitializationMode)(void *of)
 
 FMI3_STATUS(EnterEventMode)(void *of) { return phi_fmi3_enter(of, PHI_STEPPING, PHI_AT_EVENT); }
 
-/* After initialisation with events the mode is already that of steps. */
+/* After the initialisation, environments with event mode call this too, although the FMU is already in step mode. */
 FMI3_STATUS(EnterStepMode)(void *of) { return phi_fmi3_enter(of, PHI_STEPPING | PHI_AT_EVENT, PHI_STEPPING); }
 
 FMI3_STATUS(Terminate)(void *of) { return phi_fmi3_enter(of, ~0, PHI_TERMINATED); }
@@ -106,8 +106,8 @@ FMI3_STATUS(Reset)(void *of)
 
 #define FMI3_VARIABLES void *of, const uint32_t v[], size_t n
 
-/* Values of one type: `is` says whether variable v[k] has this type. There are variables of the types Float64 and Int32
-   only; for all types, calls for 0 variables succeed. */
+/* Define the functions that get and set values of one type; `is` says whether variable v[k] has this type. Only Float64 and
+   Int32 have variables, but calls for 0 variables succeed for all types. */
 #define FMI3_VALUES(type, of_c, is) \
     FMI3_STATUS(Get##type)(FMI3_VARIABLES, of_c x[], size_t m) \
     { \
@@ -138,13 +138,13 @@ FMI3_VALUES(Int64, int64_t, false)
 FMI3_VALUES(UInt64, uint64_t, false)
 FMI3_VALUES(Boolean, bool, false)
 
-/* Types without variables, whose values are no numbers. */
+/* Get or set variables of types that are no numbers; there are none, so only calls for 0 variables succeed. */
 static fmi3Status phi_fmi3_none(void *of, size_t n) { return phi_fmi3_demand(of != NULL && n == 0, of, "no such variable"); }
 
 FMI3_STATUS(GetString)(FMI3_VARIABLES, const char *x[], size_t m) { return phi_fmi3_none(of, n | m); }
 FMI3_STATUS(SetString)(FMI3_VARIABLES, const char *const x[], size_t m) { return phi_fmi3_none(of, n | m); }
 
-/* Functions for model exchange, scheduled execution, clocks, binary variables, arrays and derivatives: always refused. */
+/* Define functions that always fail: for model exchange, scheduled execution, clocks, binary variables and derivatives. */
 #define FMI3_ABSENT(name, parameters) \
     FMI3_STATUS(name) parameters { return fmi3Error; }
 FMI3_ABSENT(GetBinary, (FMI3_VARIABLES, size_t sizes[], const uint8_t *x[], size_t m))
@@ -191,7 +191,7 @@ FMI3_STATUS(UpdateDiscreteStates)(void *of, bool *again, bool *terminate, bool *
     return fmi3OK;
 }
 
-/* ---- States, and states as bytes, which end with a checksum and can be read on machines of the same kind only ---- */
+/* ---- States, also as bytes: these end with a checksum, and can be read on machines of the same kind only ---- */
 
 enum { PHI_FMU_BYTES = sizeof(phi_fmu_state) + sizeof(uint64_t) };
 

@@ -6,10 +6,10 @@
 
 #include "model.h"
 
-/* ---- The choice of the gauge: multiples of Casimirs subtracted from H ---- */
+/* ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ---- */
 #include "gauge_search.h"
 
-/* Direction of the motion at a point, a unit vector; 0 at equilibria. */
+/* Compute the direction of the vector field at a point, a unit vector; 0 at equilibria. */
 static void phi_direction(const phi_params *params, const double at[PHI_DIM], double direction[PHI_DIM])
 {
     double speed = DBL_MIN;
@@ -36,7 +36,8 @@ static void phi_sample(const phi_params *params, const double x[PHI_DIM], double
     }
 }
 
-/* The sum of |pi grad S_3|^2 over the samples, where S_3 is the leading error of the method. */
+/* The leading error of the method with this gauge: the sum of |pi grad S_3|^2 over the samples, where S_3 is the first
+   error term of the modified Hamiltonian. */
 static double phi_gauge_error(const phi_params *params, const double gauge[PHI_GAUGES], double samples[][PHI_DIM])
 {
     double error[PHI_DIM], sum = 0.0;
@@ -47,7 +48,8 @@ static double phi_gauge_error(const phi_params *params, const double gauge[PHI_G
     return sum;
 }
 
-/* Value of the error polynomial at centre + t width, by Newton's formula from forward differences. */
+/* Value of the error, a polynomial in one factor of the gauge, at centre + t width, by Newton's formula from its forward
+   differences. */
 static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
 {
     double error = difference[PHI_DEGREE];
@@ -55,8 +57,7 @@ static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
     return error;
 }
 
-/* Return the shift of gauge[c], in units of width, that minimises the error, from its values on successively finer
-   grids. */
+/* Return the shift of gauge[c], in units of width, that minimises the error, by a search on successively finer grids. */
 static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
     double samples[][PHI_DIM])
 {
@@ -83,8 +84,9 @@ static double phi_least_on_line(const phi_params *params, const double gauge[PHI
     return best;
 }
 
-/* Multiples that minimise the leading error along a short piece of the trajectory, one after the other, starting from
-   the least-squares solution of grad H = sum of multiples of grad C. Zero where a result is not finite. */
+/* Compute the gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from x.
+   Each is optimised after the other, starting from the least-squares solution of grad H = sum of gauge[c] grad C_c; 0
+   where a result is not finite. */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {
     double samples[PHI_SAMPLES][PHI_DIM], out[1 + 2 * PHI_GAUGES], sums[1 + 2 * PHI_GAUGES] = { 0.0 };

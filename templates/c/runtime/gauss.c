@@ -20,7 +20,7 @@ typedef double phi_lanes[PHI_WIDTH]; /* one value for each stage */
 #endif
 
 /* ---- The implicit step, by Gauss collocation ---- */
-/* Copy the data of the start of a step, PHI_POINT numbers, the coordinates first. */
+/* Copy the data at the start of a step, PHI_POINT numbers; the coordinates come first. */
 static void phi_start(const phi_solver *s, double point[PHI_POINT])
 {
     PHI_COPY(point, s->x, s->x, PHI_DIM);
@@ -53,9 +53,9 @@ static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_
 #endif
 }
 
-/* Compute factors f_j: the collocation polynomial at a fraction of a step, minus its value at the end of the step, is the
-   sum of f_j times the increment of stage j. The factors are integrals of Lagrange polynomials from 1 to the fraction,
-   divided by the weights, by sums of Legendre polynomials. */
+/* Compute the factors f_j of the stage increments in the collocation polynomial at a fraction of a step, minus its value at
+   the end of the step. They are the integrals of the Lagrange polynomials from 1 to the fraction, divided by the weights;
+   they are computed by sums of Legendre polynomials. */
 static void phi_factors_at(double fraction, double factor[PHI_NODES])
 {
     const double x = 2.0 * fraction - 1.0;
@@ -83,7 +83,7 @@ static void phi_factors_at(double fraction, double factor[PHI_NODES])
 #include "gauss_lifted.c"
 
 #if PHI_STAGED
-/* Weight of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
+/* Weight of squared changes of coordinates: 1 / |x|^2, or 1 / |increments|^2 if x = 0. */
 static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
 {
     double square = DBL_MIN;
@@ -94,8 +94,8 @@ static double phi_scale(const double x[PHI_DIM], phi_lanes *increments)
     return 1.0 / square;
 }
 
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates and functionals,
-   and the size of group elements. */
+/* Squared change of the unknowns by a sweep, as a mean over the stages. Changes of coordinates and functionals have the
+   weight scale, those of group elements the weight element_scale. */
 static inline double phi_change_of(double scale, double element_scale, int count, phi_lanes *before, phi_lanes *after)
 {
     phi_lanes sum = { 0.0 };
@@ -109,17 +109,17 @@ static inline double phi_change_of(double scale, double element_scale, int count
     return element_scale * (phi_total(sum) / (double)PHI_NODES);
 }
 
-/* Predict the values that sweeps read, from the increments of the last steps. */
+/* Predict the values that sweeps read, from the stage increments of the last steps; predictor is a row of phi_prediction. */
 static inline void phi_predict(phi_history *past, int predictor, phi_lanes reads[PHI_READ_COUNT])
 {
     double(*last)[PHI_WIDTH] = past->increments[past->latest], (*older)[PHI_WIDTH] = past->increments[1 - past->latest];
     if (predictor + 1 < PHI_PREDICTORS)
         for (int r = 0; r < PHI_READ_COUNT; ++r) phi_mix_twice(phi_prediction[predictor], last[PHI_READ(r)], older[PHI_READ(r)], reads[r]);
-    else /* the last predictor reads one step only */
+    else /* the last predictor uses the last step only */
         for (int r = 0; r < PHI_READ_COUNT; ++r) phi_mix(phi_prediction[predictor], last[PHI_READ(r)], reads[r]);
 }
 
-/* Number of the predictor whose prediction is nearest to the values that the last sweep of a step has read. */
+/* Number of the predictor whose prediction is nearest to reads, the values that the last sweep of a step has read. */
 static int phi_best_predictor(phi_history *past, double scale, double element_scale, phi_lanes *reads)
 {
     phi_lanes predicted[PHI_READ_COUNT];
@@ -137,8 +137,8 @@ static int phi_best_predictor(phi_history *past, double scale, double element_sc
 }
 
 #else
-/* Squared change by a sweep, as a mean over the stages, relative to the unknowns: |x| for coordinates and functionals, 1 for group elements;
-   at x = 0 the increments take the place of x. */
+/* Squared change of the unknowns by a sweep, as a mean over the stages. Changes of coordinates and functionals are relative
+   to |x|, or to their increments if x = 0; group elements have sizes near 1. */
 static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lanes *after)
 {
     double square = DBL_MIN, sum[PHI_NODES] = { 0.0 };
@@ -156,14 +156,14 @@ static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lane
 
 #endif
 #if PHI_FRAMED
-/* Transform stage increments of a step to the frame of its end, where the next step starts. The step begins at point. */
+/* Transform stage increments of a step, which begins at point, to the frame at its end, which the next step uses. */
 static void phi_to_next_frame(const phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments,
     double in_next_frame[PHI_UNKNOWNS][PHI_WIDTH])
 {
 #if PHI_STAGED
     phi_lanes in_frame[PHI_UNKNOWNS];
     phi_next_frame_lanes(s->coef, point, end, increments, in_frame);
-    memcpy(in_next_frame, in_frame, sizeof in_frame); /* may be unaligned */
+    memcpy(in_next_frame, in_frame, sizeof in_frame); /* to a place that may be unaligned */
 #else
     double increment[PHI_UNKNOWNS], in_frame[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
@@ -175,14 +175,14 @@ static void phi_to_next_frame(const phi_solver *s, double point[PHI_POINT], cons
 }
 
 #endif
-/* Store the stage increments of a step from a point with this end, to predict the next step. */
+/* Store the stage increments of a step from point, whose sum is end, to predict the next step. */
 static void phi_remember(phi_solver *s, double point[PHI_POINT], const double end[PHI_UNKNOWNS], phi_lanes *increments)
 {
     phi_history *past = &s->history;
 #if PHI_STAGED
     const int older = past->latest;
     past->latest = PHI_EARLIER - 1 - older;
-    if (s->h != past->h) past->count = 0; /* predictors read steps of one size */
+    if (s->h != past->h) past->count = 0; /* predictors need steps of equal size */
 #endif
     past->h = s->h;
     past->kicked = 0;
@@ -210,14 +210,14 @@ static void phi_remember(phi_solver *s, double point[PHI_POINT], const double en
 
 #include "gauss_policy.h"
 
-/* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if they do not converge. last
-   is the change before the latest one. *usual is updated to the factor by which changes shrink, *first to the number of
-   the first sweep of the next step whose change is measured. */
+/* The last change; consecutive sweeps whose change grew; sweeps whose change grew near rounding level. */
 typedef struct {
     double last;
     int rising, rises;
 } phi_progress;
 
+/* Convergence test: 1 if changes have reached rounding level, 0 if they still shrink, -1 if not. Updates *usual,
+   the factor by which they shrink, and *first, the sweep from which the next step measures. */
 static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep, double change)
 {
     const double rate = change / sweeps->last;
@@ -226,7 +226,7 @@ static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep,
     if (rate >= 1.0 && change <= PHI_NEARLY_ROUNDING) ++sweeps->rises;
     sweeps->last = change;
     if ((slow && change <= PHI_ROUNDING) || sweeps->rises > 1) {
-        /* the first measured change may have been at rounding level already */
+        /* fewer sweeps may suffice: an earlier change may have been at rounding level already */
         *first = (sweep == *first || rate > 2.0 * *usual ? *first : sweep) - 1;
         return 1;
     }
@@ -234,8 +234,8 @@ static int phi_judge(double *usual, int *first, phi_progress *sweeps, int sweep,
     return sweeps->rising < (int)PHI_NODES + PHI_MOST_RISING ? 0 : -1;
 }
 
-/* Solve for the increments of all stages by fixed-point sweeps, starting from the prediction. Changes are measured only
-   from the sweep on that is expected to be the last. */
+/* Solve the equations of a step for the increments of all stages, by fixed-point sweeps from the prediction. Changes are
+   measured only from the sweep on that is expected to be the last. */
 static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *increments)
 {
     phi_history *past = &s->history;
@@ -270,7 +270,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
             if (!isfinite(square)) return PHI_NOT_FINITE;
             if (judgement < 0) return PHI_NO_CONVERGENCE;
             if (judgement > 0) {
-                /* the latest change is about the error before the last sweep: if it is small, that sweep was not needed */
+                /* the last change is about the error before the last sweep: if it is small, this sweep was not needed */
                 if (solved) past->sweeps = square <= 16.0 * PHI_SOLVED * PHI_SOLVED ? sweep - 1 : sweep;
                 if (past->sweeps < 2) past->sweeps = 2;
 #if PHI_STAGED
@@ -287,7 +287,7 @@ static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lane
 }
 
 #if PHI_MONITOR
-/* Physical time of a step: the integral of dt/dtau over its stages. */
+/* Physical time that passes in a step: the integral of dt/dtau, by the values at its stages. */
 static double phi_time_of(const phi_solver *s, double point[PHI_POINT], phi_lanes *increments)
 {
     double sum = 0.0;

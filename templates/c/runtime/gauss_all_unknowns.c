@@ -1,11 +1,12 @@
 #ifndef PHI_FILE_GAUSS_ALL_UNKNOWNS
 #define PHI_FILE_GAUSS_ALL_UNKNOWNS
 #if PHI_STAGED
-/* Sweeps iterate all unknowns, and read them. */
+/* Sweeps read and iterate all unknowns. */
 #define PHI_READ(r) (r)
 
 #endif
-/* Values of the unknowns in a step of another size, the last one times a ratio, by the collocation polynomial. */
+/* Predict the unknowns z at the stages of a step whose size is ratio times that of the last step, by the collocation
+   polynomial of the last step. */
 static void phi_predict_at(phi_history *past, double ratio, phi_lanes *z)
 {
     double factor[PHI_NODES];

@@ -5,8 +5,9 @@
 #include <string.h>
 
 /* ---- Frames of group elements ---- */
-/* A copy of the quaternions with the functional y has a frame F with y = F* k F. At the end of a step it is F + w, the frame
-   of the next one. Here are the components of the first F: a rotation from y to k or -k, whichever is nearer, times |y|^1/2. */
+/* The unknowns contain quaternions F ("frames") such that the vector y, a linear function of x, is F* k F. In a step F
+   becomes F + w, the frame of the next step. Compute the first F: a rotation from y to k or -k, whichever is nearer, times
+   |y|^1/2. */
 static void phi_lift_one(const double y[3], double f[4])
 {
     const double length = sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2]), half = sqrt(0.5 * (length + fabs(y[2])));
@@ -17,8 +18,8 @@ static void phi_lift_one(const double y[3], double f[4])
     f[3] = y[2] >= 0.0 ? 0.0 : a;
 }
 
-/* Multiply F by the factor exp(tk) that brings it nearest to an old frame, so that predictions by old increments remain
-   valid. */
+/* Multiply the frame f by the rotation exp(t k) that brings it nearest to an old frame, so that predictions by old
+   increments remain valid. */
 static void phi_align(const double old[4], double f[4])
 {
     const double a = f[0] * old[0] + f[1] * old[1] + f[2] * old[2] + f[3] * old[3];
@@ -28,7 +29,7 @@ static void phi_align(const double old[4], double f[4])
     memcpy(f, turned, sizeof turned);
 }
 
-/* Compute frames for the state, unless those from the last step are still valid. */
+/* Compute the frames of the present state, unless those from the last step are still valid. */
 static void phi_lift(phi_solver *s)
 {
     phi_history *past = &s->history;
@@ -46,7 +47,8 @@ static void phi_lift(phi_solver *s)
     past->lifted = 1;
 }
 
-/* Weight of squared changes of group elements: 1 / |F|^2. It is bounded, as ratios to weights of coordinates would underflow. */
+/* Weight of squared changes of frames F: 1 / |F|^2, bounded so that its ratio to the weight of coordinates does not
+   underflow. */
 static double phi_element_scale(const phi_solver *s)
 {
     double square = sqrt(DBL_MIN);
@@ -54,7 +56,7 @@ static double phi_element_scale(const phi_solver *s)
     return 1.0 / square;
 }
 
-/* Update the frames to the end of a step, in compensated arithmetic. */
+/* Replace the frames by those at the end of a step, in compensated arithmetic; end are the changes of the unknowns. */
 static void phi_move_frames(phi_solver *s, const double end[PHI_UNKNOWNS])
 {
     for (int i = 0; i < PHI_LIFT; ++i) {

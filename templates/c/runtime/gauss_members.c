@@ -11,9 +11,9 @@
 /* ---- SIMD batches of members: Gauss steps ---- */
 enum {
     PHI_GROUP = PHI_LANES, /* number of members, one in each lane */
-    PHI_FEWEST = PHI_LANES > 4 ? 7 : 3 /* measured: fewer members are faster one after the other, with their stages in lanes */
+    PHI_FEWEST = PHI_LANES > 4 ? 7 : 3 /* measured: fewer members are faster one after the other, with a stage in each lane */
 };
-/* As PHI_SOLVED, for the slowest member. With PHI_SOLVED the energy drifts by 1e-18 of its size in each step. */
+/* Largest accepted error of the slowest member. With PHI_SOLVED the energy drifts by 1e-18 of its size in each step. */
 #define PHI_GROUP_SOLVED (0.25 * PHI_SOLVED)
 
 /* Values of the unknowns of all members, for each stage. */
@@ -21,31 +21,31 @@ typedef phi_lanes phi_batch[PHI_NODES][PHI_UNKNOWNS];
 
 /* Members of an ensemble, one in each lane. */
 typedef struct {
-    phi_lanes x[PHI_POINT]; /* data of the start of a step, as phi_start copies them */
+    phi_lanes x[PHI_POINT]; /* data at the start of a step, the coordinates first */
     phi_lanes carry[PHI_DIM], coef[PHI_COEFFICIENTS];
-    phi_lanes weights[PHI_NODES][1]; /* h b_j */
-    phi_batch increments[PHI_EARLIER];    /* stage increments of the last steps, in the frame of the end of the last one */
+    phi_lanes weights[PHI_NODES][1]; /* weights h b_j of the stages */
+    phi_batch increments[PHI_EARLIER];    /* stage increments of the last steps, in the frame at the end of the last step */
     int latest;    /* index of the last step in increments */
-    int count;     /* steps in increments */
-    int predictor; /* row of phi_prediction that predicts the next step */
+    int count;     /* number of steps in increments */
+    int predictor; /* row of phi_prediction by which the next step is predicted */
     int age;       /* steps since the predictors were first compared; they are compared again after every PHI_TRIALS steps */
     int sweeps;    /* number of the first sweep whose change is measured */
     double rate;   /* factor by which the changes of a sweep shrink from one sweep to the next */
     int active[PHI_LANES];        /* whether the lane holds a member that has not failed */
-    size_t steps_left[PHI_LANES]; /* steps left to make when the member failed */
+    size_t steps_left[PHI_LANES]; /* number of steps that the member has still to make outside of the group */
     PHI_GAUGES_OF_MEMBERS
 #if PHI_TIMED
     double t0[PHI_LANES], h[PHI_LANES]; /* initial times and steps */
-    size_t steps;                       /* steps made */
+    size_t steps;                       /* number of steps made */
 #endif
 } phi_group;
 
-/* Predict the unknowns of stage i by the increments of the last steps. */
+/* Predict the unknowns of stage i from the stage increments of the last steps; predictor is a row of phi_prediction. */
 static void phi_group_predict(phi_group *group, int predictor, int i, phi_lanes z[PHI_UNKNOWNS])
 {
     phi_lanes older[PHI_UNKNOWNS];
     phi_mix_members(phi_prediction[predictor], i, group->increments[group->latest], z);
-    if (predictor + 1 == PHI_PREDICTORS) return; /* the last predictor reads one step */
+    if (predictor + 1 == PHI_PREDICTORS) return; /* the last predictor uses the last step only */
     phi_mix_members(phi_prediction[predictor] + PHI_NODES, i, group->increments[1 - group->latest], older);
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {
         PHI_EACH_LANE
@@ -68,7 +68,7 @@ static inline void phi_group_compare(const phi_lanes scale, phi_lanes before[PHI
     }
 }
 
-/* The weights of squared changes of coordinates: 1 / |x|^2; at x = 0 the increments take the place of x. */
+/* Compute the weights of squared changes of coordinates in each lane: 1 / |x|^2, or 1 / |increments|^2 if x = 0. */
 static void phi_group_scale(const phi_group *group, phi_batch now, phi_lanes scale)
 {
     for (int lane = 0; lane < PHI_LANES; ++lane) {
@@ -80,7 +80,7 @@ static void phi_group_scale(const phi_group *group, phi_batch now, phi_lanes sca
     }
 }
 
-/* The number of the predictor whose prediction is nearest to the final unknowns z of the active members. */
+/* Number of the predictor whose prediction is nearest to the final unknowns z of the active members. */
 static int phi_group_best_predictor(phi_group *group, const phi_lanes scale, phi_batch z)
 {
     phi_lanes predicted[PHI_UNKNOWNS];
@@ -103,8 +103,8 @@ static int phi_group_best_predictor(phi_group *group, const phi_lanes scale, phi
     return best;
 }
 
-/* A sweep over all stages: compute the increments from the unknowns z, and add their squared changes to sum unless it is
-   NULL. */
+/* Make a fixed-point sweep over all stages: compute the increments from the unknowns z, and add their squared changes to
+   sum, unless it is NULL. */
 static void phi_group_sweep(phi_group *group, const phi_lanes scale, phi_batch z, phi_batch now, double *sum)
 {
     phi_lanes next[PHI_UNKNOWNS];
@@ -131,7 +131,7 @@ static double phi_group_change(phi_group *group, const phi_lanes sum)
     return largest / (double)PHI_NODES;
 }
 
-/* The starting values z of the unknowns: a prediction, or 0 in the first step. */
+/* Compute the starting values z of the unknowns: a prediction, or 0 in the first step. */
 static void phi_group_begin(phi_group *group, phi_batch z)
 {
     const int predictor = group->count < PHI_EARLIER ? PHI_PREDICTORS - 1 : group->predictor;
@@ -144,8 +144,8 @@ static void phi_group_begin(phi_group *group, phi_batch z)
     for (int i = 0; i < PHI_NODES; ++i) phi_group_predict(group, predictor, i, z[i]);
 }
 
-/* Solve for the increments of all stages, as for a single trajectory, until the slowest member has converged. Members
-   that do not converge become inactive. */
+/* Solve the equations of a step for the increments `now` of all stages, by fixed-point sweeps, until the slowest member has
+   converged. Members that do not converge become inactive. */
 static void phi_group_solve(phi_group *group, phi_batch now)
 {
     phi_batch z;
@@ -194,8 +194,8 @@ static void phi_group_remember(phi_group *group, phi_lanes start[PHI_POINT], phi
     if (group->count < PHI_EARLIER) ++group->count;
 }
 
-/* Add the changes in compensated arithmetic, as phi_advance does. Members that failed, or whose new state is not finite,
-   keep the old state. */
+/* Add the changes to x in compensated arithmetic. Members that failed, or whose new state is not finite, keep the old
+   state. */
 static void phi_group_advance(phi_group *group, phi_lanes change[PHI_DIM])
 {
     phi_lanes x[PHI_DIM], carry[PHI_DIM], zero = { 0.0 };
@@ -206,7 +206,7 @@ static void phi_group_advance(phi_group *group, phi_lanes change[PHI_DIM])
             const double total = by[lane] + small[lane], more = total - by[lane];
             const double sum = was[lane] + total, added = sum - was[lane];
             x[i][lane] = sum;
-            zero[lane] += sum - sum; /* a number less itself is 0, if it is finite */
+            zero[lane] += sum - sum; /* sum - sum is 0 if the sum is finite, else NaN */
             carry[i][lane] = ((was[lane] - (sum - added)) + (total - added)) + ((by[lane] - (total - more)) + (small[lane] - more));
         }
     }
@@ -219,7 +219,7 @@ static void phi_group_advance(phi_group *group, phi_lanes change[PHI_DIM])
 }
 
 #if PHI_MONITOR
-/* Members become inactive if the physical time of their step does not have the sign of h; a single step fails then. */
+/* Members become inactive if the physical time of their step does not have the sign of h. */
 static void phi_group_pass(phi_group *group, phi_batch now)
 {
     phi_lanes z[PHI_UNKNOWNS], elapsed[1], sum = { 0.0 };
@@ -234,7 +234,7 @@ static void phi_group_pass(phi_group *group, phi_batch now)
 
 #endif
 #if PHI_TIMED
-/* Update the time of each member after a step. */
+/* Update the time of each member to the end of a step. */
 static void phi_group_pass(phi_group *group)
 {
     ++group->steps;

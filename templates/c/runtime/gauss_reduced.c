@@ -2,10 +2,10 @@
 #define PHI_FILE_GAUSS_REDUCED
 #include <string.h>
 
-/* Sweeps iterate some unknowns only. They read integrals of the increments of these; the other unknowns follow. */
-#define PHI_READ(r) phi_iterated[phi_reads[r]] /* the unknown whose increments a value is the integral of */
+/* Fixed-point sweeps iterate some of the unknowns only. They read time integrals of these; the other unknowns follow. */
+#define PHI_READ(r) phi_iterated[phi_reads[r]] /* the unknown whose integral is value r */
 
-/* Set the factors of each stage that a sweep reads: its weight, its time and h. */
+/* Set the factors of each stage that a sweep reads: h times its weight, its time as a fraction of the step, and h. */
 static inline void phi_set_factors(double h, phi_lanes factors[PHI_FACTORS])
 {
     for (int i = 0; i < PHI_NODES; ++i) factors[0][i] = h * phi_weights[i];
@@ -13,13 +13,13 @@ static inline void phi_set_factors(double h, phi_lanes factors[PHI_FACTORS])
     for (int i = 0; i < PHI_WIDTH; ++i) factors[2][i] = h;
 }
 
-/* Compute the values that the next sweep reads, from the increments. */
+/* Compute the integrals that the next sweep reads, from the increments `now`. */
 static inline void phi_read(phi_lanes *now, phi_lanes *reads)
 {
     for (int r = 0; r < PHI_READS; ++r) phi_mix(phi_doubled, now[phi_reads[r]], reads[r]);
 }
 
-/* Compute the increments of all unknowns, from those of the iterated ones and the values that the last sweep read. */
+/* Compute the increments of all unknowns from those of the iterated unknowns and from the values that the last sweep read. */
 static void phi_complete_stages(const phi_solver *s, double point[PHI_POINT], phi_lanes *factors, phi_lanes *now, phi_lanes *reads,
     phi_lanes *increments)
 {
@@ -32,7 +32,8 @@ static void phi_complete_stages(const phi_solver *s, double point[PHI_POINT], ph
     for (int r = 0; r < PHI_ITERATED; ++r) memcpy(increments[phi_iterated[r]], now[r], sizeof z[0]);
 }
 
-/* Compute the ends of the unknowns that are not iterated. The factors 1 - c_j of increments make the step symplectic. */
+/* Compute the changes, in a step, of the unknowns that are not iterated. Factors 1 - c_j of the increments make the step
+   symplectic. */
 static void phi_end_followers(const phi_solver *s, double point[PHI_POINT], phi_lanes *increments, double end[PHI_UNKNOWNS])
 {
     double reads[PHI_READS], offsets[PHI_FOLLOWERS], time[2] = { 1.0, s->h };

@@ -6,10 +6,10 @@
 #include "model.h"
 
 /* ---- Bonds ---- */
-/* Whether the numbers of sites and bonds fit their types. */
+/* Whether the numbers of sites and of ends of bonds fit into int. */
 static int phi_few(size_t sites, size_t bonds) { return sites < INT_MAX && bonds < INT_MAX / 2; }
 
-/* Bytes for sites and bonds, after the rows of fields. */
+/* Number of bytes for tables of sites and bonds; in memory they follow the rows of fields. */
 static size_t phi_graph_size(size_t sites, size_t bonds)
 {
 #if PHI_BY_COLOUR
@@ -24,7 +24,7 @@ static size_t phi_graph_size(size_t sites, size_t bonds)
 #endif
 }
 
-/* Whether all bonds connect two different existing sites. */
+/* Whether each bond connects two different sites of the lattice. */
 static int phi_connected(const phi_bonds *bonds, size_t sites)
 {
     if (!phi_few(sites, bonds != NULL ? bonds->count : 0)) return 0;
@@ -36,7 +36,7 @@ static int phi_connected(const phi_bonds *bonds, size_t sites)
     return 1;
 }
 
-/* Greedy colouring: each site takes the first colour that none of its earlier neighbours has. */
+/* Colour the sites: each one takes the first colour that none of its earlier neighbours by bonds has. */
 static void phi_colour(phi_solver *s, int *used_by)
 {
     const int sites = (int)s->sites;
@@ -54,7 +54,7 @@ static void phi_colour(phi_solver *s, int *used_by)
     for (size_t part = 0; part < sizeof phi_by_colour; ++part) s->flows += phi_by_colour[part] ? s->colour_count : 1;
 }
 
-/* List the bonds of each site in order, those that start at the site first. */
+/* Make the table of bonds: for each site, in order, the bonds that start there, then those that end there. */
 static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
 {
     const size_t sites = s->sites, count = bonds != NULL ? bonds->count : 0;
@@ -68,13 +68,13 @@ static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
     s->number = s->other + 2 * count;
     memset(s->bonds, 0, (2 * sites + 1) * sizeof *s->bonds);
     for (size_t k = 0; k < 2 * count; ++k) ++(k % 2 == 0 ? s->bonds : s->middle)[bonds->ends[k]];
-    int end = 0; /* number of bonds so far */
+    int end = 0; /* number of ends of bonds at the sites so far */
     for (size_t i = 0; i < sites; ++i) {
         s->bonds[i] = end += s->bonds[i];
         s->middle[i] = end += s->middle[i];
     }
     s->bonds[sites] = end;
-    for (size_t k = count; k-- > 0;) { /* backwards, which turns ends of lists into their starts */
+    for (size_t k = count; k-- > 0;) { /* in reverse, since entries move the end of a list to its start */
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
         const int begins = --s->bonds[a], ends = --s->middle[b];
         s->other[begins] = (int)b;

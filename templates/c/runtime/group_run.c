@@ -7,7 +7,7 @@
 #include "members.c"
 #include "model.h"
 
-/* Write the frames of active members after a number of steps. */
+/* Write the states of active members to their frames, if frames are due after `done` steps. */
 static void phi_group_frame(const phi_group *group, const phi_members *all, size_t first, size_t done)
 {
     double x[PHI_DIM];
@@ -17,7 +17,7 @@ static void phi_group_frame(const phi_group *group, const phi_members *all, size
     }
 }
 
-/* Write the results of a member. Steps that the group did not make for it are made by single steps. */
+/* Write the results of a member. Steps that it did not make in the group are made first, one by one. */
 static phi_status phi_group_end(const phi_group *group, int lane, const phi_members *all, size_t m,
     phi_status status)
 {

@@ -9,31 +9,31 @@
 
 /* ---- SIMD batches of members: implicit steps ---- */
 enum {
-    PHI_GROUP = PHI_LANES,              /* members, one in each lane */
+    PHI_GROUP = PHI_LANES,              /* number of members, one in each lane */
     PHI_FEWEST = 3,                     /* measured: fewer members are faster one by one */
-    PHI_GROUP_REPAY = 5000 * PHI_DIM,   /* steps to repay a fit; it predicts one value only, where a fit for a block predicts eight */
-    PHI_HOPELESS_WAIT = 100 * PHI_REPAY /* steps until recurrences that did not help are fitted again */
+    PHI_GROUP_REPAY = 5000 * PHI_DIM,   /* steps that repay a fit; measured. They are many, since it predicts one solution, and not eight as in a block */
+    PHI_HOPELESS_WAIT = 100 * PHI_REPAY /* slow steps until recurrences that did not help are fitted again */
 };
 
 /* Members of an ensemble, one in each lane. */
 typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM], PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];
-    phi_lanes PHI_OF(past, PHI_STAGES)[PHI_REMEMBERED][PHI_DIM]; /* solutions, in a ring buffer */
-    phi_lanes PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM]; /* coefficients of the recurrences, for the latest solution first */
-    int latest;     /* row of the latest solutions */
-    int count;      /* rows in use */
+    phi_lanes PHI_OF(past, PHI_STAGES)[PHI_REMEMBERED][PHI_DIM]; /* past solutions of each stage, in a ring buffer */
+    phi_lanes PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM]; /* weights of past solutions in the recurrences, the latest solution first */
+    int latest;     /* index of the latest solutions in past */
+    int count;      /* number of solutions in past */
     int PHI_OF(extrapolation_order, PHI_STAGES); /* number of solutions that the extrapolation uses */
     int PHI_OF(recurrence_terms, PHI_STAGES);    /* number of solutions that the recurrences use */
-    int PHI_OF(use_recurrences, PHI_STAGES);     /* whether recurrences predict better */
+    int PHI_OF(use_recurrences, PHI_STAGES);     /* whether recurrences predict better than the extrapolation */
     int fits;               /* number of fits of the recurrences */
     int slow_steps;         /* recent steps that took more than one iteration */
-    int slow_steps_allowed; /* slow_steps at which recurrences are fitted again */
+    int slow_steps_allowed; /* value of slow_steps at which the recurrences are fitted again */
     int active[PHI_LANES];  /* whether the lane holds a member that has not failed */
-    size_t steps_left[PHI_LANES]; /* steps left to make, for active lanes */
+    size_t steps_left[PHI_LANES]; /* number of steps that the member has still to make outside of the group */
     PHI_GAUGES_OF_MEMBERS
 } phi_group;
 
-/* The past solutions of a stage, the latest for k = 0. */
+/* The solutions of a stage k steps before the last one. */
 static phi_lanes *phi_group_past(phi_group *group PHI_AND_INT_STAGE, int k)
 {
     const int row = group->latest + k;
@@ -53,7 +53,7 @@ static void phi_group_foresee(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[re
     }
 }
 
-/* Extrapolate the solutions of a stage. */
+/* Predict the solutions of a stage by polynomial extrapolation of past ones, or by x if there are none. */
 static void phi_group_extrapolate(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[restrict PHI_DIM])
 {
     const int order = PHI_OF(group->extrapolation_order, stage);
@@ -70,7 +70,7 @@ static void phi_group_extrapolate(phi_group *group PHI_AND_INT_STAGE, phi_lanes 
     }
 }
 
-/* Sum over members of the absolute values of all components. */
+/* Sum of the absolute values of all components of y, over the active members. */
 static double phi_group_sum(const phi_group *group, phi_lanes y[PHI_DIM])
 {
     double sum = 0.0;
@@ -87,7 +87,7 @@ static void phi_group_subtract(phi_lanes y[restrict PHI_DIM], phi_lanes other[re
     }
 }
 
-/* Select the predictor that would have been best for these solutions. */
+/* Select the predictor of a stage: the one that would have predicted its solutions y best. */
 static void phi_group_judge(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_DIM])
 {
     phi_lanes row[PHI_HISTORY + 1][PHI_DIM];
@@ -110,8 +110,8 @@ static void phi_group_judge(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_
     PHI_OF(group->use_recurrences, stage) = phi_group_sum(group, row[0]) <= least;
 }
 
-/* Fit the recurrences of all members. The wait until the next fit grows with every fit, and is long if a fit did not
-   help. */
+/* Fit the recurrences of all members. The number of slow steps until the next fit grows with every fit, and is large if the
+   last fit did not help. */
 static void phi_group_fit(phi_group *group)
 {
     phi_history member;
@@ -137,7 +137,8 @@ static void phi_group_fit(phi_group *group)
     group->slow_steps_allowed = helped && group->slow_steps_allowed < PHI_LONG_WAIT / 2 ? 2 * group->slow_steps_allowed + PHI_REPAY : PHI_HOPELESS_WAIT;
 }
 
-/* Replace, lane by lane, predictions that are not near the last solutions (phi_near) by the given values. */
+/* In each lane whose prediction y is not near the values `last`, replace it by these: far away the equation of a step has
+   solutions unrelated to the motion. */
 static void phi_stay_near(phi_lanes y[restrict PHI_DIM], phi_lanes last[restrict PHI_DIM])
 {
     phi_lanes distance = { 0.0 }, size = { 0.0 };
@@ -155,8 +156,8 @@ static void phi_stay_near(phi_lanes y[restrict PHI_DIM], phi_lanes last[restrict
     }
 }
 
-/* Number of lanes whose corrections are still above the tolerance. Lanes with values that are not finite leave the
-   group. */
+/* Number of active lanes whose expected corrections are still above the tolerance. Lanes with values that are not finite
+   become inactive. */
 static int phi_group_open(phi_group *group, const phi_lanes size, const phi_lanes left)
 {
     int open = 0;
@@ -168,8 +169,8 @@ static int phi_group_open(phi_group *group, const phi_lanes size, const phi_lane
     return open;
 }
 
-/* Predict the solution of a stage: by recurrences or extrapolation, or by the state where the prediction is not near
-   it. */
+/* Predict the solutions of a stage, by recurrences or extrapolation. Where the prediction is not near the state, the state
+   takes its place. */
 static void phi_group_predict(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_DIM])
 {
     if (PHI_OF(group->use_recurrences, stage)) phi_group_foresee(group PHI_AND_STAGE, y);
@@ -177,8 +178,8 @@ static void phi_group_predict(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PH
     phi_stay_near(y, group->x);
 }
 
-/* Newton's method for a stage, until all lanes have converged. Returns the number of iterations; if that is the
-   maximum, lanes that have not converged leave the group. */
+/* Solve the equation of a stage by Newton's method, until all lanes have converged. Returns the number of iterations. After
+   the largest allowed number, lanes that have not converged become inactive. */
 static int phi_group_solve(phi_group *group PHI_AND_INT_STAGE, phi_model *model)
 {
     phi_lanes unit[PHI_DIM], size, before, left;
@@ -207,7 +208,8 @@ static int phi_group_solve(phi_group *group PHI_AND_INT_STAGE, phi_model *model)
     return iterations;
 }
 
-/* Add the increments, corrected to first order, in compensated arithmetic, as in a single step. */
+/* Add the increments of a stage to x in compensated arithmetic. The effect of the last correction of y on the increment is
+   included to first order. */
 static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[restrict PHI_DIM], phi_model *model)
 {
     PHI_GAIN(model)
@@ -223,8 +225,8 @@ static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[res
     }
 }
 
-/* Members that failed, or whose new state is not finite or not near the old one, keep the old state and leave the
-   group. Returns the number of active members. */
+/* Give the old state x back to members that failed, or whose new state is not finite or not near the old one; they become
+   inactive. Returns the number of active members. */
 static int phi_group_leave(phi_group *group, phi_lanes x[PHI_DIM], phi_lanes carry[PHI_DIM],
     size_t remaining)
 {

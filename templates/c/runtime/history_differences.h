@@ -1,8 +1,8 @@
 #ifndef PHI_FILE_HISTORY_DIFFERENCES_H
 #define PHI_FILE_HISTORY_DIFFERENCES_H
-/* Predictor: the last solution and its backward differences, to extrapolate the next one. For speed only. */
+/* Predictor: the last solution y and its backward differences, which extrapolate the next. For speed only. */
 typedef struct {
-    int count, order; /* number of differences that are known, and of those that the extrapolation sums */
-    double difference[PHI_DIFFERENCES][PHI_DIM]; /* the solution, then differences */
+    int count, order; /* number of stored entries, and number of entries whose sum is the prediction */
+    double difference[PHI_DIFFERENCES][PHI_DIM]; /* the last solution, then its differences */
 } phi_history;
 #endif

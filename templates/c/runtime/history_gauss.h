@@ -1,9 +1,9 @@
 #ifndef PHI_FILE_HISTORY_GAUSS_H
 #define PHI_FILE_HISTORY_GAUSS_H
-/* Results of the last steps, by which the next one predicts the starting values of its iteration. They affect the speed
+/* Results of the last steps, from which the starting values of the next iteration are predicted. They affect the speed
    only, except for a frame, which belongs to the state. */
 typedef struct {
-    int count;     /* steps in increments */
+    int count;     /* number of steps in increments */
 #if PHI_STAGED
     int latest;    /* index of the last step in increments */
 #endif
@@ -16,16 +16,16 @@ typedef struct {
     int kicked;    /* whether the state was changed since the last step */
     double h;      /* size of the last step */
 #if PHI_LIFTED
-    int lifted;    /* whether frame has been computed; after a kick it is that of the former state */
-    double frame[PHI_LIFT], frame_carry[PHI_LIFT]; /* frames of group elements, and their compensation terms */
+    int lifted;    /* whether frame has been computed; after a kick it still belongs to the former state */
+    double frame[PHI_LIFT], frame_carry[PHI_LIFT]; /* quaternions F with y = F* k F for vectors y, linear in x; and their compensation terms */
 #endif
 #if PHI_STAGED
-    double increments[PHI_EARLIER][PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last steps, in the frame of the end of the last one */
+    double increments[PHI_EARLIER][PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last steps, in the frame at the end of the last step */
 #else
-    double increments[PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last step, in the frame of its end */
+    double increments[PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last step, in the frame at its end */
 #endif
 #if PHI_FRAMED && PHI_ADJOINT
-    double solved[PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last step in the frame of its start, for the tape */
+    double solved[PHI_UNKNOWNS][PHI_WIDTH]; /* stage increments of the last step in the frame at its start, for reverse passes */
 #endif
 } phi_history;
 #endif

@@ -2,8 +2,8 @@
 #define PHI_FILE_HISTORY_RECURRENCES_H
 enum { PHI_STORED_VALUES = 2 * PHI_REMEMBERED };
 
-/* Predictor: recent solutions of the implicit equation, from which the starting value of the next iteration follows by
-   extrapolation, or by a linear recurrence fitted to the last PHI_REMEMBERED solutions. It affects the speed only. */
+/* Predictor: recent solutions of the implicit equation. They give the starting value of the next iteration by extrapolation,
+   or by a linear recurrence that is fitted to the last PHI_REMEMBERED solutions. It affects the speed only. */
 typedef struct {
     int count;                       /* number of solutions in past */
     int extrapolation_order;         /* number of solutions that the extrapolation uses */
@@ -13,6 +13,6 @@ typedef struct {
     int slow_steps;                  /* recent steps that took more than one iteration */
     int slow_steps_allowed;          /* value of slow_steps at which the recurrence is fitted again */
     double past[PHI_STORED_VALUES][PHI_DIM]; /* solutions, the latest last */
-    double weight[PHI_WINDOW][PHI_DIM][PHI_AHEAD]; /* coefficients of the recurrences for the next solutions, by the latest solution first */
+    double weight[PHI_WINDOW][PHI_DIM][PHI_AHEAD]; /* weights of past solutions, the latest first, in the next PHI_AHEAD solutions */
 } phi_history;
 #endif

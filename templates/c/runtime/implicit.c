@@ -10,8 +10,8 @@
 #include "predictor.c"
 #include "plausibility_policy.h"
 
-/* Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its equation may
-   have solutions far away, at another energy, unrelated to the motion. */
+/* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that is too large
+   may have solutions far away, at another energy, unrelated to the motion. */
 static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double increment[PHI_DIM])
 {
     double distance = 0.0, size = 0.0, field[PHI_DIM], point[PHI_DIM], H[3];
@@ -33,7 +33,7 @@ static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double inc
     for (int k = 0; k < PHI_SOURCES * PHI_DIM; ++k) size += fabs(s->dw[k / PHI_DIM] * fields[k]);
 #endif
     if (distance <= PHI_PLAUSIBLE * size) return 1;
-    for (int k = 0; k < 3; ++k) { /* at the start, halfway, at the end */
+    for (int k = 0; k < 3; ++k) { /* energy at the start, halfway, and at the end */
         for (int i = 0; i < PHI_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
         H[k] = phi_hamiltonian(&s->params PHI_AND_T(s->t), point);
     }

@@ -5,15 +5,15 @@
 #include <string.h>
 
 #if PHI_CALLS_EXP || PHI_CALLS_EXPM1 || PHI_CALLS_SIN || PHI_CALLS_COS
-#define PHI_ROUNDER 6755399441055744.0 /* 1.5 2^52: adding it rounds to an integer */
+#define PHI_ROUNDER 6755399441055744.0 /* 1.5 * 2^52: adding it rounds to integers */
 
 #endif
-/* exp(u) - 2^k, and 2^k, where u = k log 2 + r; branch-free. */
+/* Compute exp(u) - 2^k and *power = 2^k, where k is the integer nearest to u / log 2; branch-free. */
 static inline double phi_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the last bits of shifted are k */
+    uint64_t bits; /* of shifted, whose last bits are k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;
@@ -56,7 +56,7 @@ static inline double phi_log_lane(double u)
     uint64_t bits, exponent, digits;
     double m, k, sum = 0.043478260869565216, other = 0.047619047619047616;
     memcpy(&bits, &u, sizeof bits);
-    exponent = (bits - 0x3fe6a09e667f3bcdU + 0x3ff0000000000000U) >> 52; /* k + 1023 */
+    exponent = (bits - 0x3fe6a09e667f3bcdU + 0x3ff0000000000000U) >> 52; /* k + 1023, the biased exponent of 2^k */
     digits = bits - ((exponent - 1023) << 52);
     memcpy(&m, &digits, sizeof m);
     exponent |= 0x4330000000000000U; /* 2^52 + k + 1023, as a double */
@@ -72,7 +72,7 @@ static inline double phi_log_lane(double u)
     sum = sum * qq + 0.14285714285714285;
     other = other * qq + 0.2;
     sum = (sum * q + other) * q + 0.3333333333333333;
-    /* m - 1 is exact; f (m - 1) and the later terms are small compared with it */
+    /* m - 1 is exact; the terms in small are small compared with it */
     const double small = q * sum * 2.0 * f + k * 1.9082149292705877e-10;
     const double rest = (m - 1.0) - f * (m - 1.0) + small + k * 0.6931471803691238;
     return rest + (u >= 2.2250738585072014e-308 && u <= 1.7976931348623157e308 ? 0.0 : (double)NAN);
@@ -92,7 +92,7 @@ static inline double phi_turned_sin(double u, double offset)
 #if PHI_CALLS_SIN || PHI_CALLS_COS
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of the rounded u */
+    uint64_t parity, bits; /* bits of shifted, whose last one is the parity of k */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;

@@ -6,15 +6,15 @@
 #include <string.h>
 
 #if PHI_CALLS_EXP || PHI_CALLS_EXPM1 || PHI_CALLS_SIN || PHI_CALLS_COS
-#define PHI_ROUNDER 12582912.0f /* 1.5 2^23: adding it rounds to an integer */
+#define PHI_ROUNDER 12582912.0f /* 1.5 * 2^23: adding it rounds to integers */
 
 #endif
-/* exp(u) - 2^k, and 2^k, where u = k log 2 + r; branch-free. */
+/* Compute exp(u) - 2^k and *power = 2^k, where k is the integer nearest to u / log 2; branch-free. */
 static inline float phi_exp_parts(float u, float *power)
 {
     const float shifted = u * 1.442695f + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
     const float r = (u - k * 0.693359375f) + k * 2.1219444e-4f, rr = r * r;
-    uint32_t bits; /* the last bits of shifted are k */
+    uint32_t bits; /* of shifted, whose last bits are k */
     float sum = 0.0013888889f, other = 1.9841270e-4f;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 127) << 23;
@@ -50,7 +50,7 @@ static inline float phi_log_lane(float u)
     uint32_t bits, exponent, digits;
     float m, k, sum = 0.14285715f, other = 0.11111111f;
     memcpy(&bits, &u, sizeof bits);
-    exponent = (bits - 0x3f3504f3U + 0x3f800000U) >> 23; /* k + 127 */
+    exponent = (bits - 0x3f3504f3U + 0x3f800000U) >> 23; /* k + 127, the biased exponent of 2^k */
     digits = bits - ((exponent - 127) << 23);
     memcpy(&m, &digits, sizeof m);
     exponent |= 0x4b000000U; /* 2^23 + k + 127, as a float */
@@ -59,7 +59,7 @@ static inline float phi_log_lane(float u)
     const float f = (m - 1.0f) / (m + 1.0f), q = f * f;
     sum = (other * q + sum) * q + 0.2f;
     sum = sum * q + 0.33333334f;
-    /* m - 1 is exact; f (m - 1) and the later terms are small compared with it */
+    /* m - 1 is exact; the terms in small are small compared with it */
     const float small = q * sum * 2.0f * f - k * 2.1219444e-4f;
     const float rest = (m - 1.0f) - f * (m - 1.0f) + small + k * 0.693359375f;
     return rest + (u >= FLT_MIN && u <= FLT_MAX ? 0.0f : (float)NAN);
@@ -79,7 +79,7 @@ static inline float phi_turned_sin(float u, float offset)
 #if PHI_CALLS_SIN || PHI_CALLS_COS
     const float near = (u - k * 3.140625f) - k * 9.67502594e-4f;
     const float r = (near - k * 1.50990672e-7f) - k * 5.1266883e-12f, q = r * r, qq = q * q;
-    uint32_t parity, bits; /* the last bit of shifted is the parity of the rounded u */
+    uint32_t parity, bits; /* bits of shifted, whose last one is the parity of k */
     float value, sum = -2.5052108e-8f, other = 1.6059044e-10f;
     sum = sum * qq + -1.9841270e-4f;
     other = other * qq + 2.7557319e-6f;

@@ -6,7 +6,7 @@
 /* The functions below evaluate the formulas of a step several times together, one evaluation in each lane. Compilers turn
    the loops over lanes into vector instructions. */
 #if PHI_NARROW
-enum { PHI_LANES = 4 }; /* more would need too much stack */
+enum { PHI_LANES = 4 }; /* a larger number would need too much stack for this system */
 #else
 enum { PHI_LANES = 8 }; /* numbers in one vector of AVX-512 */
 #endif
@@ -21,10 +21,10 @@ typedef double phi_lanes[PHI_LANES] __attribute__((aligned(64))); /* one value i
 typedef double phi_lanes[PHI_LANES];
 #endif
 
-/* Before a loop over lanes: tells the compiler that iterations are independent. */
+/* Stands before loops over lanes: it tells the compiler that their iterations are independent. */
 #if defined(__clang__)
 #if PHI_PACKS || PHI_STAGED
-/* Loops over lanes are not unrolled by clang, which would then vectorise the loops around them instead. */
+/* clang must not unroll loops over lanes, since it would then vectorise the loops around them instead. */
 #define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
 #else
 #define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
@@ -38,7 +38,7 @@ typedef double phi_lanes[PHI_LANES];
 #endif
 
 #if PHI_PACKS
-/* Marks functions that must be inlined, once for each value of a constant argument. */
+/* Marks functions that are inlined, so that there is a copy for each value of a constant argument. */
 #if defined(__GNUC__)
 #define PHI_IN_PLACE __attribute__((always_inline))
 #else

@@ -6,8 +6,8 @@
 
 #include "lanes.c"
 
-/* Largest value over the lanes, none of which is negative; infinite if one is not finite. The bits of such numbers have
-   the same order as integers, and those of NaN are larger still. */
+/* Largest value over the lanes, none of which may be negative; infinite if one is not finite. The bits of positive numbers,
+   read as integers, have the order of the numbers, and those of NaN are larger still. */
 static double phi_largest(const phi_lanes size)
 {
     uint64_t bits[PHI_LANES], most = 0;
@@ -19,7 +19,7 @@ static double phi_largest(const phi_lanes size)
 }
 #if PHI_BLOCKS
 
-/* Replace each lane of most by the larger value, in the same order. */
+/* Replace each lane of most by the larger of most and size, where NaN counts as larger than all numbers. */
 static void phi_update_largest(phi_lanes most, const phi_lanes size)
 {
     uint64_t bits[PHI_LANES], bits_of_most[PHI_LANES];

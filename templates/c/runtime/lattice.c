@@ -17,18 +17,18 @@
 #include "lattice_pieces.c"
 #include "lattice_share.c"
 
-enum { PHI_BUFFER = 256 }; /* number of densities summed in one pass */
+enum { PHI_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 
 #if PHI_SPREAD
-/* Doubles from one array to the next. Arrays start at different places of their pages: a load that has the page offset
-   of a pending store would wait for it. */
+/* Number of doubles from one array to the next. Arrays start at different offsets in memory pages, since a load would wait
+   for a pending store with the same offset. */
 static size_t phi_block(size_t rows, ptrdiff_t width)
 {
     const size_t block = rows * (size_t)width, apart = 512 / PHI_ARRAYS / 8 * 8;
     return block < 512 ? block : block + (512 + apart - block % 512) % 512;
 }
 #else
-/* Doubles from one array to the next. */
+/* Number of doubles from one array to the next. */
 static size_t phi_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 #endif
 
@@ -61,7 +61,7 @@ static void phi_take(const phi_solver *s, double *const *fields, double *x)
 
 #include "lattice_seams.c"
 
-/* Store the values of a parameter at sites, or one value for all sites. */
+/* Store a parameter at all sites: its values, or if values is NULL, `value` everywhere. */
 static void phi_put_parameter(const phi_solver *s, double *rows, const double *values, double value)
 {
     for (ptrdiff_t i = PHI_LEAST; i < PHI_MEMORY_OF(PHI_BEYOND); ++i) rows[i] = value;
@@ -136,7 +136,7 @@ phi_status PHI_INIT(phi_solver *s, const phi_params *params, PHI_SIZES, const do
 
 #include "lattice_time.c"
 
-/* Compute coefficients for the step size h, if h has changed. */
+/* Compute the coefficients for steps of size h, if h has changed. */
 static phi_status phi_set_step(phi_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;

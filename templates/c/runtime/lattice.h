@@ -6,9 +6,9 @@
 
 #include "lattice_predictor.h"
 
-/* A solver, initialised by phi_init. Its arrays lie in memory of the caller: a copy of the struct is no independent solver.
-   A field lies in rows, all sites along the last axis, with a halo where steps read other sites: copies of the other end
-   beside each end. Only read the struct, at any time. */
+/* A solver, initialised by phi_init. Its arrays lie in memory of the caller, so a copy is no independent solver. Fields are
+   stored in rows along the last axis. If steps read neighbours, a row has a halo: copies of the other end beside each end.
+   Callers may only read the struct. */
 typedef struct {
 #include "state_of_lattice.h"
 } phi_solver;
@@ -19,16 +19,16 @@ typedef struct {
 /* As phi_init, at the time t0; phi_init starts at the time 0. */
 phi_status phi_init_at(phi_solver *s, const phi_params *params, PHI_SIZES, const double *x0, double t0, void *work);
 
-/* Select the random numbers of the next steps, a function of the seed, the member of an ensemble, the number of the step,
-   less than 2^48, and the site. phi_init sets the first three to 0. */
+/* Select the random numbers of the next steps: a function of seed, ensemble member, number of the step (`step` for the
+   next, below 2^48) and site. phi_init sets the first three to 0. */
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
 
-/* Declare that this lattice is a part of one with planes planes along the first axis, and that the first plane here is
-   number first of it. So sites have the random numbers that they have in the whole lattice. */
+/* Declare that this lattice is a part of a larger one with `planes` planes along the first axis, of which plane 0 here is
+   plane number `first`. Sites then have the random numbers that they have in the larger lattice. */
 phi_status phi_set_planes(phi_solver *s, size_t first, size_t planes);
 
-/* Advance time and random numbers by steps steps of size h. Call it after phi_init to continue a run with the same bits,
-   and before each step of caller-driven stepping. */
+/* Set the number of earlier steps of size h, for time and random numbers: after phi_init, to continue a run with the
+   same bits, and before each caller-driven step. */
 phi_status phi_passed(phi_solver *s, double h, size_t steps);
 
 #if PHI_SERIES || PHI_NOISE
@@ -46,7 +46,7 @@ phi_status phi_passed(phi_solver *s, double h, size_t steps);
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
-/* Make one step, or many, and multiply the tangent vectors v[vector][field][site] by their derivatives, exact to
+/* Make one step, or many, and multiply the tangent vectors v[vector][field][site] by the derivative of these steps, exact to
    round-off. count is the number of vectors, work is memory of phi_tangent_size(s, count) bytes. If a step fails, v is
    unchanged. */
 size_t phi_tangent_size(const phi_solver *s, size_t count);
@@ -57,9 +57,9 @@ phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t c
    NULL, receives the states after stride, 2 * stride, ... steps and at the end. For L = sum of rows_bar * rows,
    x0_bar[field][site] receives the derivatives of L by the initial state, and those by the parameters are added to
    *params_bar, if not NULL; its arrays have a number for each site or bond, or are NULL. Derivatives are exact to
-   round-off. trail is work space of size bytes, at least phi_trail_size(s, 1). With phi_trail_size(s, steps) bytes, each
-   step is computed once. With less, steps are recomputed from stored states, most of them once. On failure all arguments
-   are unchanged. */
+   round-off. trail is work space of `size` bytes, at least phi_trail_size(s, 1). With phi_trail_size(s, steps) bytes, each
+   step is computed once; with less, steps are computed again from stored states, most of them once more. On failure all
+   arguments are unchanged. */
 size_t phi_trail_size(const phi_solver *s, size_t steps);
 phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
     double *x0_bar, phi_params_bar *params_bar, void *trail, size_t size);
@@ -82,25 +82,26 @@ phi_status phi_kick(phi_solver *s, const double *change);
 
 #if PHI_BODIES || PHI_MONITOR
 /* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its arrays means
-   defaults. Returns PHI_BAD_ARGUMENT for parameters that phi_init refuses. If this is because of the state or of masses,
-   the parameters are replaced nevertheless: replace them again before the next step. */
+   defaults. Returns PHI_BAD_ARGUMENT for parameters that phi_init refuses. If it refuses them because of the state or of
+   masses, they are replaced nevertheless; then replace them again before the next step. */
 #else
 /* Between steps: replace the parameters; the state and the time remain. params must not be NULL; NULL in its arrays means
    defaults. Returns PHI_BAD_ARGUMENT for parameters that phi_init refuses, and then changes nothing. */
 #endif
 phi_status phi_set_parameters(phi_solver *s, const phi_params *params);
 
-/* Save and restore a run with the same bits: phi_saved writes far and arrays x[field][site], and returns their number, at
-   most that of fields, with compensated steps three times that. phi_resume takes all three after phi_init with the state. */
+/* Save and restore a run: it continues with the same bits. phi_saved writes far and arrays x[array][site], and returns
+   their number: at most that of fields, or three times that with compensated steps. To restore, call phi_resume with these
+   after phi_init. */
 size_t phi_saved(const phi_solver *s, double *x, size_t *far);
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t fields, size_t far);
 
-/* Steps are equal in tau: h is a step in tau, and K = log(A + e) - log(-B) is 0 along the trajectory, where H = A + B.
-   phi_init and changes of the state set e = -H, and return PHI_BAD_ARGUMENT where -B is not positive. This is the physical
-   time since phi_init, s->t too. */
+/* The physical time since phi_init, also s->t. Steps are equal in a time tau: h is a step in tau of the Hamiltonian K =
+   log(A + e) - log(-B), where H = A + B. K is 0 along the trajectory, since phi_init and changes of the state set e = -H;
+   they return PHI_BAD_ARGUMENT where -B is not positive. */
 double phi_solver_time(const phi_solver *s);
 
-/* Save and restore the level e and the physical time, beside phi_saved and phi_resume; restored after the latter. */
+/* Save and restore the energy level e and the physical time; to restore a run, call phi_resume_clock after phi_resume. */
 void phi_saved_clock(const phi_solver *s, double clock[5]);
 phi_status phi_resume_clock(phi_solver *s, const double clock[5]);
 
@@ -111,10 +112,11 @@ void phi_density(const phi_solver *s, double *out);
 void phi_casimirs(const phi_solver *s, double *out);
 void phi_vector_field(const phi_solver *s, double *out);
 
-/* The observables, in the order of phi_OBSERVABLES. Sums are compensated, with the same bits for any number of threads. */
+/* Compute the observables, in the order of phi_OBSERVABLES. Sums are compensated, and have the same bits for any number of
+   threads. */
 void phi_observables(const phi_solver *s, double *out);
 
-/* The observables with a value at each site, as out[k][site], in the order of phi_OBSERVED_FIELDS. */
+/* Compute the observables with a value at each site, out[k][site], in the order of phi_OBSERVED_FIELDS. */
 void phi_observed_fields(const phi_solver *s, double *out);
 
 #include "lattice_by_hand.h"

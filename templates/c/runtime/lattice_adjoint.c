@@ -12,7 +12,7 @@
 #include "lattice_adjoint_flows.c"
 
 /* ---- Reverse pass of runs ---- */
-/* Add the cotangents of coefficients over all row segments, in their order, and clear them. */
+/* Add the partial sums of the cotangents of coefficients, over all row segments in order, to coef_bar, and clear them. */
 static void phi_add_up(const phi_solver *s, phi_transpose *g, double coef_bar[PHI_SUMS])
 {
     const size_t units = phi_units(s);
@@ -25,7 +25,8 @@ static void phi_add_up(const phi_solver *s, phi_transpose *g, double coef_bar[PH
 
 #include "lattice_adjoint_renewed.c"
 
-/* Add the cotangents of parameters; those of parameters with one value follow from the cotangents of coefficients. */
+/* Add the cotangents of parameters to *params_bar. For parameters with one value, they follow from the cotangents of the
+   coefficients. */
 static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, const double coef_bar[PHI_SUMS],
     phi_params_bar *params_bar)
 {
@@ -41,7 +42,7 @@ static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, cons
         phi_add_numbers(parameter_bars, params_bar);
     }
 #if PHI_SERIES && PHI_GATHER
-    phi_add_numbers(coef_bar + PHI_COEFFICIENTS, params_bar); /* sums over bonds or pairs depend on parameters directly */
+    phi_add_numbers(coef_bar + PHI_COEFFICIENTS, params_bar); /* contributions of sums over bonds or pairs, which depend on parameters directly */
 #endif
 #else
     (void)coef_bar;
@@ -50,7 +51,7 @@ static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, cons
 }
 
 #if PHI_NEAR
-/* Whether the cotangents of parameters are finite: if not, small-argument functions had arguments out of range. */
+/* Whether the cotangents of parameters are finite. If not, arguments were too large for the fast versions of functions. */
 static int phi_parameters_hold(const phi_solver *s, const phi_transpose *g, const double coef_bar[PHI_SUMS])
 {
     int hold = phi_finite(coef_bar, PHI_SUMS);
@@ -63,8 +64,8 @@ static int phi_parameters_hold(const phi_solver *s, const phi_transpose *g, cons
 }
 
 #endif
-/* Number of steps in the next segment, out of the steps left; at least g->longest. Without room for another checkpoint,
-   all but the last g->longest steps. */
+/* Number of steps to make until the next checkpoint, out of the steps left; at least g->longest. Without room for another
+   checkpoint, all but the last g->longest steps are made. */
 static size_t phi_onward(const phi_transpose *g, size_t left)
 {
     const size_t free = g->most - g->count, parts = free > 1 ? free / 2 + 1 : 2;
@@ -76,7 +77,8 @@ static size_t phi_onward(const phi_transpose *g, size_t left)
 #endif
 }
 
-/* Reverse pass of the last segment, from step until back to step done; s holds its final state. */
+/* Pull the cotangents back through the steps from number `done` to number `until`, whose tape has been written; s holds the
+   state after them. */
 static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
     const double *rows_bar, double coef_bar[PHI_SUMS])
 {
@@ -88,7 +90,7 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
 #if PHI_RENEWED
         next = k - 1;
 #else
-        next = row * stride > done + leg * g->leg ? row * stride : done + leg * g->leg; /* at most to the next row or leg */
+        next = row * stride > done + leg * g->leg ? row * stride : done + leg * g->leg; /* back to the last output row or start of a leg */
         next = k - next > most ? k - most : next;
 #endif
         if (g->anew) {
@@ -132,7 +134,7 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
     return status;
 }
 
-/* Reverse pass of a run, segment by segment, from the last. */
+/* Pull the cotangents back through a run, segment by segment, the last one first. */
 static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, size_t stride, double *rows,
     const double *rows_bar, double coef_bar[PHI_SUMS])
 {
@@ -176,7 +178,7 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
     return status;
 }
 
-/* Reverse pass of a run from the present state of s; cotangents of coefficients start from 0. */
+/* Make a run from the present state of s and its reverse pass; the cotangents of coefficients start from 0. */
 static phi_status phi_attempt(phi_solver *s, phi_transpose *g, size_t steps, size_t stride, double *rows,
     const double *rows_bar, double coef_bar[PHI_SUMS], void *trail, size_t size)
 {
@@ -195,7 +197,8 @@ static phi_status phi_attempt(phi_solver *s, phi_transpose *g, size_t steps, siz
 }
 
 #if PHI_NEAR || PHI_RECOMPUTED
-/* Whether the reverse pass must be repeated, with full-range functions or shorter legs; restores the initial state. */
+/* Whether the reverse pass must be repeated: with functions for arguments of any size, or with the state stored after
+   fewer steps. Restores the initial state in this case. */
 static int phi_begins_again(phi_solver *s, phi_transpose *g)
 {
 #if PHI_RECOMPUTED
@@ -230,7 +233,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 #if PHI_RECOMPUTED
     g.leg = PHI_STRETCH;
 #if !PHI_NEAR
-    g.far = 1; /* full-range functions are the only ones */
+    g.far = 1; /* there are no fast versions of functions, for small arguments only */
 #endif
 #endif
     status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar, trail, size);

@@ -27,7 +27,7 @@ static int phi_sweep_of(const phi_solver *s, int flow, int number)
 #endif
 }
 
-/* The part of H that a sweep belongs to, counted from 0. */
+/* The part of H, counted from 0, to which a sweep belongs. */
 static int phi_part_of(const phi_solver *s, int sweep)
 {
 #if PHI_BY_COLOUR
@@ -44,7 +44,8 @@ static int phi_part_of(const phi_solver *s, int sweep)
 #include "lattice_recomputed.c"
 #include "lattice_tape.c"
 
-/* Pull the cotangent of a row, the state after a number of steps, back through the last flow, and add it. */
+/* Add the cotangent of an output row, the state after a number of steps. The cotangent is first pulled back through the
+   last flow, since the state of the reverse pass is that before it. */
 static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, const double *row_bar)
 {
     for (size_t f = 0; f < PHI_DIM; ++f) phi_put(s, g->row_bar[f], row_bar + f * s->sites);
@@ -55,7 +56,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
             phi_flow last;
             size_t count = 0;
             phi_set_flow(s, steps - 1, PHI_FLOWS - 1, &last);
-            phi_sweep_part(s, last.part, last.coef PHI_AND_FAR(g->far)); /* the reverse pass inverts this flow */
+            phi_sweep_part(s, last.part, last.coef PHI_AND_FAR(g->far)); /* applied here, since the reverse pass inverts it */
 #if PHI_TAKES
             phi_hand_nothing(s, g, phi_number_of(steps, 0) + 1);
             phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar, &last, &count, 1);
@@ -84,8 +85,8 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
     }
 }
 
-/* Make the steps from done to until. rows, if not NULL, receives the states after stride, 2 stride, ... steps and at
-   the end. keeping = 1 writes the tape. */
+/* Make the steps from number `done` to number `until` of a run. rows, if not NULL, receives the states after stride, 2
+   stride, ... steps and at the end of the run. keeping = 1 writes the tape. */
 static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
     double *rows, int keeping)
 {
@@ -130,7 +131,7 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
     return status;
 }
 
-/* Set the state after all steps or, on failure, before them. */
+/* Set the solver to the state after all steps or, on failure, to the state before them; returns the status. */
 static phi_status phi_settle(phi_solver *s, phi_transpose *g, size_t steps, phi_status status)
 {
     if (status != PHI_OK || steps == 0) {

@@ -3,8 +3,8 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Add the cotangents of coefficients of one step, after pulling those of time-dependent coefficients back to the
-   others. */
+/* Add the cotangents of the coefficients of one step to coef_bar. The cotangents of time-dependent coefficients are first
+   pulled back to the other coefficients. */
 static void phi_add_up_step(const phi_solver *s, phi_transpose *g, size_t steps, double coef_bar[PHI_SUMS])
 {
     double coef_sums[PHI_SUMS] = { 0.0 }, early[PHI_PREPARED];

@@ -13,7 +13,7 @@
    m = (dr/dy)^T m + (da/dy)^T v, and the cotangent of x before the stage is v + (dr/dx)^T m. The code that solves for y
    also solves for m. */
 
-/* Add the cotangent of a row. */
+/* Add the cotangent of an output row, a state of the run, to the cotangent of the state. */
 static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, const double *row_bar)
 {
     for (size_t f = 0; f < PHI_DIM; ++f) {
@@ -79,8 +79,8 @@ static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, d
     return status;
 }
 
-/* Make the steps from done to until. rows, if not NULL, receives the states after stride, 2 stride, ... steps and at
-   the end, where predictors restart as in phi_integrate. keeping = 1 writes the tape. */
+/* Make the steps from number `done` to number `until` of a run. rows, if not NULL, receives the states after stride, 2
+   stride, ... steps and at the end of the run; predictors restart after each. keeping = 1 writes the tape. */
 static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
     double *rows, int keeping)
 {
@@ -101,7 +101,7 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
     return status;
 }
 
-/* Set the state after all steps or, on failure, before them. */
+/* Set the solver to the state after all steps or, on failure, to the state before them; returns the status. */
 static phi_status phi_settle(phi_solver *s, phi_transpose *g, size_t steps, phi_status status)
 {
     if (status == PHI_OK && steps > 0) {

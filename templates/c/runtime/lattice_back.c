@@ -9,8 +9,8 @@
 /* ---- Reverse pass of sweeps ---- */
 #include "lattice_shares.c"
 
-/* Copy row segments to the tape, with their halo, which another thread may be writing for a single row. Pairs read
-   beyond the last site, but do not use these values. */
+/* Copy segments of rows to the tape, with their halo. The halo of a single row is computed here, since another thread may be
+   writing it. Sums over pairs may read numbers after the last site, which they do not use; these become 0. */
 static void phi_store_units(const phi_solver *s, const double *from, double *to, size_t first, size_t end)
 {
 #if PHI_ONE_ROW
@@ -28,7 +28,8 @@ static void phi_store_units(const phi_solver *s, const double *from, double *to,
 #endif
 }
 
-/* Rows whose terms contribute cotangents to a row; beyond open ends the row of zeros after all others. */
+/* Compute the offsets in memory of the rows whose terms contribute cotangents to a row. Beyond open ends it is the row of
+   zeros that follows all others. */
 static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
 {
     ptrdiff_t place[PHI_AXES];
@@ -63,8 +64,8 @@ static void phi_add_at_bonds(const phi_solver *s, const double *bar, double *to)
 #include "adjoint_sweeps.h"
 #if PHI_SERIES
 
-/* to = from (or 0) + the transpose of a kernel at y = s->y[2] times v, for row segments. Called by all threads
-   together. */
+/* Compute to = from (0 if NULL) + (transpose of the derivative of a kernel at y = s->y[2]) v, for all row segments. Called
+   by all threads together. */
 static void phi_pull_rows(const phi_solver *s, int kernel, const double *coef, double *const *v, double *const *from,
     double *const *to, size_t first, size_t end)
 {

@@ -16,7 +16,7 @@ static void phi_swap(double *a, double *b)
     *b = held;
 }
 
-/* Row of the entry with the largest magnitude. */
+/* Index of the entry with the largest magnitude. */
 static ptrdiff_t phi_largest(const double *entries, ptrdiff_t count)
 {
     ptrdiff_t pivot = 0;
@@ -25,12 +25,12 @@ static ptrdiff_t phi_largest(const double *entries, ptrdiff_t count)
     return pivot;
 }
 
-/* LU factorisation with pivoting of a band matrix (A), or with middle < 0 of a full one (D). Columns are `tall` apart,
-   with at most `below` entries under the diagonal. */
+/* Replace a band matrix, or with middle < 0 a full matrix, by its LU factors, with row exchanges. Columns are `tall` apart,
+   with at most `below` entries under the diagonal. pivots receives the exchanged rows. Returns 0 if singular. */
 static int phi_decompose(double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, double *pivots)
 {
     ptrdiff_t last = 0;
-    for (ptrdiff_t j = 0; j < n; ++j) { /* entry (i, j) is a[j * tall + middle + i - j], or, of D, a[j * tall + i] */
+    for (ptrdiff_t j = 0; j < n; ++j) { /* entry (i, j) is a[j * tall + middle + i - j], or a[j * tall + i] in a full matrix */
         const ptrdiff_t under = n - 1 - j < below ? n - 1 - j : below, step = middle < 0 ? tall : tall - 1;
         double *diagonal = a + j * tall + (middle < 0 ? j : middle);
         const ptrdiff_t p = phi_largest(diagonal, under + 1);
@@ -48,7 +48,7 @@ static int phi_decompose(double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middl
     return 1;
 }
 
-/* Solve with the factors, in place. */
+/* Solve a linear system by the factors of phi_decompose; x is the right-hand side, and becomes the solution. */
 static void phi_substitute(
     const double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, const double *pivots, double *x)
 {
@@ -78,8 +78,8 @@ static void phi_put_entry(const phi_matrix *m, ptrdiff_t i, ptrdiff_t j, double 
         m->d[(j - m->inner) * m->border + i - m->inner] = value;
 }
 
-/* Compute the matrix columns of one field at every PHI_APART-th site, or at a single remaining site, by differences of
-   a sweep. */
+/* Compute columns of the Newton matrix, by one product of the derivative of a sweep with a vector: those of field f at count
+   sites from `first` on, which are so far apart that their columns do not overlap. */
 static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, int now, ptrdiff_t first, ptrdiff_t count, int f)
 {
     const ptrdiff_t sites = s->length, apart = 2 * PHI_REACH + 1;
@@ -106,7 +106,7 @@ static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, in
         }
 }
 
-/* Assemble and factorise the matrix at s->y[now]. Returns 0 if it is singular. */
+/* Compute and factorise the Newton matrix at s->y[now]. Returns 0 if it is singular. */
 static int phi_factorise(phi_solver *s, const double *coef, int now)
 {
     phi_matrix m;
@@ -127,7 +127,7 @@ static int phi_factorise(phi_solver *s, const double *coef, int now)
     return phi_decompose(m.d, border, border, -1, border, m.pivots + inner);
 }
 
-/* Solve with the factorised matrix, in place. */
+/* Solve a linear system with the factorised Newton matrix; m->side becomes the solution. */
 static void phi_solve(const phi_matrix *m)
 {
     const ptrdiff_t inner = m->inner, border = m->border;
@@ -140,7 +140,7 @@ static void phi_solve(const phi_matrix *m)
         for (ptrdiff_t i = 0; i < inner; ++i) m->side[i] -= m->b[j * inner + i] * lower[j];
 }
 
-/* Solve with the transpose of the factors of phi_decompose, in place. */
+/* Solve the transposed linear system by the factors of phi_decompose; x is the right-hand side, and becomes the solution. */
 static void phi_substitute_back(
     const double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, const double *pivots, double *x)
 {
@@ -158,7 +158,8 @@ static void phi_substitute_back(
     }
 }
 
-/* Solve with the transposed matrix: first (A^-1 B)^T, then D, then C^T and A. */
+/* Solve the transposed linear system with the factorised Newton matrix; m->side becomes the solution. The blocks are used
+   in the order A^-1 B, D, C, A. */
 static void phi_solve_back(const phi_matrix *m)
 {
     const ptrdiff_t inner = m->inner, border = m->border;
@@ -171,7 +172,8 @@ static void phi_solve_back(const phi_matrix *m)
     phi_substitute_back(m->a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m->pivots, m->side);
 }
 
-/* Apply the Newton correction: s->y[now] corrected by a sweep, stored in place of the result of the sweep. */
+/* Make a Newton correction of s->y[now]: the change by a sweep, whose result is s->y[1 - now], gives the residual, and the
+   corrected value replaces this result. */
 static void phi_eliminate(phi_solver *s, int now)
 {
     phi_matrix m;

@@ -6,7 +6,7 @@
 #include "sweeps.h"
 
 /* ---- Caller-driven stepping ---- */
-/* Sweeps with a number: those of a step and, without noise, the merged last and first one. */
+/* Number of stages that callers can make: those of a step and, without noise, the last one merged with the first. */
 #if PHI_NOISE
 enum { PHI_NUMBERED = PHI_FLOWS };
 #else

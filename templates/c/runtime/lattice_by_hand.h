@@ -2,12 +2,12 @@
 #define PHI_FILE_LATTICE_BY_HAND_H
 /* Caller-driven stepping, for lattices distributed over several memories. A plane is all sites with the same index of the
    first axis. A step consists of the stages 0 ... phi_stages() - 1; each is a sweep over all planes. Without noise, stage
-   number phi_stages() is the last stage of a step merged with the first of the next, as in phi_integrate. A stage may be
-   made in parts, in any order, with the same bits as phi_step. Before a part is swept, all planes that it reads must have
-   completed the stages before. */
+   number phi_stages() is the last stage of a step merged with the first of the next step, as phi_integrate does. A stage may
+   be made in parts, in any order, with the same bits as phi_step. Before a part is made, all planes that it reads must have
+   completed the earlier stages. */
 typedef struct {
-    size_t behind, ahead;        /* number of planes read before the first swept one, and after the last */
-    unsigned long read, changed; /* fields that are read there, and fields that are changed; bit k is field k */
+    size_t behind, ahead;        /* number of planes that are read before the first updated one, and after the last */
+    unsigned long read, changed; /* fields read there, and fields that are updated: bit k is 1 for field k */
 } phi_stage;
 
 size_t phi_stages(void);

@@ -4,13 +4,14 @@
 #include "model.h"
 #include "rows.c"
 
-/* Clear the compensation terms. */
+/* Set the compensation terms of the fields x to 0. */
 static void phi_clear_carry(phi_solver *s)
 {
     for (size_t k = 0; k < PHI_DIM; ++k) memset(PHI_MEMORY_OF(s->carry[k]), 0, PHI_DOUBLES * sizeof *s->carry[k]);
 }
 
-/* Copy the compensation terms with the fields: those of x are first, those of s->before after them. */
+/* Copy the compensation terms with the fields, from s->before to s->x or back. Of s->carry, the first half belongs to s->x,
+   the second half to s->before. */
 static void phi_copy_carry(const phi_solver *s, double *const *to)
 {
     const size_t block = PHI_DOUBLES * sizeof **to, into = to == s->before ? PHI_DIM : 0;

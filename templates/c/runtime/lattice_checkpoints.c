@@ -11,10 +11,11 @@
 
 /* ---- Checkpoints and tape ---- */
 #if !PHI_SERIES
-/* Number of flows in a step whose last flow is merged with the first of the next step. */
+/* Number of flows of a step in a run, where the last flow of a step is merged with the first of the next step. */
 #define PHI_OWN_FLOWS (PHI_FLOWS > 1 ? PHI_FLOWS - 1 : 1)
 
-/* Number of a flow, with PHI_FLOWS for the merged last and first one. */
+/* Number of the row of coefficients for a flow of a step: PHI_FLOWS if it is the first flow, merged with the last flow of
+   the step before (continues = 1). */
 static int phi_joined(int flow, int continues) { return PHI_FLOWS > 1 && flow == 0 && continues ? PHI_FLOWS : flow; }
 
 #endif
@@ -24,10 +25,10 @@ typedef struct phi_transpose {
 } phi_transpose;
 
 #if PHI_SERIES
-/* Doubles on the tape for one step. */
+/* Number of doubles on the tape for one step. */
 static size_t phi_step_tape_size(const phi_solver *s) { return PHI_ALL_STAGES((size_t)PHI_STORED_STATES) * PHI_DIM * phi_block(s->rows, s->width); }
 
-/* Set the number of steps and the time. */
+/* Set the number of steps made, and the time that belongs to it. */
 static void phi_stand(phi_solver *s, size_t steps)
 {
     s->steps = steps;
@@ -39,11 +40,11 @@ static void phi_stand(phi_solver *s, size_t steps)
 
 #endif
 #if PHI_BOND_PARAMETERS
-/* Doubles for values at all bonds. */
+/* Number of doubles in an array over the ends of all bonds, padded to a multiple of 8. */
 static size_t phi_at_bonds(const phi_solver *s) { return ((size_t)s->bonds[s->sites] + 7) / 8 * 8; }
 
 #endif
-/* Doubles that every reverse pass needs. */
+/* Number of doubles that a reverse pass needs besides tape and checkpoints. */
 static size_t phi_always(const phi_solver *s)
 {
     const size_t block = phi_block(s->rows, s->width), units = phi_units(s);
@@ -54,7 +55,7 @@ static size_t phi_always(const phi_solver *s)
     return numbers + units * PHI_SUMS;
 }
 
-/* Bytes of a checkpoint: the state at the start of a segment. */
+/* Number of bytes of a checkpoint, which holds the state at the start of a segment. */
 static size_t phi_state_size(const phi_solver *s)
 {
     return PHI_DIM * phi_block(s->rows, s->width) * sizeof(double) + 2 * sizeof(size_t);
@@ -64,21 +65,22 @@ static size_t phi_state_size(const phi_solver *s)
 #include "lattice_tape_stored.c"
 
 #if !PHI_SERIES
-enum { PHI_BESIDE_CORE = 1 << 19 }; /* bytes of cache for the tape, beside the state */
+enum { PHI_BESIDE_CORE = 1 << 19 }; /* bytes of cache that the tape of a segment may fill */
 
 #endif
-/* Whether the checkpoints of all segments fit beside the tape of one segment. */
+/* Whether `room` bytes hold the tape of a segment of `longest` steps and the checkpoints of all segments. */
 static int phi_fits(size_t room, size_t longest, size_t of_step, size_t of_state, size_t steps)
 {
     return (room - longest * of_step) / of_state > steps / longest;
 }
 
 #if PHI_SERIES
-/* Divide the memory between the tape of one segment and checkpoints. Segments are as long as checkpoints of all segments
-   allow, so that each step is made at most twice; if these never fit, each gets one half. */
+/* Divide the memory between the tape of one segment and checkpoints. Segments are as long as possible with checkpoints of
+   all segments, so that each step is made at most twice. If these never fit, tape and checkpoints get one half each. */
 #else
-/* Divide the memory between the tape of one segment and checkpoints. Segments fill the cache, or are longer if only then
-   checkpoints of all segments fit, so that each step is made at most twice; if these never fit, each gets one half. */
+/* Divide the memory between the tape of one segment and checkpoints. The tape of a segment fills the cache, or is longer if
+   only then checkpoints of all segments fit; each step is then made at most twice. If these never fit, tape and checkpoints
+   get one half each. */
 #endif
 static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t steps, void *memory, size_t size)
 {
@@ -88,7 +90,7 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
     memset(next, 0, phi_always(s) * sizeof *next);
     g->block = block;
 #if PHI_RECOMPUTED
-    const size_t of_step = phi_leg_size(s); /* sizes are counted in legs */
+    const size_t of_step = phi_leg_size(s); /* here steps are counted in legs: groups of steps with one state on the tape */
     steps = phi_legs(steps, g->leg);
 #else
     g->of_step = phi_step_tape_size(s);
@@ -127,7 +129,8 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
 
 enum { PHI_UNASKED = 1 << 22 }; /* site updates between calls of s->stop */
 
-/* Whether to stop: asks s->stop, but only after PHI_UNASKED site updates since the last call. */
+/* Whether the caller wants to stop: calls s->stop, but only after PHI_UNASKED site updates since the last call. steps is the
+   number of steps made since this function was called last. */
 static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
 {
     g->unasked += steps * s->sites;
@@ -136,13 +139,13 @@ static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
     return s->stop();
 }
 
-/* Fields of a checkpoint. */
+/* Set fields to the arrays of checkpoint `number`. */
 static void phi_fields_of_state(const phi_transpose *g, size_t number, double *fields[PHI_DIM])
 {
     for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->states + (number * PHI_DIM + f) * g->block);
 }
 
-/* Store a checkpoint after a number of steps. */
+/* Store the present state as a checkpoint; done is its number of steps since the start of the run. */
 static void phi_mark(const phi_solver *s, phi_transpose *g, size_t done)
 {
     double *fields[PHI_DIM];
@@ -155,7 +158,7 @@ static void phi_mark(const phi_solver *s, phi_transpose *g, size_t done)
     ++g->count;
 }
 
-/* Restore the last checkpoint; returns the number of its step. */
+/* Set the solver to the last checkpoint; returns its number of steps since the start of the run. */
 static size_t phi_return(phi_solver *s, const phi_transpose *g)
 {
     double *fields[PHI_DIM];

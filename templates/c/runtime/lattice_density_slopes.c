@@ -7,7 +7,7 @@
 
 static double phi_sum_of_densities(const phi_solver *s);
 
-/* The derivative of a part of H along a tangent vector. */
+/* The derivative of a part of H along a tangent vector v; called by all threads together. */
 static double phi_part_slope(const phi_solver *s, int part, double *const *v)
 {
     size_t first, end = phi_share(phi_units(s), &first);

@@ -3,12 +3,12 @@
 #include "lattice.h"
 #include "model.h"
 
-/* A part of H, and the coefficients of its flow. */
+/* A flow to apply: the part of H, and the coefficients of its flow. */
 typedef struct {
 #include "state_of_flow.h"
 } phi_flow;
 
-/* Set *flow to flow `number` of a step; number PHI_FLOWS is the last merged with the first. */
+/* Set *flow to flow `number` of the step that follows `steps` steps; PHI_FLOWS is the last flow merged with the first. */
 static void phi_set_flow(const phi_solver *s, size_t steps, int number, phi_flow *flow)
 {
     flow->part = phi_flow_parts[number];

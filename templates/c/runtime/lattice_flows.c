@@ -8,21 +8,21 @@
 /* ---- The flows ---- */
 enum { PHI_STRETCH = 32 }; /* steps between checks for finite values */
 #if PHI_NEAR
-enum { PHI_FAR_STEPS = 64 }; /* steps with full-range functions, after one that needed them */
+enum { PHI_FAR_STEPS = 64 }; /* number of steps with functions for arguments of any size, after a step that needed them */
 #endif
 
 #if PHI_SHARED
 #if PHI_BY_COLOUR
-/* Apply the flow of one part of H, one colour. */
+/* Apply one flow, of a part of H or of its terms at sites of one colour; called by all threads together. */
 static void phi_sweep_colour(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
 #else
-/* Apply the flow of one part of H. */
+/* Apply the flow of one part of H; called by all threads together. */
 static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
 #endif
 {
     size_t first, end = phi_share(phi_units(s), &first);
 #if PHI_TANGENT && !PHI_MONITOR
-    for (size_t k = 0; k < s->vectors; ++k) { /* a flow reads its own fields at the same site only: threads need not wait */
+    for (size_t k = 0; k < s->vectors; ++k) { /* threads need not wait: the fields that a flow changes are read at the same site only */
         double *v[PHI_DIM];
         phi_vector(s, k, v);
         if (part == PHI_REMAINDER) phi_gather_varied_pulls(s, coef, v, first, end);
@@ -36,7 +36,7 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI
 
 #endif
 #if PHI_BY_COLOUR
-/* Apply the flow kind: 0 first, 1 all inner ones, 2 last, 3 inner ones in reverse order. */
+/* Apply flows of a step: kind 0 the first, 1 all inner ones, 2 the last, 3 all inner ones in reverse. */
 static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI_AND_INT_FAR)
 {
 #if PHI_TIMED
@@ -61,7 +61,7 @@ static void phi_reverse_flow(const phi_solver *s, const phi_flow *flow, size_t f
 #include "lattice_waves.c"
 
 #if PHI_NOISE && PHI_SHARED
-/* Draw the increments of a part of a step, at all sites. */
+/* Draw the increments of the noise in a part of a step, at all sites; called by all threads together. */
 static void phi_draw(const phi_solver *s, size_t steps, int part)
 {
     size_t first, end = phi_share(phi_units(s), &first);
@@ -71,12 +71,12 @@ static void phi_draw(const phi_solver *s, size_t steps, int part)
 
 #endif
 #if PHI_NOISE
-/* Make some steps: flows of the noise, those of H, and those of the noise in reverse order. */
+/* Make some steps, each by flows of the noise, of H, and again of the noise in reverse order. */
 #elif PHI_CORRECTED
-/* Make some steps; if they are the first of a run, after the flows of the corrector. 0 steps: make the flows of the
-   corrector at the end of a run. */
+/* Make some steps. Before the first steps of a run, apply the flows of the corrector; for 0 steps, apply only the flows of
+   the corrector at the end of a run. */
 #else
-/* Make some steps with merged last and first flows, without the last flow. 0 steps: the last flow alone. */
+/* Make some steps but for the last flow, which the next step merges; 0 steps: make the last flow alone. */
 #endif
 #if PHI_SHARED
 static void phi_shared_steps(const phi_solver *s, size_t steps)
@@ -126,7 +126,7 @@ static size_t phi_step_tape_size(const phi_solver *s);
 static void phi_make_steps_with_tape(const phi_solver *s, size_t steps);
 
 #endif
-/* Make some steps from the state in s->before, or restore it and return 0 if values are not finite. */
+/* Make some steps from the state in s->before. If values are not finite, restore this state and return 0. */
 static int phi_try(phi_solver *s, size_t steps)
 {
 #if PHI_ADJOINT && !PHI_RECOMPUTED
@@ -140,7 +140,7 @@ static int phi_try(phi_solver *s, size_t steps)
     return 0;
 }
 
-/* Apply the last flow of a step, with full-range functions if needed; returns whether values are finite. */
+/* Apply the last flow of a step, if needed with functions for arguments of any size; returns whether values are finite. */
 static int phi_close(phi_solver *s)
 {
     if (phi_try(s, 0)) return 1;
@@ -151,8 +151,8 @@ static int phi_close(phi_solver *s)
     return done;
 }
 
-/* Make steps from s->before, equal to s->x, without the last flow of the last step. Values are checked after several
-   steps; if they are not finite, these steps are repeated one by one. */
+/* Make steps from the state s->before, which equals s->x, except for the last flow of the last step. Values are checked
+   after several steps; if they are not finite, these steps are repeated one by one. */
 static phi_status phi_march(phi_solver *s, size_t steps)
 {
     const size_t end = s->steps + steps;
@@ -164,7 +164,7 @@ static phi_status phi_march(phi_solver *s, size_t steps)
         if (!phi_try(s, now)) {
 #if PHI_NEAR
             if (now == 1 && s->far > 0) return PHI_NOT_FINITE;
-            if (now == 1) s->far = PHI_FAR_STEPS; /* small-argument functions return NaN out of range */
+            if (now == 1) s->far = PHI_FAR_STEPS; /* the fast functions give NaN if an argument is too large */
             stretch = now > 1 ? 1 : PHI_STRETCH;
 #else
             if (now == 1) return PHI_NOT_FINITE;
@@ -196,11 +196,11 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #else
     if (!s->open) phi_to_relative(s, s->x);
     if (!s->open) phi_clear_other_carry(s);
-    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* an open flow is merged with the next */
+    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s); /* if the last flow is still to be merged with the next, the state is s->before */
 #endif
     status = phi_march(s, steps);
 #if !PHI_NOISE
-    if (s->open && !PHI_TRY_FLOWS) { /* the last flow of the last step; s->before stays before it */
+    if (s->open && !PHI_TRY_FLOWS) { /* makes the last flow; s->before remains before it */
         status = PHI_NOT_FINITE;
         s->open = 0;
         --s->steps;

@@ -1,6 +1,6 @@
 #ifndef PHI_FILE_LATTICE_GRID_H
 #define PHI_FILE_LATTICE_GRID_H
-/* Bytes that phi_init needs for these sizes; 0 if they are not admissible. */
+/* Number of bytes that phi_init needs for these sizes; 0 if they are not admissible. */
 size_t phi_work_size(const size_t sizes[PHI_AXES]);
 
 #if PHI_DEFAULTS
@@ -14,7 +14,7 @@ size_t phi_work_size(const size_t sizes[PHI_AXES]);
    one that must be positive is not. */
 #endif
 #if PHI_BODIES
-/* It also returns PHI_BAD_ARGUMENT if a mass is negative, that of the first body is 0, or the sum of all is not finite. */
+/* phi_init also returns PHI_BAD_ARGUMENT if a mass is negative, if the first one is 0, or if their sum is not finite. */
 #endif
 phi_status phi_init(phi_solver *s, const phi_params *params, PHI_SIZES, const double *x0, void *work);
 #endif

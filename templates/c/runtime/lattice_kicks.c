@@ -6,7 +6,7 @@
 
 #include "lattice_level_of_state.c"
 
-/* Set the state to x + factor * state. */
+/* Set the state to x + factor * (present state), if all values are finite. */
 static phi_status phi_move(phi_solver *s, const double *x, double factor)
 {
     if (s == NULL || x == NULL) return PHI_BAD_ARGUMENT;

@@ -10,8 +10,8 @@
 /* ---- Krylov spaces ---- */
 #include "lattice_newton_policy.h"
 
-/* Scalar product of x and y, in units of the usual size of each field. Row segments are added in order: the bits do not
-   depend on threads. */
+/* Scalar product of x and y, each field divided by its usual size. Sums of row segments are added in order, so that the bits
+   do not depend on the number of threads. */
 static double phi_product(const phi_solver *s, double *const *x, double *const *y)
 {
     const size_t units = phi_units(s);
@@ -35,7 +35,7 @@ static double phi_product(const phi_solver *s, double *const *x, double *const *
     return sum;
 }
 
-/* to = a x + b y, with the halo. */
+/* Compute to = a x + b y at all sites, and the halo of `to`. */
 static void phi_combine(const phi_solver *s, double *const *to, double a, double *const *x, double b, double *const *y)
 {
     const size_t units = phi_units(s);
@@ -57,9 +57,9 @@ static void phi_combine(const phi_solver *s, double *const *to, double a, double
 
 #include "lattice_site_blocks.c"
 
-/* to = from - v, where matrix(v) = s->space[0] is solved by GMRES (Y. Saad and M. H. Schultz) with PHI_DIRECTIONS
-   directions, without restart. The matrix is that of phi_multiply. Returns the norm of s->space[0], or infinity if the
-   solution is useless. */
+/* Compute to = from - v, where v solves A v = s->space[0] with the matrix A of phi_multiply, by GMRES (Y. Saad and
+   M. H. Schultz) with PHI_DIRECTIONS directions, without restart. Returns the norm of s->space[0], or infinity if the
+   residual is too large for v to be useful. */
 static double phi_krylov(phi_solver *s, const double *coef, int now, double *const *from, double *const *to)
 {
     double matrix[PHI_DIRECTIONS][PHI_DIRECTIONS], cosine[PHI_DIRECTIONS], sine[PHI_DIRECTIONS], side[PHI_DIRECTIONS + 1];

@@ -4,9 +4,10 @@
 #include "model.h"
 
 #if PHI_ADJOINT
-/* to = v - J v, where J is the derivative of a sweep by y at s->y[now]; its transpose in a reverse pass (s->side). */
+/* Compute to = v - J v, where J is the derivative of a sweep by y at s->y[now]; in a reverse pass, when s->side is not NULL,
+   to = v - J^T v. */
 #else
-/* to = v - J v, where J is the derivative of a sweep by y at s->y[now]. */
+/* Compute to = v - J v, where J is the derivative of a sweep by y at s->y[now]. */
 #endif
 static void phi_multiply(const phi_solver *s, const double *coef, int now, double *const *v, double *const *to)
 {

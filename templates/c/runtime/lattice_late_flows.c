@@ -4,7 +4,7 @@
 #include "model.h"
 #include "lattice_monitor.c"
 
-/* Multiply tangent vectors by the derivative of a flow over a time that depends on the state: time = tau / rate. */
+/* Multiply the tangent vectors by the derivative of a flow over the time tau / rate, which depends on the state by rate. */
 static void phi_carry_vectors(const phi_solver *s, int part, double time, double rate)
 {
     size_t first, end = phi_share(phi_units(s), &first);

@@ -3,19 +3,19 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Unknowns are numbered site by site. The matrix 1 - (derivative of a sweep) is banded, except for entries that couple
-   the two ends of a ring. So the last sites form a border; small lattices are all border. Of the blocks (A B; C D), A
-   is a band factorised with pivoting, B becomes A^-1 B, and D becomes D - C A^-1 B, factorised too. */
+/* The Newton matrix 1 - (derivative of a sweep by y), with unknowns numbered site by site. It is banded, except for entries
+   that couple the two ends of a ring. So the last sites form a border, which gives blocks (A B; C D); small lattices are
+   all border. A is banded and stored as its LU factors, B as A^-1 B, and D as the factors of D - C A^-1 B. */
 enum { PHI_FEW = 6 * PHI_REACH + 6, PHI_TALL = 3 * PHI_BAND + 1 };
 
 typedef struct {
-    ptrdiff_t inner, border; /* numbers of unknowns */
-    double *a, *b, *c, *d;   /* by columns; a is banded: entry (i, j) is in row 2 PHI_BAND + i - j */
-    double *side;            /* right-hand side: inner unknowns, then border */
-    double *pivots;          /* swapped rows of A, then of D */
+    ptrdiff_t inner, border; /* numbers of unknowns, which are the numbers of rows of A and of D */
+    double *a, *b, *c, *d;   /* the blocks by columns; entry (i, j) of A is in row 2 PHI_BAND + i - j of a */
+    double *side;            /* right-hand side, then solution: inner unknowns, then those of the border */
+    double *pivots;          /* exchanged rows of A, then of D */
 } phi_matrix;
 
-/* Set the pointers of *m into memory, if not NULL; returns the number of doubles. */
+/* Set the sizes of *m and, unless memory is NULL, its pointers; returns the number of doubles in memory. */
 static size_t phi_matrix_of(size_t sites, double *memory, phi_matrix *m)
 {
     const size_t few = sites <= PHI_FEW ? sites : phi_open[0] ? 0 : PHI_REACH;

@@ -9,11 +9,11 @@
 #include "sweeps.h"
 #include "lattice_share.c"
 
-/* ---- Steps equal in tau: those of K = log(A + e) - log(-B), where H = A + B ---- */
+/* ---- Steps equal in a time tau: steps of K = log(A + e) - log(-B), where H = A + B and e = -H(x0) ---- */
 #include "lattice_density.c"
 #include "lattice_density_slopes.c"
 
-/* The sum of densities at the sites in s->densities, compensated after A. Neumaier, once all threads have filled theirs. */
+/* Sum of s->densities over all sites, compensated after A. Neumaier. It waits until all threads have filled their parts. */
 static double phi_sum_of_densities(const phi_solver *s)
 {
     double sum = 0.0, rest = 0.0;
@@ -27,7 +27,7 @@ static double phi_sum_of_densities(const phi_solver *s)
     return sum + rest;
 }
 
-/* The value of a part of H, the same for all threads. */
+/* The value of a part of H at x, with the same bits in all threads; called by all threads together. */
 static double phi_part_energy(const phi_solver *s, int part)
 {
     size_t first, end = phi_share(phi_units(s), &first);
@@ -38,14 +38,15 @@ static double phi_part_energy(const phi_solver *s, int part)
     return phi_sum_of_densities(s);
 }
 
-/* A + e or -B: the flow of a part of K for a time is that of the part of H for the time divided by this. */
+/* A + e for the part log(A + e) of K, or -B for the part -log(-B). The flow of the part of K over a time equals the flow of
+   A or B over that time divided by this value. */
 static double phi_rate(const phi_solver *s, int part)
 {
     const double energy = phi_part_energy(s, part);
     return part == PHI_NEGATIVE ? -energy : energy + s->level;
 }
 
-/* Set e = -H at the state. Returns 0 if H is not finite, or -B not positive, so that time would not increase. */
+/* Set e = -H at the present state. Returns 0 if H is not finite, or if -B is not positive, where time would not increase. */
 static int phi_take_level(phi_solver *s)
 {
     const double negative = phi_part_energy(s, PHI_NEGATIVE), energy = phi_part_energy(s, 3 - PHI_NEGATIVE) + negative;
@@ -53,7 +54,7 @@ static int phi_take_level(phi_solver *s)
     return isfinite(energy) && negative < 0.0;
 }
 
-/* Add the time of a flow to the physical time of x, clock[0], with the compensation term clock[1]. */
+/* Add the time of a flow to the physical time of the state: s->clock[0], with the compensation term s->clock[1]. */
 static void phi_pass(const phi_solver *s, double time)
 {
     const double before = s->clock[0], sum = before + time, added = sum - before;
@@ -61,7 +62,8 @@ static void phi_pass(const phi_solver *s, double time)
     s->clock[0] = sum;
 }
 
-/* Copy the physical time with the fields: clock[0] and clock[1] are those of x, the next two those of s->before. */
+/* Copy the physical time and its compensation term with the fields, from s->before to s->x or back: the first two numbers of
+   s->clock belong to s->x, the next two to s->before. */
 static void phi_copy_clock(const phi_solver *s, double *const *to)
 {
     const size_t into = to == s->before ? 2 : 0;

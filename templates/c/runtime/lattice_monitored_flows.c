@@ -5,8 +5,8 @@
 #include "lattice_monitor.c"
 #include "lattice_late_flows.c"
 
-/* Apply flow `number` of a step, that of a part of K; number PHI_FLOWS is the last merged with the first. If its time is
-   not positive, the state becomes NaN. */
+/* Apply flow `number` of a step, the flow of a part of K; PHI_FLOWS is the last flow merged with the first. If the physical
+   time would not increase, the state becomes NaN. */
 static void phi_apply_flow(const phi_solver *s, size_t steps, int number)
 {
     double coef[PHI_ROW];

@@ -14,7 +14,7 @@
 #include "lattice_newton_policy.h"
 #include "lattice_sweep_policy.h"
 
-/* Sum of the distances of y from x, plus added times the sum of the sizes of x. */
+/* The sum of |y - x| + added |x| over all fields and sites, for y = s->y[side]. */
 static double phi_distance(const phi_solver *s, int side, double added)
 {
     double sum = 0.0;
@@ -27,11 +27,12 @@ static double phi_distance(const phi_solver *s, int side, double added)
 }
 
 #if PHI_BANDED
-/* Correct s->y[now] by a Newton step into the other array; the factors of the matrix are reused while steps contract. */
+/* Make a Newton correction of s->y[now]; s->y[1 - now] receives the result. Factors of the matrix are reused as long as the
+   corrections shrink. */
 #else
-/* Correct s->y[now] by a Newton step into the other array, with the linear equations solved in a Krylov space. */
+/* Make a Newton correction of s->y[now], by a linear equation solved in a Krylov space; s->y[1 - now] receives the result. */
 #endif
-/* Returns the change relative to the size of each field; not finite on failure. */
+/* Returns the largest change of a field relative to its size; not finite on failure. */
 static double phi_corrected(phi_solver *s, const double *coef, int now)
 {
 #if PHI_BANDED
@@ -50,7 +51,7 @@ static double phi_corrected(phi_solver *s, const double *coef, int now)
     return phi_relaxed(s, NULL PHI_AND_FAR(1), now);
 }
 
-/* Largest distance from x at which a solution is accepted as part of the motion. */
+/* Largest accepted distance of a solution from x: farther away, solutions are unrelated to the motion. */
 static double phi_range(phi_solver *s, const double *coef)
 {
     phi_copy(s->y[0], s->x, s);
@@ -59,8 +60,8 @@ static double phi_range(phi_solver *s, const double *coef)
 }
 
 
-/* Solve for y of a stage from the prediction in s->y[0], to rounding level: by fixed-point sweeps or, if s->stiff, by
-   Newton corrections, which must end within range of x. The solution is s->y[*now]. */
+/* Solve the equation of a stage for y to rounding level, from the prediction in s->y[0]: by fixed-point sweeps or, if
+   s->stiff, by Newton corrections, whose result must not be farther than range from x. The solution is s->y[*now]. */
 static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FAR, double range, int *now)
 {
     double before = 0.0;
@@ -71,7 +72,7 @@ static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FAR, 
         ++s->sweeps;
         *now = 1 - *now;
         if (!isfinite(change)) return failed;
-        /* expected change by further sweeps, at the rate change / before; or rounding level */
+        /* stop if further sweeps, at the rate change / before, would change too little, or at rounding level */
         if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && count > 0))
             return (s->stiff ? phi_distance(s, *now, 0.0) <= range : phi_all_hold(s, s->y[*now])) ? PHI_OK : failed;
         if (!s->stiff && count >= PHI_PATIENCE && change > PHI_SLOW * before && change > PHI_NEARLY_SETTLED) break;

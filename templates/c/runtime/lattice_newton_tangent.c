@@ -5,8 +5,9 @@
 
 #include "lattice_tangent_policy.h"
 
-/* Multiply a tangent vector by the derivative of a stage with solution s->y[now]: solve dy = (derivative of a sweep) dy +
-   side, and add the increment that dy gives. */
+/* Multiply tangent vector `number` by the derivative of a stage with solution y = s->y[now]. The change dy of y solves dy =
+   S dy + side, where S is the derivative of a sweep by y and side its derivative along the vector; then the change of the
+   increment due to dy is added to the vector. */
 static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t number)
 {
     const size_t units = phi_units(s);

@@ -9,7 +9,7 @@
 
 /* ---- Noise ---- */
 #if PHI_BY_HAND || !PHI_ONE_ROW
-/* Number of a site in the whole lattice, of which this solver may hold some planes. */
+/* Number of site i of a row in the whole lattice, of which this solver may hold some planes only. */
 static uint64_t phi_site(const phi_solver *s, size_t row, ptrdiff_t i)
 {
 #if PHI_BY_HAND && PHI_ONE_ROW
@@ -25,8 +25,8 @@ static uint64_t phi_site(const phi_solver *s, size_t row, ptrdiff_t i)
 }
 
 #endif
-/* Draw the increments of a part of a step: a function of seed, member, step, part and site only. A step of -h has them
-   in reverse order, so that it inverts a step of h. */
+/* Draw the increments of the noise in a part of a step: a function of seed, member, step, part and site only. A step of -h
+   has them in reverse order, so that it inverts a step of h. */
 #if PHI_SHARED || PHI_SERIES
 static void phi_draw_pieces(const phi_solver *s, size_t steps, int part, size_t first, size_t end)
 #else

@@ -4,8 +4,8 @@
 #include "model.h"
 #include "rows.c"
 
-/* Reduce the densities of one observable: add them, compensated after A. Neumaier, or take the largest or the
-   smallest. */
+/* Combine count densities of one observable with *sum: add them, with the compensation term *rest after A. Neumaier, or take
+   the largest or the smallest (kinds 0 to 3: mean, sum, largest, smallest). */
 static void phi_reduce(int kind, size_t count, const double *density, double *sum, double *rest)
 {
     for (size_t i = 0; i < count; ++i) {
@@ -14,7 +14,7 @@ static void phi_reduce(int kind, size_t count, const double *density, double *su
             *rest += fabs(*sum) >= fabs(next) ? (*sum - total) + next : (next - total) + *sum;
             *sum = total;
         } else if (next != next || (kind == 2 ? next > *sum : next < *sum)) {
-            *sum = next; /* NaN stays: no comparison with it is true */
+            *sum = next; /* NaN remains, since no comparison with it is true */
         }
     }
 }

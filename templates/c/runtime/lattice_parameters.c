@@ -13,7 +13,7 @@ phi_status phi_set_parameters(phi_solver *s, const phi_params *params)
     s->params = *params;
     phi_put_parameters(s, params);
     phi_put_at_bonds(s, params);
-    s->prepared = 0; /* so that the next step starts as with a new step size */
+    s->prepared = 0; /* so that the next step computes all coefficients */
     PHI_NOT_OPEN(s)
     PHI_NOT_FAR(s)
     phi_clear_carry(s);

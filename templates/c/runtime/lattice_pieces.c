@@ -1,6 +1,6 @@
 #ifndef PHI_FILE_LATTICE_PIECES
 #define PHI_FILE_LATTICE_PIECES
-/* Before a loop over row segments: threads share its iterations. */
+/* Stands before loops over row segments: threads share the iterations. */
 #ifdef _OPENMP
 #if PHI_PAIRS
 #define PHI_EACH_PIECE _Pragma("omp parallel for if (s->sites > 512)")

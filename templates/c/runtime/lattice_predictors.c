@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Predict: s->y[0] = x + extrapolated y - x, with the halo. */
+/* Predict the solution of a stage: s->y[0] = x + (extrapolation of past y - x), with the halo. */
 static void phi_predict(const phi_solver *s, double *const *x PHI_AND_INT_STAGE)
 {
     PHI_EACH_PIECE
@@ -53,7 +53,7 @@ static void phi_remember(phi_solver *s, double *const *from PHI_AND_INT_STAGE, i
     if (predictor->count < PHI_DIFFERENCES) ++predictor->count;
 }
 
-/* Clear the predictors, and return to fixed-point sweeps. */
+/* Clear the predictors; the next stage is solved by fixed-point sweeps, without a prediction. */
 static void phi_forget(phi_solver *s)
 {
     s->stiff = 0;

@@ -31,7 +31,7 @@ static void phi_reverse_flow(const phi_solver *s, const phi_flow *flow, size_t f
 #endif
 }
 
-/* Reverse pass of some flows, the last first; called by all threads together. */
+/* Pull cotangents back through some flows, in the order of the array; called by all threads together. */
 static void phi_reverse_flows(const phi_solver *s, const phi_flow *flows, size_t count)
 {
 #if PHI_WAVES
@@ -48,11 +48,11 @@ static void phi_reverse_flows(const phi_solver *s, const phi_flow *flows, size_t
 }
 
 #if !PHI_WAVES
-enum { PHI_DEEPEST = 1 }; /* flows in a wavefront block */
+enum { PHI_DEEPEST = 1 }; /* number of flows that are processed together */
 #endif
 
-/* Queue the reverse pass of a flow, by its number in a step, for the cotangents bar; the queue is processed when it
-   holds depth flows. */
+/* Append the reverse pass of flow `number` of a step, for the cotangents bar, to the queue of *count flows. The queue is
+   processed when it holds `depth` flows. */
 static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t step, int number, double *const *bar,
     phi_flow *flows, size_t *count, size_t depth)
 {
@@ -86,7 +86,8 @@ static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t st
 #endif
 }
 
-/* Reverse pass of some steps after step `before`, with merged flows; s->x becomes the fields before them. */
+/* Pull cotangents back through `steps` steps that follow step number `before`, with merged flows. The inverse flows
+   recompute the states on the way: s->x becomes the state before these steps. */
 static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t before, size_t steps)
 {
 #if PHI_WAVES
@@ -110,14 +111,14 @@ static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t b
 #endif
 }
 
-/* Fields at the start of a leg. */
+/* Set fields to the arrays on the tape for the state at the start of a leg. */
 static void phi_fields_of_leg(const phi_transpose *g, size_t leg, double *fields[PHI_DIM])
 {
     for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->tape + (leg * PHI_DIM + f) * g->block);
 }
 
-/* As phi_steps_back for the first step of a leg, with the state before each flow recomputed from the start of the
-   step. */
+/* Pull cotangents back through the step that is leg number `leg`. The state before each flow is recomputed from the start of
+   the step, where inverse flows would lose too many digits. */
 static void phi_step_back_anew(phi_solver *s, const phi_transpose *g, size_t before, size_t leg)
 {
     double *began[PHI_DIM];
@@ -143,7 +144,7 @@ static void phi_step_back_anew(phi_solver *s, const phi_transpose *g, size_t bef
     }
 }
 
-/* Largest magnitude in a field, in an order that lets loops vectorise. */
+/* Largest magnitude in a field. Eight partial results let the loops vectorise. */
 static double phi_largest_of(const phi_solver *s, const double *field)
 {
     double lanes[8] = { 0.0 };
@@ -158,7 +159,7 @@ static double phi_largest_of(const phi_solver *s, const double *field)
     return lanes[0];
 }
 
-/* Whether two fields differ by at most `most`. */
+/* Whether two fields differ by no more than `most` at each site. */
 static int phi_differ_by(const phi_solver *s, const double *one, const double *other, double most)
 {
     int near = 1;
@@ -169,8 +170,8 @@ static int phi_differ_by(const phi_solver *s, const double *one, const double *o
     return near;
 }
 
-/* Restore the state at the start of a leg, after all its steps have been recomputed; fails if the recomputed state
-   differs too much. */
+/* Set the state to that stored at the start of a leg, after all its steps have been recomputed; fails if the recomputed state
+   differs too much from it. */
 static phi_status phi_leave_leg(const phi_solver *s, phi_transpose *g, size_t leg)
 {
     double *began[PHI_DIM], largest = 0.0;

@@ -3,13 +3,13 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Number of a flow among all flows of a run; a merged flow counts for the later step. */
+/* Number of a flow among all flows of a run; a merged flow belongs to the later step. */
 static size_t phi_number_of(size_t step, int number) { return step * PHI_OWN_FLOWS + (size_t)(number % PHI_FLOWS); }
 
-/* Arrays for contributions of a flow to other sites: two sets, used alternately. */
+/* Arrays for the contributions of a flow to cotangents of other sites. There are two sets, which flows use alternately. */
 static double *const *phi_handed_by(const phi_transpose *g, size_t flow) { return g->handed + flow % 2 * (PHI_HANDED / 2); }
 
-/* Clear the contributions of a flow to other sites, before a reverse pass. */
+/* Set the contributions of a flow to cotangents of other sites to 0, before a reverse pass. */
 static void phi_hand_nothing(const phi_solver *s, const phi_transpose *g, size_t flow)
 {
     size_t first, end = phi_share(phi_units(s), &first);
@@ -24,7 +24,7 @@ static void phi_hand_nothing(const phi_solver *s, const phi_transpose *g, size_t
     phi_wait();
 }
 
-/* After a reverse pass: add the contributions of the last flow. */
+/* After a reverse pass: add the contributions of the flow that was processed last to the cotangents of other sites. */
 static void phi_hand_last(const phi_solver *s, const phi_transpose *g, size_t flow, double *const *bar)
 {
 #if PHI_HANDS
@@ -36,5 +36,5 @@ static void phi_hand_last(const phi_solver *s, const phi_transpose *g, size_t fl
 #endif
 }
 
-/* Reverse pass of a flow for row segments: pull cotangents back, and invert the flow. */
+/* Pull cotangents back through a flow for row segments, and invert the flow. */
 #endif

@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Compute a row of time-dependent coefficients for the step after a number of steps. */
+/* Compute a row of coefficients, including time-dependent ones, for the step that follows `steps` steps. */
 static void phi_renew(const phi_solver *s, int row, size_t steps, double coef[PHI_ROW])
 {
     memcpy(coef, s->coef + row * PHI_ROW, PHI_PREPARED * sizeof *coef);

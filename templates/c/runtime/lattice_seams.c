@@ -5,7 +5,8 @@
 #include "rows.c"
 
 /* ---- Seams ---- */
-/* Where boundary seams begin: along each axis the remainder of its size after whole periods of colours. */
+/* Find where the boundary seam of each axis begins. A seam has the sites that remain after whole periods of colours, and
+   further periods if these are fewer than its smallest width. */
 static void phi_find_seams(phi_solver *s)
 {
     for (int a = 0; a < PHI_AXES; ++a) {
@@ -18,7 +19,7 @@ static void phi_find_seams(phi_solver *s)
     }
 }
 
-/* Kind of each site: its colour, plus the number of colours for each seam that contains the site. */
+/* Set the kind of each site: its colour + (number of colours) times the sum of 2^axis over the seams that contain it. */
 static void phi_put_kinds(const phi_solver *s)
 {
     PHI_EACH_ROW {

@@ -4,7 +4,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-int omp_get_num_threads(void); /* declared as in omp.h, which compilers without OpenMP lack */
+int omp_get_num_threads(void); /* declared here as in omp.h, a header that may be missing */
 int omp_get_thread_num(void);
 #ifdef __cplusplus
 }
@@ -22,7 +22,7 @@ int omp_get_thread_num(void);
 #define PHI_THREAD (size_t)0
 #endif
 
-/* The share of a thread in a number of work items: from *first on; returns its end. */
+/* Divide a number of work items among the threads. The share of the calling thread begins at *first; its end is returned. */
 static size_t phi_share(size_t units, size_t *first)
 {
     const size_t threads = PHI_THREADS, thread = PHI_THREAD, each = units / threads, more = units % threads;
@@ -34,7 +34,7 @@ static size_t phi_share(size_t units, size_t *first)
 static void phi_wait(void)
 {
 #ifdef _OPENMP
-    if (PHI_THREADS > 1) { /* a barrier may cost a system call even for one thread */
+    if (PHI_THREADS > 1) { /* even for one thread a barrier may cost a system call */
 #pragma omp barrier
     }
 #endif

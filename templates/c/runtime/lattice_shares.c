@@ -4,8 +4,9 @@
 #include "model.h"
 
 #if !PHI_SWEPT
-/* Sums over sites have eight partial sums. Compilers must not unroll the loop over these and vectorise the loop around
-   it. Clang would store such sums in memory: it gets one loop over all sites, and may reorder the additions. */
+/* Sums over sites consist of eight partial sums, one for each SIMD lane. Compilers must not unroll the loop over the eight,
+   since they would vectorise the loop around it. Clang would keep the eight sums in memory, so it gets one sum in one loop
+   over all sites, and may reorder its additions. */
 #if defined(__clang__) && __clang_major__ >= 13
 #define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) interleave_count(1)")
 #define PHI_LANES(sites) (sites)
@@ -23,7 +24,7 @@
 #endif
 
 #endif
-/* Total of the partial sums, which are overwritten. */
+/* Sum of the eight partial sums, which are overwritten. */
 static inline double phi_total(double lanes[8])
 {
     for (int l = 0; l < 4; ++l) lanes[l] += lanes[l + 4];
@@ -32,7 +33,7 @@ static inline double phi_total(double lanes[8])
 
 enum { PHI_ADDED = 64 }; /* number of sites whose contributions are stored before they are added */
 
-/* Sum of some values, in an order that lets loops vectorise. */
+/* Sum of the values. Eight partial sums let the loop vectorise. */
 static inline double phi_added(const double *values, ptrdiff_t count)
 {
     double lanes[8] = { 0.0 }, rest = 0.0;

@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Invert a matrix in place; a singular one becomes 1. */
+/* Replace a matrix by its inverse, or by the identity if it is singular. */
 static void phi_invert_block(double b[PHI_DIM][PHI_DIM])
 {
     double zero = 0.0;
@@ -22,8 +22,8 @@ static void phi_invert_block(double b[PHI_DIM][PHI_DIM])
     for (int k = 0; zero != 0.0 && k < PHI_DIM * PHI_DIM; ++k) b[k / PHI_DIM][k % PHI_DIM] = k % (PHI_DIM + 1) == 0;
 }
 
-/* Preconditioner: the inverse of the diagonal block of each site, at s->y[now]. Where fields of one site are strongly
-   coupled, like a momentum and its field, it halves the number of Krylov directions. */
+/* Compute the preconditioner at s->y[now]: the inverse of the diagonal block of each site. Where fields of one site are
+   strongly coupled, like a momentum and its field, it halves the number of Krylov directions. */
 static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
 {
     const size_t units = phi_units(s);
@@ -45,7 +45,7 @@ static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
     }
 }
 
-/* to = from + preconditioner times v; from may be NULL for 0. */
+/* Compute to = from + (preconditioner) v; from may be NULL for 0. */
 static void phi_apply_blocks(const phi_solver *s, double *const *v, double *const *from, double *const *to)
 {
     const size_t units = phi_units(s);

@@ -10,11 +10,12 @@
 
 /* ---- The stages ---- */
 #include "lattice_sweep_policy.h"
-enum { PHI_WIDTH = 32 }; /* number of partial results, so that loops vectorise */
+enum { PHI_WIDTH = 32 }; /* number of partial results in reductions over sites, so that these loops vectorise */
 
 static inline void phi_raise(double *largest, double value) { *largest = value > *largest ? value : *largest; }
 
-/* Update the largest change and the largest |y| of each field by a row segment; NaN is left out. */
+/* Update the largest change of y by a sweep, and the largest |y|, of each field, by the sites of a row segment. NaN is left
+   out. */
 static void phi_measure(const phi_solver *s, int now, size_t unit, double *change, double *size)
 {
     const phi_row row = phi_piece_of(s, unit);
@@ -44,7 +45,7 @@ static void phi_measure(const phi_solver *s, int now, size_t unit, double *chang
 }
 
 #if PHI_ADJOINT
-/* to = from (or 0) + the transpose of a kernel at y = s->y[2] times v. */
+/* Compute to = from (0 if NULL) + (transpose of the derivative of a kernel at y = s->y[2]) v, at all sites. */
 static void phi_pull(const phi_solver *s, int kernel, const double *coef, double *const *v, double *const *from, double *const *to)
 {
     PHI_PARALLEL
@@ -54,12 +55,12 @@ static void phi_pull(const phi_solver *s, int kernel, const double *coef, double
     }
 }
 
-/* Make a fixed-point sweep from s->y[now] to the other array; coef = NULL keeps what is there. Returns the change of y
-   relative to the size of each field, not finite if y is not. If s->side is set, y is a cotangent, and the sweep is
-   side + the transposed sweep at s->y[2]. */
+/* Make a fixed-point sweep from s->y[now] to s->y[1 - now]; with coef = NULL, only compare the two. Returns the largest
+   change of a field relative to its size, not finite if y is not. In a reverse pass s->side is not NULL; y is then a
+   cotangent, and the sweep is side + (transposed derivative of a sweep at s->y[2]) y. */
 #else
-/* Make a fixed-point sweep from s->y[now] to the other array; coef = NULL keeps what is there. Returns the change of y
-   relative to the size of each field, not finite if y is not. */
+/* Make a fixed-point sweep from s->y[now] to s->y[1 - now]; with coef = NULL, only compare the two. Returns the largest
+   change of a field relative to its size, not finite if y is not. */
 #endif
 static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int now)
 {
@@ -90,7 +91,7 @@ static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int
 
 #include "lattice_newton.c"
 
-/* Write the solution y of a stage, and x if its reverse pass reads it, to the tape; returns the end of the tape. */
+/* Write the solution y of a stage to the tape, and also x if the reverse pass reads it; returns the new end of the tape. */
 static double *phi_store_stage(const phi_solver *s, int now, double *to)
 {
     const size_t block = phi_block(s->rows, s->width), units = phi_units(s);
@@ -106,7 +107,7 @@ static double *phi_store_stage(const phi_solver *s, int now, double *to)
     return to + PHI_STORED_STATES * PHI_DIM * block;
 }
 
-/* Make the stages of a step. */
+/* Make all stages of a step: solve for y, and add the increment to x. */
 static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
 {
     const size_t units = phi_units(s);

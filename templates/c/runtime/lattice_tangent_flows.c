@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Make a step with tangent vectors, with full-range functions. */
+/* Make a step of the state and the tangent vectors, with functions for arguments of any size. */
 static phi_status phi_carry(phi_solver *s)
 {
     const size_t far = s->far;

@@ -3,6 +3,6 @@
 #include "lattice.h"
 #include "model.h"
 
-/* Make a step with tangent vectors. */
+/* Make a step of the state and the tangent vectors. */
 static phi_status phi_carry(phi_solver *s) { return phi_stages(s PHI_AND_FAR(1)); }
 #endif

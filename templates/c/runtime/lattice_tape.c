@@ -8,7 +8,7 @@
 #include "lattice_checkpoints.c"
 
 /* ---- Tape of fields ---- */
-/* Doubles on the tape for one step. */
+/* Number of doubles on the tape for one step. */
 static size_t phi_step_tape_size(const phi_solver *s)
 {
     size_t fields = 0;
@@ -18,8 +18,7 @@ static size_t phi_step_tape_size(const phi_solver *s)
     return (fields > 0 ? fields : 1) * phi_block(s->rows, s->width);
 }
 
-/* Write the fields that a sweep will change, and that the reverse pass reads, to the tape; returns the end of the
-   tape. */
+/* Write to the tape the fields that a sweep will change and that the reverse pass reads; returns the new end of the tape. */
 static double *phi_store_fields(const phi_solver *s, int sweep, double *to)
 {
     size_t first, end = phi_share(phi_units(s), &first);
@@ -31,7 +30,7 @@ static double *phi_store_fields(const phi_solver *s, int sweep, double *to)
     return to;
 }
 
-/* As phi_steps for at least one step, but write the tape to s->tape. */
+/* Make at least one step, without the last flow of the last step, and write the tape to s->tape. */
 static void phi_make_steps_with_tape(const phi_solver *s, size_t steps)
 {
     const size_t of_step = phi_step_tape_size(s);
@@ -72,8 +71,8 @@ static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int swee
 #endif
 }
 
-/* Pull cotangents back through a flow. tape is the end of its fields on the tape, or NULL; x becomes the fields before
-   the flow. Returns the end of the tape before the flow. */
+/* Pull the cotangents bar back through a flow. Its fields on the tape end at `tape`, which may be NULL if there are none; x
+   becomes the fields before the flow. Returns where the fields of the flow begin on the tape. */
 static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t steps, int number,
     double *tape, double **x, double *const *bar)
 {
@@ -93,7 +92,7 @@ static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t
     return tape;
 }
 
-/* Pull cotangents back through one step, from its fields on the tape. */
+/* Pull the cotangents back through one step, whose fields on the tape begin at `tape`. */
 static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, int continues, double *tape)
 {
     PHI_PARALLEL
@@ -104,7 +103,7 @@ static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, i
         for (int flow = PHI_OWN_FLOWS - 1; flow >= 0; --flow)
             left = phi_flow_back(s, g, steps, phi_joined(flow, continues), left, x, g->bar);
     }
-    double *left = tape; /* the fields at the start of the step */
+    double *left = tape; /* the following loops set g->x to the fields at the start of the step */
     int passed[PHI_DIM] = { 0 };
     for (int flow = 0; flow < PHI_OWN_FLOWS; ++flow)
         for (int k = 0, sweep; (sweep = phi_sweep_of(s, flow, k)) >= 0; ++k)

@@ -3,16 +3,17 @@
 #include "lattice.h"
 #include "model.h"
 
-/* The reverse pass recomputes states by the inverse flows, leg by leg. The tape holds the state at the start of each
-   leg, so rounding errors do not pass from leg to leg. If a recomputed state differs too much, as where fields grow
-   fast, all is repeated with legs of one step; if that fails too, as with strong damping, each flow is recomputed from
-   the start of its step. Legs are counted from the start of the run, so results do not depend on segments. */
-#define PHI_UNLIKE (450.0 * DBL_EPSILON) /* relative to the largest value of all fields; 1e-13 in double precision */
+/* The reverse pass recomputes states by the inverse flows. The tape holds a state for each leg, a group of consecutive steps,
+   at its start, so rounding errors do not pass from leg to leg. If a recomputed state differs too much, for instance since
+   fields grow fast, the pass is repeated with legs of one step. If that fails too, as with strong damping, the state before
+   each flow is recomputed from the start of its step. Legs are counted from the start of the run, so results do not depend
+   on the division into segments. */
+#define PHI_UNLIKE (450.0 * DBL_EPSILON) /* largest accepted difference from the stored state, relative to the largest value of all fields; 1e-13 in double precision */
 
-/* Number of legs in a number of steps. */
+/* Number of legs for a number of steps; leg is the number of steps in one. */
 static size_t phi_legs(size_t steps, size_t leg) { return steps / leg + (steps % leg > 0); }
 
-/* Bytes on the tape for one leg. */
+/* Number of bytes on the tape for one leg. */
 static size_t phi_leg_size(const phi_solver *s) { return PHI_DIM * phi_block(s->rows, s->width) * sizeof(double); }
 
 size_t phi_trail_size(const phi_solver *s, size_t steps)

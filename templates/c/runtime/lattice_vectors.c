@@ -3,7 +3,7 @@
 #include "lattice.h"
 #include "model.h"
 
-/* The fields of a tangent vector. */
+/* Set v to the arrays of tangent vector `number`. */
 static void phi_vector(const phi_solver *s, size_t number, double *v[PHI_DIM])
 {
     const size_t block = PHI_DOUBLES;

@@ -6,11 +6,11 @@
 #include "sweeps.h"
 
 /* ---- Wavefront (temporal) blocking ---- */
-/* If the fields exceed the caches, several flows pass over the lattice together, slice by slice, each PHI_SPAN slices
-   behind the one before, so that a slice is loaded once for all of them. Each thread has its own slices. At the ends of
-   these, flow k first leaves out k PHI_SPAN slices, which are made after all threads have come so far. Each flow reads
-   the same values as in separate passes: the bits are the same. */
-enum { PHI_DEEPEST = 16, PHI_CACHE = 1 << 21 }; /* most flows in a block; bytes that their slices may take */
+/* If the fields exceed the caches, several flows pass over the lattice together, slice by slice. Each flow is PHI_SPAN slices
+   behind the flow before it, so that a slice is loaded once for all of them. Each thread has its own range of slices. At the
+   ends of the range, flow k first leaves out k PHI_SPAN slices, which are updated when all threads have reached their ends.
+   Each flow reads the same values as in separate passes, so the bits are the same. */
+enum { PHI_DEEPEST = 16, PHI_CACHE = 1 << 21 }; /* largest number of flows in a block; bytes of cache for their slices */
 
 #if PHI_ONE_ROW
 /* Number of slices: the segments of the row. */
@@ -20,7 +20,7 @@ static size_t phi_slices(const phi_solver *s) { return phi_units(s); }
 static size_t phi_slices(const phi_solver *s) { return s->sizes[0]; }
 #endif
 
-/* Number of flows in a block; 1 for no blocking. */
+/* Number of flows that pass over the lattice together; 1 if blocking does not pay. */
 static size_t phi_depth(const phi_solver *s)
 {
     const size_t slices = phi_slices(s), bytes = PHI_DOUBLES * PHI_ARRAYS * sizeof(double);
@@ -64,7 +64,7 @@ static void phi_make_wave(const phi_solver *s, const phi_flow *flows, size_t cou
     phi_wait();
 }
 
-/* Apply the flows of some steps, merged, without the last one. */
+/* Apply the flows of some steps but for the last flow; the last flow of a step is merged with the first of the next. */
 static void phi_make_waves(const phi_solver *s, size_t steps)
 {
     const size_t each = PHI_FLOWS - 1, depth = phi_depth(s);

@@ -4,7 +4,7 @@
 
 #include "model.h"
 
-/* ---- The energy level e = -H(x0) and the monitor dt/dtau ---- */
+/* ---- The energy level e = -H(x0), a constant of a trajectory, and the monitor dt/dtau ---- */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {
     gauge[0] = -phi_hamiltonian(params, x);
@@ -17,7 +17,7 @@ static int phi_time_passes(const phi_params *params, const double x[PHI_DIM])
     return isfinite(rate) && rate > 0.0;
 }
 
-/* Convert a vector field from physical time to tau. */
+/* Convert a vector field from dx/dt, with the physical time t, to dx/dtau. */
 static void phi_make_per_tau(const phi_params *params, const double x[PHI_DIM], double field[PHI_DIM])
 {
     const double rate = phi_monitor(params, x);

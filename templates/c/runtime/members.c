@@ -10,7 +10,7 @@
 
 /* ---- Members of an ensemble ---- */
 /* Arguments of an ensemble. per_member = 1: member m has the parameters params[m] and the step h[m]; per_member = 0: all
-   have those of member 0. */
+   members have params[0] and h[0]. */
 typedef struct {
     double *x;
     size_t members, steps, per_member;
@@ -36,7 +36,7 @@ static phi_members phi_asked(const phi_params *params, double *x, size_t members
     return all;
 }
 
-/* Initialise a member at a state, with its parameters and all coefficients for its step size. */
+/* Initialise a solver for member m at the state x, with its parameters and all coefficients for its step size. */
 static phi_status phi_begin_member(const phi_members *all, size_t m, const double x[PHI_DIM] PHI_AND_GAUGE(const double *gauge), phi_solver *s)
 {
     const phi_params *params = all->params != NULL ? all->params + m * all->per_member : NULL;
@@ -44,7 +44,7 @@ static phi_status phi_begin_member(const phi_members *all, size_t m, const doubl
     return status == PHI_OK ? phi_integrate(s, all->h[m * all->per_member], 0) : status;
 }
 
-/* Initialise a member at its state in the ensemble, which is copied to x. */
+/* Initialise a solver for member m at its state in the ensemble, which is copied to x. */
 static phi_status phi_take_member(const phi_members *all, size_t m, double x[PHI_DIM], phi_solver *s)
 {
     for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + m];
@@ -58,7 +58,7 @@ static size_t phi_to_frame(const phi_members *all, size_t done)
     return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride : left;
 }
 
-/* Write the frame of a member, if one is due after this number of steps: x, or NaN if x is NULL. */
+/* If a frame is due after `done` steps, write x to it, or NaN if x is NULL, for a member that has failed. */
 static void phi_put_frame(const phi_members *all, size_t m, size_t done, const double *x)
 {
     for (size_t i = 0; i < PHI_DIM && all->frames != NULL && done % all->stride == 0; ++i)
@@ -67,7 +67,7 @@ static void phi_put_frame(const phi_members *all, size_t m, size_t done, const d
 
 #include "members_attitudes.c"
 
-/* Make the remaining steps of a member, one by one. */
+/* Make the remaining steps of member m by itself; `done` steps have been made, status is the present status. */
 static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, phi_solver *s, phi_status status)
 {
     while (done < all->steps) {

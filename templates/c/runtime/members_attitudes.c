@@ -4,7 +4,7 @@
 #include <string.h>
 #include "members.c"
 
-/* Write the attitude of a member to its frame, if one is due after this number of steps; NaN for NULL. */
+/* If a frame is due after `done` steps, write the attitude of a member to it, or NaN if s is NULL. */
 static void phi_put_attitude(const phi_members *all, size_t m, size_t done, const phi_solver *s)
 {
     double element[PHI_ELEMENT];

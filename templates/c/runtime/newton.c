@@ -14,7 +14,7 @@
 #include "measure_policy.h"
 #include "newton_policy.h"
 
-/* Largest size of a correction relative to the components of y; NaN or infinite if a correction is. */
+/* Largest component of the correction delta, relative to that of y; NaN or infinite if delta is. */
 static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
 {
     double norm = 0.0, size = 0.0;
@@ -54,10 +54,10 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
         previous = size;
         if (!(remaining <= PHI_TOLERANCE || stalled)) continue;
 #if PHI_ATTITUDE
-        double factor[PHI_ELEMENT]; /* computed here, in parallel with the lines below */
+        double factor[PHI_ELEMENT]; /* computed here, so that the processor overlaps it with the lines below */
         phi_factor(s PHI_AND_STAGE, y, factor);
 #endif
-        double small[PHI_DIM] = { 0.0 }; /* correction of the increment, and compensation */
+        double small[PHI_DIM] = { 0.0 }; /* correction of the increment and compensation term */
         for (int i = 0; i < PHI_DIM; ++i)
             for (int j = 0; j < PHI_DIM; ++j) small[i] -= slope[i * PHI_DIM + j] * delta[j];
         for (int i = 0; i < PHI_DIM; ++i) small[i] += s->carry[i];

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "newton_lanes.c"
 
-/* Product of a matrix and a vector. */
+/* Compute the product of a matrix and a vector in all lanes. */
 static void phi_apply(phi_lanes matrix[restrict PHI_DIM * PHI_DIM], phi_lanes vector[restrict PHI_DIM],
     phi_lanes product[restrict PHI_DIM])
 {
@@ -18,7 +18,7 @@ static void phi_apply(phi_lanes matrix[restrict PHI_DIM * PHI_DIM], phi_lanes ve
     }
 }
 
-/* Compute the corrections of the increment from the residual. */
+/* Compute the correction of the increment that a residual of the equation for y causes, in all lanes. */
 static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes gained[restrict PHI_DIM])
 {
 #if PHI_CENTRED
@@ -32,7 +32,7 @@ static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi
 #endif
 }
 
-/* Correct y by the residuals, with the inverse of the Newton matrix, and measure the corrections. */
+/* Correct y by its residuals, with the inverse of the Newton matrix; size receives the sizes of the corrections. */
 static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];

@@ -4,8 +4,8 @@
 #include <string.h>
 #include "newton_lanes.c"
 
-/* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite where a pivot
-   is far from 1. */
+/* Replace the matrices in all lanes by their inverses. They are I + O(h), so elimination needs no pivoting; the result is
+   infinite in lanes where a pivot is far from 1. */
 static void phi_invert(phi_lanes matrix[restrict PHI_DIM * PHI_DIM])
 {
     for (int k = 0; k < PHI_DIM; ++k) {
@@ -33,7 +33,7 @@ static void phi_invert(phi_lanes matrix[restrict PHI_DIM * PHI_DIM])
     }
 }
 
-/* Linearise a stage around the points y. */
+/* Linearise a stage around the points y in all lanes. */
 static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 {
 #if PHI_CENTRED

@@ -13,15 +13,15 @@
 /* ---- Newton's method in lanes ---- */
 #include "measure_policy.h"
 
-/* Linearisation of a stage around y, in all lanes. */
+/* Linear model of a stage around its points y, in all lanes. */
 typedef struct {
 #include "state_of_model.h"
 } phi_model;
 
 #include "newton_stages.c"
 
-/* Units in which corrections of y are measured, so that matrices are reused down to the same relative accuracy as in
-   phi_size: the smallest magnitude of each component in the stages. */
+/* Compute the weights of corrections of y: 1 / (the smallest magnitude of a component of y in all stages), with a bound for
+   small components. So the accuracy of solutions is relative, as in single steps. */
 static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes unit[restrict PHI_DIM])
 {
     phi_lanes norm = { 0.0 };
@@ -41,7 +41,7 @@ static void phi_measure(const phi_model *model PHI_AND_INT_STAGES, phi_lanes uni
     }
 }
 
-/* Subtract a correction from y; returns its size, summed over the components. */
+/* Subtract the correction delta from y; size receives the sum of the magnitudes of its components times their weights, unit. */
 static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     memset(size, 0, PHI_LANES * sizeof size[0]);
@@ -59,15 +59,15 @@ static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_la
 #include "newton_corrected_sparse.c"
 #include "newton_corrected.c"
 
-/* After corrections below PHI_FROZEN the matrices are reused. After a correction below PHI_SMALL, whose square is
-   rounding, one below PHI_BLOCK_ROUNDING is the last. */
+/* Relative sizes of corrections. After one below PHI_FROZEN, the matrices are reused. After one below PHI_SMALL, whose square
+   is below rounding, a correction below PHI_BLOCK_ROUNDING is the last. */
 #define PHI_FROZEN 1e-4
 #define PHI_SMALL 1e-8
 #define PHI_BLOCK_ROUNDING 1e-10
 #define PHI_CAUTION 32.0 /* reused matrices contract half as fast as new ones; the factor 32 is a wide safety margin */
 
-/* Expected next correction: the square of the first; later the latest times the ratio of the latest to the one before.
-   0 at rounding level. */
+/* Estimate the size of the next correction from the last one, `size`, and the one before it: the square of the first; later
+   size times the ratio size / before, with a safety margin. It is 0 at rounding level. */
 static void phi_leave(const phi_lanes size, const phi_lanes before, phi_lanes left)
 {
     PHI_EACH_LANE

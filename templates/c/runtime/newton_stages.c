@@ -4,7 +4,7 @@
 
 #include "newton_lanes.c"
 
-/* Set the unit of each component, in each lane, to its smallest magnitude in any stage. */
+/* Set unit, in each lane, to the smallest magnitude of component i of y in all stages. */
 static inline void phi_take_least(const phi_model *model, int stages, int i, double unit[restrict PHI_LANES])
 {
     for (int stage = 1; stage < stages; ++stage) {

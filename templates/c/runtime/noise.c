@@ -8,7 +8,7 @@
 #include "philox.c"
 
 /* ---- Noise ---- */
-/* Draw independent normal variates of variance 1. */
+/* Draw independent normal variates of mean 0 and variance 1: a function of seed, member and step. */
 static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double normals[PHI_DRAWS])
 {
     for (int k = 0; k < PHI_DRAWS; k += 2) {
@@ -22,15 +22,15 @@ static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double no
 
 #include "noise_of_flows.c"
 
-/* Set the increments of the noise in the next step to the given ones, or for NULL to random ones. Returns 0 if one is not
-   finite. */
+/* Set the increments of the noise in the next step: to those of the caller, or if increments is NULL, to random ones.
+   Returns 0 if one is not finite. */
 static int phi_draw(phi_solver *s, const double *increments)
 {
     if (increments != NULL) {
         PHI_TAKE_INCREMENTS(s->dw, increments);
     } else {
         phi_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
-        const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h); /* so that a step of -h inverts one of h */
+        const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h); /* with the sign of h, so that a step of -h inverts a step of h */
         for (int k = 0; k < PHI_DRAWS; ++k) s->dw[k] *= size;
         phi_order_draws(s);
     }

@@ -13,7 +13,7 @@ phi_status phi_set_parameters(phi_solver *s, const phi_params *params)
     if (s == NULL || params == NULL) return PHI_BAD_ARGUMENT;
     phi_solver changed = *s;
     changed.params = *params;
-    changed.h = (double)NAN; /* so that the next step starts as with a new step size */
+    changed.h = (double)NAN; /* so that the next step computes all coefficients */
 #if PHI_MONITOR
     phi_choose_gauge(&changed.params, changed.x, changed.gauge);
 #endif

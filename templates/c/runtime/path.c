@@ -14,8 +14,8 @@
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 #include "path_policy.h"
 
-/* Whether the slope of an expansion at a point m is pi(m) p. If not, the expansion only seems to have converged: it has
-   gaps between its terms, as t + t^9, or extends across the kink of an absolute value. */
+/* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to have converged:
+   it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value. */
 static int phi_holds(const double *coef, const double p[PHI_DIM], const double m[PHI_DIM],
     const double slope[PHI_DIM])
 {
@@ -27,8 +27,8 @@ static int phi_holds(const double *coef, const double p[PHI_DIM], const double m
     return 1;
 }
 
-/* Compute the path m(t) from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start, mean the mean of m -
-   start. Terms are added until they are negligible. Returns 0 if PHI_TERMS terms do not suffice. */
+/* Compute the path dm/dt = pi(m) p from start, 0 <= t <= 1, by its Taylor series: change is m(1) - start, mean the mean of
+   m - start. Terms are added until they are negligible. Returns 0 if PHI_TERMS terms do not suffice. */
 static int phi_piece(const double *coef, const double p[PHI_DIM], const double start[PHI_DIM], double change[PHI_DIM],
     double mean[PHI_DIM])
 {
@@ -58,9 +58,9 @@ static int phi_piece(const double *coef, const double p[PHI_DIM], const double s
     return 0;
 }
 
-/* Compute the whole path from x, in 1, 2, 4, ... pieces until each expansion converges: change is its end minus x, mean
-   its mean minus x. For any p, the end of the path lies on the symplectic leaf of x. Returns 0 if the path is too long or
-   leaves the domain. *made counts all pieces. */
+/* Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is its end minus
+   x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x. Returns 0 if the path is too
+   long or leaves the domain of pi. *pieces_used increases by the number of computed pieces. */
 static int phi_path(const double *coef, const double x[PHI_DIM], const double p[PHI_DIM], double change[PHI_DIM],
     double mean[PHI_DIM], int *pieces_used)
 {
@@ -99,8 +99,8 @@ static int phi_residual(phi_solver *s, const double *coef, const double p[PHI_DI
     return 1;
 }
 
-/* Compute the Jacobian of the residual by differences, for steps so large that iterations with the approximate Jacobian
-   do not converge. */
+/* Compute the Jacobian of the residual by differences. It serves for steps so large that iterations with the approximate
+   Jacobian do not converge. */
 static int phi_differences(phi_solver *s, const double *coef, const double p[PHI_DIM], const double residual[PHI_DIM],
     double jacobian[PHI_DIM * PHI_DIM], int *pieces_used)
 {
@@ -115,8 +115,8 @@ static int phi_differences(phi_solver *s, const double *coef, const double p[PHI
     return 1;
 }
 
-/* Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path. A step that needs more
-   than PHI_MOST_PIECES pieces is too large for a meaningful solution. */
+/* Make one stage: solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path; S_h is
+   the generating function. A step that needs more than PHI_MOST_PIECES pieces is too large for a meaningful solution. */
 static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     const double *coef = PHI_OF(s->coef, stage);

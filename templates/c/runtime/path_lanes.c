@@ -9,11 +9,12 @@
 #include "newton_lanes.c"
 
 /* ---- Blocks along paths ---- */
-#define PHI_SLOPE_ACCURACY 1e-7 /* accuracy of the derivatives of paths */
-#define PHI_MIDDLES_SETTLED 1e-9 /* accuracy of middles; Newton iterations remove the remaining error */
-#define PHI_PREDICTION_ACCURACY 1e-6 /* accuracy of expansions in predictions, which are not more accurate */
+#define PHI_SLOPE_ACCURACY 1e-7 /* relative accuracy of the derivatives of paths */
+#define PHI_MIDDLES_SETTLED 1e-9 /* relative accuracy of the middles of paths; Newton iterations remove the remaining error */
+#define PHI_PREDICTION_ACCURACY 1e-6 /* relative accuracy of paths in predictions, which have larger errors anyway */
 
-/* Compute alpha - y and beta - alpha to leading order, by one short expansion. */
+/* Compute alpha - y (displacement) and beta - alpha (increment) to leading order, from short Taylor series of paths with the
+   middle y. */
 static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM],
     phi_lanes displacement[restrict PHI_DIM], phi_lanes increment[restrict PHI_DIM])
 {
@@ -31,8 +32,8 @@ static void phi_evaluate_lanes(phi_lanes coef[restrict], phi_lanes y[restrict PH
     }
 }
 
-/* Compute alpha - y and beta - alpha from an expansion. Its mean differs a little from y; results are corrected to first
-   order in the difference. */
+/* Compute alpha - y (displacement) and beta - alpha (increment) from the Taylor series of paths. The mean of a path differs
+   a little from y; results are corrected to first order in the difference. */
 static void phi_read_ends(phi_model *model, phi_expansion *e, const phi_lanes wrong)
 {
     phi_lanes miss[PHI_DIM];
@@ -55,8 +56,8 @@ static void phi_read_ends(phi_model *model, phi_expansion *e, const phi_lanes wr
         }
 }
 
-/* Compute the matrices of a stage, from the derivatives of the paths and the Hessian of S_h. Seven digits suffice: the
-   error of an accepted correction is then below rounding. */
+/* Compute the Newton matrices of a stage from the derivatives of the paths and from the Hessian of the generating function
+   S_h. Seven digits suffice, since the error of an accepted correction is then below rounding. */
 static void phi_linearise_paths(phi_lanes coef[restrict], phi_model *model, phi_expansion *e,
     phi_lanes hessian[restrict PHI_DIM * PHI_DIM])
 {
@@ -72,7 +73,7 @@ static void phi_linearise_paths(phi_lanes coef[restrict], phi_model *model, phi_
     }
 }
 
-/* Evaluate a stage at the points y, with new matrices or with those of the last iteration. */
+/* Evaluate a stage at the points y; matrices = 1 computes new matrices, 0 keeps those of the last iteration. */
 static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
 {
     phi_expansion e;

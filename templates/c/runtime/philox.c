@@ -6,8 +6,8 @@
 #include "model.h"
 
 /* ---- Random numbers ---- */
-/* Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3 (2011): the
-   counter becomes four random words. */
+/* Replace a counter of four words by four random words: Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel
+   random numbers: as easy as 1, 2, 3 (2011). */
 static void phi_philox(uint32_t counter[4], uint32_t key0, uint32_t key1)
 {
     for (int round = 0; round < 10; ++round) {
@@ -22,7 +22,7 @@ static void phi_philox(uint32_t counter[4], uint32_t key0, uint32_t key1)
     }
 }
 
-/* A number from 0 up to, but not including, 2^53, from 53 bits of two words. */
+/* A random integer from 0 to 2^53 - 1, from 53 bits of two words. */
 static double phi_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0 + (double)(low >> 6); }
 
 /* Two independent standard normal variates (Box and Muller), truncated at PHI_BOUND. */

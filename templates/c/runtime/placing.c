@@ -50,7 +50,7 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
     PHI_TAKE_LEVEL(s, from)
     PHI_SHIFT_PREDICTORS(s, from)
 #if PHI_GAUSS
-    s->history.kicked = 1; /* the increments of the last step still predict those of the next one */
+    s->history.kicked = 1; /* increments of the last step still predict those of the next */
 #endif
     phi_renew_rate(s);
     return PHI_OK;

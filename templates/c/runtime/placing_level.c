@@ -6,8 +6,8 @@
 #include "algebra.c"
 #include "level.c"
 
-/* Set the energy level to that of the new state s->x. Returns 0, with the former state, if the new state is not
-   admissible. */
+/* Set the energy level e to -H of the new state s->x. If the new state is not admissible, restore the former state and
+   return 0. */
 static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const double carry[PHI_DIM])
 {
     double level[PHI_GAUGES];
@@ -19,7 +19,7 @@ static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const doubl
         return 0;
     }
     memcpy(s->gauge, level, sizeof level);
-    PHI_EACH_STAGE /* if s->h is NaN, the next step computes them */
+    PHI_EACH_STAGE /* if s->h is NaN, the next step computes the coefficients */
         phi_prepare(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(s->coef, stage));
     return 1;
 }

@@ -8,9 +8,9 @@
 
 #define PHI_NEAR_BY 0.125 /* largest relative change of the state after which predictors are shifted rather than cleared */
 
-/* Shift the predictors with the state, for as many past values as the extrapolation needs: a motion through x would
-   have had past values that differ by the change of the state and by the difference of the slopes. Recurrences are
-   dropped, as they were fitted to the former motion. After a large change, the next step clears the predictors. */
+/* Shift the past solutions that the extrapolation needs, after a change of the state: past solutions of a motion through the
+   new x differ by the change of the state, and by the change of the vector field times the time since then. Recurrences are
+   dropped, since they were fitted to the former motion. After a large change, the next step clears the predictors. */
 static void phi_shift_predictors(phi_solver *s, const double from[PHI_DIM])
 {
     double distance = 0.0, size = 0.0, before[PHI_DIM], slope[PHI_DIM];
@@ -41,7 +41,7 @@ static void phi_shift_predictors(phi_solver *s, const double from[PHI_DIM])
     for (int i = 0; i < PHI_DIM; ++i) slope[i] -= before[i];
 #endif
 #if PHI_COMPOSED
-    double since = s->h; /* time since the start of the last step, then of each of its stages */
+    double since = s->h; /* time since the start of a stage of the last step, first of stage 0 */
 #endif
     PHI_EACH_STAGE {
         phi_history *history = &PHI_OF(s->history, stage);

@@ -5,8 +5,8 @@
 #include "model.h"
 #include "predictor_policy.h"
 
-/* Predict the next solution by the sum of differences. Returns 0 if there is no prediction, or if it is far away, where
-   the equation of a step has solutions unrelated to the motion. */
+/* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away: there the
+   equation of a step has solutions unrelated to the motion. */
 static int phi_predict(const phi_history *history, double value[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;

@@ -6,7 +6,7 @@
 #include "recurrence.c"
 #include "predictor_policy.h"
 
-/* Whether a prediction is near the state. Far away the equation of a step has solutions unrelated to the motion. */
+/* Whether a prediction is near `last`. Far away the equation of a step has solutions unrelated to the motion. */
 static int phi_near(const double predicted[PHI_DIM], const double last[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -18,9 +18,9 @@ static int phi_near(const double predicted[PHI_DIM], const double last[PHI_DIM])
 }
 
 enum {
-    PHI_HISTORY = 8, /* most values that the extrapolation uses; more would amplify rounding errors */
-    PHI_REPAY = 150, /* cost of a fit, in steps; measured */
-    PHI_LONG_WAIT = 20000 /* steps until the next fit of a recurrence that has needed many */
+    PHI_HISTORY = 8, /* largest number of values that the extrapolation uses; more would amplify rounding errors */
+    PHI_REPAY = 150, /* cost of fitting a recurrence, in steps; measured */
+    PHI_LONG_WAIT = 20000 /* largest number of slow steps until a recurrence is fitted again */
 };
 
 /* Predict the next solution from earlier ones. Returns 0 if there is no prediction. */
@@ -45,7 +45,7 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
     return last >= 0 && phi_near(value, history->past[last]);
 }
 
-/* Select the predictor that would have been best for a solution that took several iterations. */
+/* Select the predictor that would have predicted `value` best, a solution that took several iterations. */
 static void phi_judge(phi_history *history, const double value[PHI_DIM])
 {
     double row[PHI_HISTORY + 1][PHI_DIM], predicted[PHI_DIM], least = HUGE_VAL, fitted = HUGE_VAL;
@@ -79,8 +79,8 @@ static void phi_make_room(phi_history *history, int values)
     history->count = PHI_REMEMBERED;
 }
 
-/* Fit the recurrence to the last values; the wait until the next fit grows with every fit. Returns whether the
-   recurrence predicts well. */
+/* Fit the recurrence to the stored solutions. The number of slow steps until the next fit grows with every fit. Returns
+   whether the recurrence predicts well. */
 static int phi_fit(phi_history *history)
 {
     int fitted = 1;
@@ -99,7 +99,7 @@ static int phi_fit(phi_history *history)
     return fitted;
 }
 
-/* Update the predictor with a solution and the number of iterations it took; 1 means that the prediction was good. */
+/* Update the predictor with a solution that took this number of iterations; 1 means that the prediction was good. */
 static void phi_remember(phi_history *history, const double value[PHI_DIM], int iterations)
 {
     if (iterations > 1) phi_judge(history, value);

@@ -9,18 +9,17 @@
 /* A fit stops adding values once the residual is below this, relative to the largest value. */
 #define PHI_ENOUGH 3e-12
 
-/* Regularisation of the least squares: the level of rounding. */
+/* Weight of the regularisation in the least-squares fit, relative to the largest value: the level of rounding. */
 #define PHI_RIDGE 1e-15
 
-/* Largest accepted error of a recurrence for values it was not fitted to, relative to the largest value. Beyond it, the
-   motion is chaotic or the step long, and other predictors are as good. */
+/* Largest accepted error of a recurrence for values to which it was not fitted, relative to the largest value. If the error
+   is larger, the motion is chaotic or the step long, and other predictors are as good. */
 #define PHI_HOPELESS 1e-7
 
 enum { PHI_ROWS = (int)PHI_REMEMBERED - PHI_WINDOW - PHI_AHEAD - PHI_CHECKS + 1 }; /* equations of the least-squares problem */
 
-/* Subtract multiples of one column, stored in r, from eight columns, to make them orthogonal to it. If that column is
-   one of the eight, columns up to it are unchanged, and inverse becomes 1 over its squared norm. The number of rows is
-   even. */
+/* Make eight columns orthogonal to one column, by subtracting multiples of it; r receives the factors. If the column is one
+   of the eight, columns up to it are unchanged, and *inverse becomes 1 / (its squared norm). The number of rows is even. */
 static void phi_project(int rows, double (*one)[8], int column, double *inverse, double (*eight)[8], double r[8])
 {
     double even[8] = { 0.0 }, odd[8] = { 0.0 };
@@ -41,7 +40,7 @@ static void phi_project(int rows, double (*one)[8], int column, double *inverse,
     }
 }
 
-/* Error of the recurrences for the last of these values. */
+/* Error of the recurrences for values that were not used in the fit, at the end of the array. */
 static double phi_missed(const double *value, double (*weight)[8])
 {
     enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, CHECKS = PHI_CHECKS };
@@ -62,7 +61,7 @@ static double phi_missed(const double *value, double (*weight)[8])
 static int phi_train(phi_history *history, int component)
 {
     enum { AHEAD = PHI_AHEAD, WINDOW = PHI_WINDOW, ROWS = PHI_ROWS };
-    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* eight columns in each part */
+    double q[WINDOW / 8][ROWS + WINDOW][8], r[WINDOW / 8][WINDOW][8], inverse[WINDOW]; /* each part has eight columns */
     double right[ROWS + WINDOW][8], weight[WINDOW][8], value[PHI_REMEMBERED], largest = 0.0, left = HUGE_VAL;
     int terms = 0;
     memset(q, 0, sizeof q);
@@ -75,7 +74,7 @@ static int phi_train(phi_history *history, int component)
     for (int i = 0; i < ROWS; ++i)
         for (int l = 0; l < AHEAD; ++l) right[i][l] = value[i + WINDOW + l];
     while (terms < WINDOW && left > PHI_ENOUGH * largest) {
-        const int part = terms / 8, rows = ROWS + terms + 8; /* later rows of the regularisation are zero in these columns */
+        const int part = terms / 8, rows = ROWS + terms + 8; /* the other rows, of the regularisation, are 0 in these columns */
         for (int i = 0; i < ROWS; ++i)
             for (int l = 0; l < 8; ++l) q[part][i][l] = value[i + WINDOW - 1 - terms - l];
         for (int l = 0; l < 8; ++l) q[part][ROWS + terms + l][l] = PHI_RIDGE * largest;

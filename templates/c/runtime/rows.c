@@ -11,7 +11,7 @@ typedef struct {
 #include "state_of_row.h"
 } phi_row;
 
-/* Before a loop over sites: tells the compiler that iterations are independent. */
+/* Stands before loops over sites: it tells the compiler that their iterations are independent. */
 #if defined(__clang__)
 #define PHI_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
 #pragma clang diagnostic ignored "-Wpass-failed"
@@ -22,7 +22,7 @@ typedef struct {
 #endif
 
 #if PHI_COLOURS
-/* First site of a colour in a row, at or after a given site. */
+/* First site of the colour in a row, from the site `from` on. */
 static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 {
     for (ptrdiff_t i = from; i < from + PHI_COLOUR_COUNT; ++i)
@@ -35,7 +35,7 @@ static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 }
 
 #endif
-/* Update the halo for the sites from..to: copies of the other end, or mirrored values of weight 0. */
+/* Update the halo for changed sites from ... to - 1: copies of the other end, or mirrored (weight 0). */
 static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
 #if PHI_OPEN_ROWS
@@ -58,10 +58,10 @@ static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
 #if PHI_BETWEEN
 
 #if PHI_ONE_ROW
-/* Before a loop over the sites of a segment. */
+/* Restrict a row to the sites from ... to - 1, for a loop over them. */
 #else
-/* Before a loop over the sites of a segment, rounded up to whole vectors of 8; the excess lies in the halo, which is
-   updated afterwards. */
+/* Restrict a row to the sites from ... to - 1, for a loop over them that is rounded up to whole vectors of 8. Excess sites
+   lie in the halo, which is updated afterwards. */
 #endif
 static inline const phi_row *phi_between(phi_row *row, ptrdiff_t from, ptrdiff_t to)
 {

@@ -16,12 +16,12 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
         rows *= sizes[a];
     }
     size_t wide = PHI_WIDE((sizes[PHI_LAST_AXIS] + 7) / 8 * 8);
-    if (wide % 512 == 0) wide += 8; /* rows pages apart share cache sets */
+    if (wide % 512 == 0) wide += 8; /* multiples of 512 share cache sets */
     *width = (ptrdiff_t)wide;
     return rows > most / wide ? 0 : rows;
 }
 
-/* Position of a row along all axes but the last. */
+/* Compute the position of row number `index` along all axes but the last. */
 static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[PHI_AXES])
 {
     place[PHI_AXES - 1] = 0;
@@ -31,7 +31,7 @@ static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[
     }
 }
 
-/* Addresses of a row and its neighbours. */
+/* Compute the offsets in memory of a row and its neighbours. */
 static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
 {
     ptrdiff_t place[PHI_AXES];
@@ -41,7 +41,7 @@ static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_L
         for (int a = 0; a < PHI_AXES - 1; ++a) {
             const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
             ptrdiff_t p = place[a] + phi_lines[k][a];
-            if (phi_open[a]) { /* mirrored, as in phi_ends */
+            if (phi_open[a]) { /* rows beyond open ends are mirrored; their values have the weight 0 */
                 p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
                 p = p < 0 ? 0 : p < size ? p : size - 1;
             } else {
@@ -53,14 +53,14 @@ static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_L
     }
 }
 
-/* Store the addresses of all rows and their neighbours in memory. */
+/* Store the offsets of all rows and their neighbours in memory, for s->lines. */
 static void phi_find_all_lines(phi_solver *s, double *memory)
 {
     s->lines = (ptrdiff_t *)(void *)memory;
     for (size_t r = 0; r < s->rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
 }
 
-/* Row with this number, a work item of threads. */
+/* Row number `index`, a work item of threads. */
 static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
 {
     phi_row row;
@@ -97,5 +97,5 @@ static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
     return row;
 }
 
-static size_t phi_units(const phi_solver *s) { return s->rows; } /* work items of threads: the rows */
+static size_t phi_units(const phi_solver *s) { return s->rows; } /* number of work items for threads: the rows */
 #endif

@@ -9,11 +9,11 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
     const size_t n = sizes != NULL ? sizes[0] : 0;
     if (n < phi_least[0] PHI_OR_MISFIT(0) || n > SIZE_MAX / 128 / PHI_DOUBLES_OF_SITE) return 0;
     const size_t wide = PHI_WIDE((n + 7) / 8 * 8);
-    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* rows pages apart share cache sets */
+    *width = (ptrdiff_t)(wide % 512 == 0 ? wide + 8 : wide); /* multiples of 512 share cache sets */
     return 1;
 }
 
-/* The whole row. */
+/* The record of the whole row. */
 static inline phi_row phi_row_of(const phi_solver *s)
 {
     phi_row row;
@@ -27,13 +27,13 @@ enum { PHI_PIECE = 256 }; /* sites of a work item, for any number of threads */
 enum { PHI_PIECE = 1024 }; /* sites of a work item, for any number of threads */
 #endif
 
-/* Number of segments of the row; the last one is the longest, so that halos copy from one segment only. */
+/* Number of segments of the row; the last is the longest, so that a halo copies from one segment only. */
 static size_t phi_units(const phi_solver *s)
 {
     return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;
 }
 
-/* Segment with this number, a work item of threads. */
+/* Segment number `unit` of the row, a work item of threads. */
 static inline phi_row phi_piece_of(const phi_solver *s, size_t unit)
 {
     phi_row row = phi_row_of(s);

@@ -14,7 +14,7 @@
 PHI_CHAPTER_OF_SOLVER
 #include "gauge_formula.c"
 
-/* Initialise *s. The arguments may be parts of *s, which is therefore written last. */
+/* Initialise *s at the state x0. The arguments may be parts of *s, which is therefore written last. */
 phi_status PHI_INIT_FROM(phi_solver *s, const phi_params *params, const double x0[PHI_DIM] PHI_AND_START)
 {
     if (s == NULL || x0 == NULL PHI_OR_NO_T0) return PHI_BAD_ARGUMENT;
@@ -50,7 +50,7 @@ PHI_ABOUT_RUN
 PHI_RUN(phi_solver *s, double h, size_t steps PHI_AND_RECORD)
 {
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
-    if (h != s->h) { /* coefficients depend on the step size */
+    if (h != s->h) { /* a new step size needs new coefficients */
         PHI_EACH_STAGE
             phi_prepare(&s->params PHI_AND_GAUGE(s->gauge), PHI_FRACTION(h), PHI_OF(s->coef, stage));
 #include "state_reset.h"

@@ -28,11 +28,12 @@ static void phi_prepare(const phi_params *params, double h, double *coef)
 }
 
 #if PHI_MONITOR
-/* Quantities that flows update: the state, the physical time, and a sum that becomes NaN outside the domain of a
-   logarithm. */
+/* Indices of quantities that flows update, after the coordinates: the physical time, and a sum that becomes NaN outside the
+   domain of a logarithm. PHI_ALONG is the number of all. */
 enum { PHI_TIME = PHI_DIM, PHI_DOMAIN, PHI_ALONG };
 
-/* Make one step: the exact flows of the parts of K, one after the other. If it fails, the state is unchanged. */
+/* Make one step: the exact flows of the parts of the Hamiltonian K, one after the other. If it fails, the state is
+   unchanged. */
 #if PHI_ADJOINT
 static phi_status phi_stages(phi_solver *s, double (*tape)[PHI_DIM])
 #else
@@ -99,7 +100,8 @@ static phi_status phi_stages(phi_solver *s)
 }
 
 #if PHI_CORRECTED
-/* Apply the corrector before the steps of a run, or its inverse after them. If it fails, the state is unchanged. */
+/* Apply the corrector before the steps of a run (after = 0), or its inverse after them (1). If it fails, the state is
+   unchanged. */
 static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_TAPE)
 {
     double x[PHI_DIM], displacement[PHI_DIM];
@@ -111,8 +113,8 @@ static phi_status phi_correct(phi_solver *s, int after PHI_AND_STATES_TAPE)
     return PHI_OK;
 }
 
-/* End a run that started at `before`, by the corrector; returns the status of the last step or, if the corrector fails,
-   that of the corrector. If no step succeeded, or if the corrector fails, the state before the run is restored. */
+/* End a run that started at `before`, by the inverse of the corrector. Returns the status of the last step or, if it fails,
+   of the corrector. If no step succeeded, or if the corrector fails, the state before the run is restored. */
 static phi_status phi_end_run(phi_solver *s, const phi_solver *before, phi_status status PHI_AND_STATES_TAPE)
 {
     const phi_status corrected = s->steps == before->steps ? PHI_OK : phi_correct(s, 1 PHI_AND_TAPE_AT(-PHI_BEGUN));

@@ -7,7 +7,7 @@
 #include "path.c"
 #include "gauss.c"
 
-/* Make one stage. If it fails from the predicted solution, it is made again without a prediction. */
+/* Make one stage of a step. If it fails from the predicted solution, repeat it without a prediction. */
 static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
     const phi_status status = phi_attempt(s PHI_AND_STAGE);

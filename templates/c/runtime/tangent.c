@@ -16,7 +16,7 @@
 #include "tangent_path.c"
 #include "tangent_splitting.c"
 
-/* Advance *at through one stage of the step that s has just made, and multiply product by its derivative. */
+/* Advance *at through one stage of the step that s has just made, and multiply product by the derivative of the stage. */
 static phi_status phi_tangent_of(const phi_solver *s PHI_AND_INT_STAGE, phi_solver *at, double product[PHI_DIM * PHI_DIM])
 {
     double derivative[PHI_DIM * PHI_DIM], both[PHI_DIM * PHI_DIM], change[PHI_DIM];

@@ -3,8 +3,8 @@
 #include "model.h"
 #include "solver.h"
 
-/* Compute the derivative of one explicit stage, 1 + increment', and the change of x by it. The arguments carry and
-   value are unused. */
+/* Compute the change of x in one explicit stage, and the derivative of the stage: 1 + the Jacobian of the increment. The
+   arguments carry and value are unused. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

@@ -8,11 +8,11 @@
 #include "model.h"
 #include "solver.c"
 
-enum { PHI_SLOPES = PHI_UNKNOWNS * (PHI_DIM + PHI_UNKNOWNS) }; /* of a stage, by x and by the unknowns */
+enum { PHI_SLOPES = PHI_UNKNOWNS * (PHI_DIM + PHI_UNKNOWNS) }; /* number of derivatives of the vector field at a stage, by x and by the unknowns */
 #include "gauss_tangent_policy.h"
 
-/* Compute the derivatives of the stage increments by coordinate j. They solve linear equations, by fixed-point sweeps.
-   Returns 0 if these do not converge. */
+/* Compute the derivatives of the stage increments by coordinate j at the start of the step. They solve linear equations, by
+   fixed-point sweeps. Returns 0 if the sweeps do not converge. */
 static int phi_vary(const phi_solver *s, double slopes[PHI_NODES][PHI_SLOPES], int j, phi_lanes *varied)
 {
     phi_lanes z[PHI_UNKNOWNS];
@@ -42,7 +42,7 @@ static int phi_vary(const phi_solver *s, double slopes[PHI_NODES][PHI_SLOPES], i
     return 0;
 }
 
-/* Compute the derivative and the change of the step that s has made from *at. */
+/* Compute the change of x in the step that s has made from *at, and the derivative of this step. */
 static phi_status phi_tangent_stage(const phi_solver *s, const phi_solver *at, double change[PHI_DIM],
     double derivative[PHI_DIM * PHI_DIM])
 {

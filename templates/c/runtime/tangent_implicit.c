@@ -5,14 +5,14 @@
 #include "algebra.c"
 #include "tangent_policy.h"
 
-/* Whether Newton's method has reached rounding level, by the sizes of its last two corrections. */
+/* Whether Newton's method has reached rounding level, judged by the relative sizes of its last two corrections. */
 static int phi_tangent_solved(double size, double previous)
 {
     const int stalled = size < PHI_TANGENT_NEARLY_SOLVED && size > PHI_TANGENT_SHRINKING * previous;
     return size <= PHI_TANGENT_SOLVED || stalled;
 }
 
-/* Solve matrix * solution = sides for all columns of sides, which are overwritten. Returns 0 if singular. */
+/* Solve matrix * solution = sides for all columns of sides, which become the solutions. Returns 0 if singular. */
 static int phi_tangent_solve(const double matrix[PHI_DIM * PHI_DIM], double sides[PHI_DIM * PHI_DIM])
 {
     for (int j = 0; j < PHI_DIM; ++j) {

@@ -11,7 +11,8 @@
 #include "path_tangent_policy.h"
 #include "tangent_product.c"
 
-/* Whether the slopes of a path and of its variation at a point m are those of their equations. */
+/* Whether the slopes of the Taylor series of a path and of its variation, at a point m, satisfy their differential
+   equations. */
 static int phi_tangent_holds(const double *coef, const double p[2 * PHI_DIM], const double m[2 * PHI_DIM],
     const double slope[2 * PHI_DIM])
 {
@@ -81,8 +82,9 @@ static int phi_tangent_seed(const double *coef, const double x[PHI_DIM], const d
     return 0;
 }
 
-/* Compute the derivative of one stage, end_x + end_p Dp. p = grad S_h(mean) gives (1 - H mean_p) Dp = H mean_x, where H is
-   the Hessian of S_h. p is refined to rounding level, starting from the stored mean in value. */
+/* Compute the derivative of one stage, which follows a path from x with a covector p that solves p = grad S_h(mean). It is
+   end_x + end_p Dp, where (1 - H mean_p) Dp = H mean_x with the Hessian H of S_h, and end_x ... mean_p are derivatives of
+   end and mean of the path by x and p. p is first refined to rounding level, starting from `value`, the stored mean. */
 static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM], const double carry[PHI_DIM],
     const double value[PHI_DIM], double change[PHI_DIM], double derivative[PHI_DIM * PHI_DIM])
 {

@@ -2,7 +2,7 @@
 #define PHI_FILE_TAYLOR
 #include "model.h"
 
-/* Coefficient k of the product of two Taylor series. */
+/* Coefficient k of the product of two Taylor series, whose coefficients are the entries of a and b. */
 static double phi_taylor_product(const double *a, const double *b, int k)
 {
     double sum = 0.0;
@@ -10,7 +10,7 @@ static double phi_taylor_product(const double *a, const double *b, int k)
     return sum;
 }
 
-/* Coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'; d is the series of f'(a). */
+/* Coefficient k >= 1 of the Taylor series of f(a), from f(a)' = f'(a) a'; a and d have the coefficients of a and f'(a). */
 static double phi_taylor_chain(const double *a, const double *d, int k)
 {
     double sum = 0.0;
@@ -18,7 +18,7 @@ static double phi_taylor_chain(const double *a, const double *d, int k)
     return sum / (double)k;
 }
 
-/* a[0] times coefficient k >= 1 of the Taylor series of b = a^r, from a b' = r a' b. */
+/* a[0] times coefficient k >= 1 of the Taylor series of b = a^r, from a b' = r a' b; coefficients of b before k are known. */
 static double phi_taylor_power(const double *a, const double *b, double r, int k)
 {
     double sum = 0.0;
