@@ -1,4 +1,5 @@
-/* What all methods share. `real` is double, long double for references, or a vector of doubles for ensembles. */
+/* Types and functions that all methods share. `real` is double, long double for reference solutions, or a SIMD vector
+   of doubles, for several members of an ensemble or several stages of a method. */
 #include <math.h>
 #include <string.h>
 #include <time.h>
@@ -10,7 +11,7 @@
 #endif
 typedef REAL real;
 
-/* Numbers of a state: not the vectors in which a method keeps its stages. */
+/* Type of the numbers of a state. It is double where `real` is a vector over the stages of a method. */
 #ifndef STATE
 #define STATE real
 #endif
@@ -22,13 +23,13 @@ static double seconds_of(clockid_t clock)
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* CPU time of this thread, in seconds. To ask for it takes as long as ten steps. */
+/* CPU time of this thread, in seconds. The call takes as long as ten steps. */
 static double cpu_time(void)
 {
     return seconds_of(CLOCK_THREAD_CPUTIME_ID);
 }
 
-/* Time by the clock, in seconds, which is cheap to ask for: for limits. */
+/* Elapsed time in seconds, for time limits, since the call is fast. */
 static inline double wall_time(void)
 {
     return seconds_of(CLOCK_MONOTONIC);

@@ -1,4 +1,4 @@
-/* Methods made of steps of a symmetric method of order 2, with the given fractions of a step. */
+/* Composition of a symmetric method BASE of order 2: a step consists of steps of BASE over the fractions FRACTIONS. */
 #define COMPOSE(NAME, BASE, FRACTIONS)                                                                               \
     static void NAME(real x[DIM], double h, long steps)                                                              \
     {                                                                                                                \
@@ -6,8 +6,8 @@
             for (size_t s = 0; s < sizeof FRACTIONS / sizeof *FRACTIONS; ++s) BASE(x, FRACTIONS[s] * h);             \
     }
 
-/* The same for splittings: a step is OUTER for half of it, INNER, and OUTER for the other half, which makes one flow
-   with the OUTER of the next. */
+/* Composition of a splitting whose step is the flow OUTER over half of the step, the flow INNER over the step, and
+   OUTER over the second half. The last flow of a step and the first flow of the next are merged. */
 #define COMPOSE_SPLITTING(NAME, OUTER, INNER, FRACTIONS)                                                             \
     static void NAME(real x[DIM], double h, long steps)                                                              \
     {                                                                                                                \

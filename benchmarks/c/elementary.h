@@ -1,4 +1,5 @@
-/* Sine, cosine and exponential of small arguments by their Taylor series, of others by libm: splittings live on them. */
+/* Sine, cosine and exponential: by Taylor series for small arguments, by libm for others. Splittings spend most of
+   their time in these functions. */
 INLINE void sine_cosine(double t, double *s, double *c)
 {
     if (__builtin_expect(fabs(t) > 0.6, 0)) {
@@ -25,10 +26,10 @@ INLINE double exponential(double t)
     const double b = 0.5 + t * (1.0 / 6.0), c = 1.0 / 24.0 + t * (1.0 / 120.0), d = 1.0 / 720.0 + t * (1.0 / 5040.0);
     const double e = 1.0 / 40320.0 + t * (1.0 / 362880.0), f = 1.0 / 3628800.0 + t * (1.0 / 39916800.0);
     const double rest = t4 * (c + t2 * d) + t8 * (e + t2 * f + t4 * (1.0 / 479001600.0));
-    return 1.0 + (t + (t2 * b + rest)); /* 1 is added last, for the sake of rounding */
+    return 1.0 + (t + (t2 * b + rest)); /* 1 is added last, so that rounding errors are small */
 }
 
-/* Turn (a, b) by the angle with this sine and cosine, from b to a. */
+/* Rotate (a, b) by the angle with the sine s and the cosine c, in the direction from b to a. */
 INLINE void turn(double *a, double *b, double s, double c)
 {
     const double turned = c * *a + s * *b;

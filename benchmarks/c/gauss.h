@@ -1,5 +1,5 @@
-/* Gauss collocation, solved by fixed-point iteration to round-off; one stage is the implicit midpoint rule. The first
-   guess extrapolates the collocation polynomial of the previous step, x is summed with compensation. */
+/* Gauss collocation, solved by fixed-point iteration to round-off; with one stage it is the implicit midpoint rule. The
+   iteration starts from the collocation polynomial of the previous step, extrapolated. x is a compensated sum. */
 static struct {
     int started, failed;
     long evaluations;

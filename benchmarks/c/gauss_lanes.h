@@ -1,14 +1,15 @@
-/* Gauss collocation of order 2 STAGES with the stages side by side in the lanes of vectors, solved by fixed-point sweeps
-   over all stages at once. With 8 stages this is IRKGL16 (Antonana, Makazaga, Murua, arXiv 2511.03655).
+/* Gauss collocation of order 2 STAGES, solved by fixed-point sweeps over all stages at once, one stage in each SIMD
+   lane. With 8 stages this is IRKGL16 (Antonana, Makazaga, Murua, arXiv 2511.03655).
 
-   The unknowns are L_j = h b_j f(Z_j), and Z_i = x + sum_j mu_ij L_j with mu_ij = a_ij / b_j. In floating point, too,
-   mu_ij + mu_ji = 1 holds exactly: with rounded a_ij quadratic invariants drift in proportion to the time. */
+   The unknowns are L_j = h b_j f(Z_j), where the stages are Z_i = x + sum_j mu_ij L_j with mu_ij = a_ij / b_j. The
+   rounded mu_ij satisfy mu_ij + mu_ji = 1 exactly; otherwise quadratic invariants would drift in proportion to the
+   time. */
 #ifndef MEASURED
-#define MEASURED DIM /* coordinates whose size is that of the state: all but a time that grows */
+#define MEASURED DIM /* number of coordinates that count in the size of the state; a time as last coordinate does not */
 #endif
 enum { PACKS = (STAGES + WIDTH - 1) / WIDTH, SLOTS = PACKS * WIDTH, HISTORY = 2, MOST_SWEEPS = 100 };
 
-/* The first guess of the L_j is a linear combination of those of the last HISTORY steps, chosen by `set_predictor`. */
+/* Weights by which the L_j are predicted from the L_j of the last HISTORY steps; `set_predictor` sets them. */
 static double predictor[HISTORY][STAGES][STAGES];
 
 void set_predictor(const double *weights)
@@ -17,15 +18,15 @@ void set_predictor(const double *weights)
 }
 
 static struct {
-    double h;                                     /* that the tables below are for; 0: not made yet */
+    double h;                                     /* step size of the tables below; 0 before they are computed */
     real weight[PACKS];                           /* h b_j */
-    real mu[STAGES][PACKS];                       /* column j: what L_j adds to all stages */
-    real guess[HISTORY][STAGES][PACKS];           /* mu after the predictor: from old L_j to guessed Z_i */
-    double flow[HISTORY][DIM][SLOTS] __attribute__((aligned(64))); /* L_j, a ring of the last steps */
-    int newest, steps;                            /* place of the last step in the ring; steps in it */
-    int expected;                                 /* sweeps before the change is looked at for the first time */
-    double rate;                                  /* by which a sweep shrinks the error */
-    double carry[DIM];                            /* low part of x */
+    real mu[STAGES][PACKS];                       /* column j: factors of L_j in all stages Z_i */
+    real guess[HISTORY][STAGES][PACKS];           /* mu times the predictor: factors of past L_j in predicted Z_i */
+    double flow[HISTORY][DIM][SLOTS] __attribute__((aligned(64))); /* L_j of the last steps, a ring buffer */
+    int newest, steps;                            /* index of the last step in the buffer; number of steps in it */
+    int expected;                                 /* number of the first sweep whose change is computed */
+    double rate;                                  /* estimated factor by which a sweep reduces the error */
+    double carry[DIM];                            /* compensation term of x */
     long evaluations;
     int failed;
 } gauss;
@@ -102,7 +103,8 @@ INLINE void store(real fresh[PACKS][DIM], double flow[DIM][SLOTS])
         for (int i = 0; i < DIM; ++i) memcpy(&flow[i][p * WIDTH], &fresh[p][i], sizeof(real));
 }
 
-/* The change by the last sweep, that of the stages of one lane together; the largest of all lanes. */
+/* The largest norm of the change of L_j by the last sweep, of all lanes. If there are two vectors of stages, a lane has
+   two stages, which count together. */
 INLINE double change_of(real fresh[PACKS][DIM], const double flow[DIM][SLOTS])
 {
     real squares = { 0.0 };
@@ -119,8 +121,9 @@ INLINE double change_of(real fresh[PACKS][DIM], const double flow[DIM][SLOTS])
     return sqrt(most);
 }
 
-/* Sweeps until the error left is beyond the last bit of `size`. The change is looked at from the sweep on that the step
-   before leads to expect; a step that needs fewer lets the next one look a sweep earlier. */
+/* Make sweeps until the error is below the last bit of `size`; return their number, or 0 if they do not converge. To
+   save time, the change is computed only from the sweep `expected` on, which follows from the number of sweeps of the
+   step before; if a step converges at its first test, the next step tests one sweep earlier. */
 INLINE int solve(const double x[DIM], double flow[DIM][SLOTS], double size)
 {
     real Z[PACKS][DIM], fresh[PACKS][DIM];
@@ -142,7 +145,8 @@ INLINE int solve(const double x[DIM], double flow[DIM][SLOTS], double size)
             before = change;
         }
         store(fresh, flow);
-        __asm__ volatile("" : : "r"(flow) : "memory"); /* single numbers are read next, not vectors from registers */
+        /* The next sweep reads the stored numbers one by one: keep the compiler from extracting them from registers. */
+        __asm__ volatile("" : : "r"(flow) : "memory");
     }
     return 0;
 }

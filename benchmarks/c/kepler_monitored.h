@@ -1,5 +1,5 @@
-/* The satellite of kepler.h in another time, dt = g dtau with g = r^(3/2), by K = g (H - ENERGY): its orbits with K = 0 are
-   those of H. The last coordinate is t. */
+/* The satellite of kepler.h with the time tau, where dt = g dtau and g = r^(3/2). The Hamiltonian is K = g (H -
+   ENERGY), whose orbits with K = 0 are the orbits of H. The last coordinate is t. */
 enum { DIM = 5 };
 #define MEASURED 4
 

@@ -1,5 +1,5 @@
-/* Right-hand sides of rings of N sites, between the halos. */
-#if defined(XXZ) /* S' = S x dH/dS with H = sum x x' + y y' + DELTA z z', in phigen's sign of the bracket of so(3) */
+/* Vector fields of rings of N sites; arrays have 8 halo entries before the first site and after the last. */
+#if defined(XXZ) /* S' = dH/dS x S with H = sum of x x' + y y' + DELTA z z' over neighbours: so(3), sign plus */
 enum { FIELDS = 3 };
 INLINE void field(double (*restrict s)[N + 16], double (*restrict out)[N + 16])
 {

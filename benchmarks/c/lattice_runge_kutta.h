@@ -1,5 +1,5 @@
-/* Explicit Runge-Kutta methods of fixed step on a ring of N sites with FIELDS fields, as one would write them: each
-   field is an array with a copy of the other end on both sides, and each stage one loop over the sites that vectorises. */
+/* Explicit Runge-Kutta methods of fixed step on a ring of N sites with FIELDS fields, in plain C. Each field is an
+   array with a halo, a copy of the opposite end, on both sides. Each stage is one vectorised loop over the sites. */
 enum { HALO = 8, WIDTH = N + 2 * HALO };
 typedef double state[FIELDS][WIDTH];
 
@@ -13,7 +13,7 @@ static void ends(state y)
     }
 }
 
-/* `to` becomes x + h sum w[j] k[j]; the weights are constants, so that the loop over j unrolls and zeros vanish. */
+/* Set `to` to x + h sum_j w[j] stages[j]. The weights are constants, so the loop over j unrolls and zeros vanish. */
 INLINE void sum_up(state to, int count, const double *w, double h)
 {
     for (int f = 0; f < FIELDS; ++f)

@@ -1,5 +1,6 @@
-/* Spins on a ring or a cube with exchange, by splitting by hand: H = Hx + Hy + Hz, where in the flow of Hx each spin
-   turns about x by an angle that the x of its neighbours give, which stay. Rows have a halo, so that they vectorise. */
+/* Hand-written splitting of spins with exchange on a ring or a cube: H = Hx + Hy + Hz. The flow of Hx rotates each spin
+   about the x axis, by an angle proportional to the sum of x over its neighbours; all x are constant. Rows have a halo,
+   so that loops vectorise. */
 #if AXES == 1
 enum { ROWS = 1 };
 #else
@@ -8,7 +9,7 @@ enum { ROWS = N * N };
 enum { HALO = 8, WIDTH = N + 2 * HALO };
 static double spins[3][ROWS][WIDTH];
 
-/* Sine and cosine by Taylor's polynomials: right to round-off for angles up to about one half. */
+/* Rotate (u, v). Sine and cosine are Taylor polynomials, accurate to round-off for angles up to about one half. */
 INLINE void turn(double angle, double *restrict u, double *restrict v)
 {
     const double z = angle * angle;
@@ -43,13 +44,14 @@ static void flow(double (*restrict f)[WIDTH], double (*restrict u)[WIDTH], doubl
 
 enum { X, Y, Z };
 
-/* The flow of the part of H along one axis. */
+/* Apply the flow of the part of H that belongs to an axis, over a time. */
 static void part(int axis, double time)
 {
     flow(spins[axis], spins[(axis + 1) % 3], spins[(axis + 2) % 3], axis == Z ? DELTA * time : time);
 }
 
-/* One symmetric step of order 2, of which the first flow was made in full by the step before (`joined`). */
+/* Make one symmetric step of order 2. If `joined`, the step before has made its first flow. The last flow is merged
+   with the first flow of the next step, whose size is `next`; 0 if there is none. */
 static void strang(double h, int joined, double next)
 {
     if (!joined) part(FIRST, 0.5 * h);
@@ -64,7 +66,7 @@ static void splitting2(double h, long steps)
     for (long n = 0; n < steps; ++n) strang(h, n > 0, n + 1 < steps ? h : 0.0);
 }
 
-/* Suzuki's composition of order 4, which is what one writes from memory. */
+/* Suzuki's composition of order 4, a common choice for code written by hand. */
 static void splitting4(double h, long steps)
 {
     const double a = h / (4.0 - cbrt(4.0)), b = h - 4.0 * a, sizes[] = { a, a, b, a, a };

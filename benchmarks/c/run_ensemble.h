@@ -1,4 +1,5 @@
-/* Members side by side in vectors of WIDTH: x[i * members + m]; members is a multiple of WIDTH. */
+/* Integrate an ensemble, WIDTH members at a time, one in each SIMD lane. Coordinate i of member m is x[i * members +
+   m]; `members` is a multiple of WIDTH. */
 int measure_many(int method, double *x, long members, double h, long steps, double *seconds)
 {
     const double began = cpu_time();

@@ -1,4 +1,5 @@
-/* Steps by one of `methods` on the lattice whose rows are row(field, r), from and to y[field][site]; CPU seconds. */
+/* Make steps of one of `methods`, from the state y[field][site], which is replaced; return the CPU seconds. The methods
+   work on the arrays row(field, r). */
 double bench_lattice(int method, double *y, double h, long steps)
 {
     for (int f = 0; f < FIELDS; ++f)

@@ -1,5 +1,5 @@
-/* Integrate by one of `methods`: chunks times chunk steps, the state after each chunk to out. Gives up after `limit`
-   seconds. `seconds` is the CPU time; a solver's start-up is part of it. */
+/* Integrate by one of `methods`, in `chunks` chunks of `chunk` steps each; the state after each chunk is written to
+   out. The run ends early after `limit` seconds. `seconds` is the CPU time, including the start of the solver. */
 int measure_run(int method, const double *start, double h, long chunk, long chunks, double limit, double *out,
               double *seconds, double *evaluations)
 {

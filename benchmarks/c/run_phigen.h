@@ -1,4 +1,4 @@
-/* The same for phigen's solver, named `bench`. */
+/* Integrate by phigen's solver `bench`, with the arguments of measure_run in run_peers.h; `method` is not used. */
 int measure_run(int method, const double *start, double h, long chunk, long chunks, double limit, double *out,
               double *seconds, double *evaluations)
 {
@@ -16,7 +16,7 @@ int measure_run(int method, const double *start, double h, long chunk, long chun
     return status;
 }
 
-/* The ensemble function of the solver, timed. */
+/* Integrate an ensemble by phigen's solver, and measure the CPU seconds. */
 int measure_many(int method, double *x, long members, double h, long steps, double *seconds)
 {
     (void)method;

@@ -1,6 +1,6 @@
 /* Explicit Runge-Kutta methods of fixed step. With constant tables all loops unroll and zero entries vanish. */
 
-/* What x has lost to rounding, where it is summed with compensation: that costs DOP853 up to a fifth of its time. */
+/* Compensation term of x for compensated sums, which cost DOP853 up to a fifth of its time. */
 static real carry[DIM];
 
 INLINE void runge_kutta(int stages, const double *a, const double *b, int compensated, real x[DIM], double h)

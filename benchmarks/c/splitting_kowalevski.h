@@ -1,4 +1,4 @@
-/* Kicks by gravity, and rotations of P and G about the axes of the body. The moments 1 and 2 are equal. */
+/* Splitting of the Kowalevski top: kicks of P by gravity, and rotations of P and G about the axes of the body. */
 INLINE void kick(double x[6], double h)
 {
     x[1] += h * x[5];

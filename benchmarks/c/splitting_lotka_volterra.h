@@ -1,4 +1,5 @@
-/* The flow of one summand x_i - log x_i leaves x_i alone and multiplies the others. */
+/* Splitting of H into its summands x_i - log x_i. The flow of a summand leaves x_i constant, and multiplies the other
+   coordinates by exponentials. */
 INLINE void flow1(double x[3], double h)
 {
     const double t = h * (x[0] - 1.0);

@@ -1,4 +1,4 @@
-/* H = p^2/2 + V: the leapfrog method. V is not needed until somebody looks: V + cos(theta) stays. */
+/* Leapfrog method for H = p^2/2 + V with the Casimir V + cos(theta). V is computed from theta only at the end of a call. */
 INLINE void kick(double x[3], double h)
 {
     x[1] -= h * sin(x[0]);

@@ -1,4 +1,5 @@
-/* H minus |x|^2/2 times the middle inverse moment, a Casimir, is a sum of two squares: two kinds of rotations. */
+/* Splitting of the free rigid body. H minus the Casimir |x|^2/2 times the second inverse moment of inertia has the flow
+   of H, and is a sum of two squares, whose flows are rotations. */
 INLINE void first(double x[3], double h)
 {
     double s, c;

@@ -1,5 +1,6 @@
-/* DOP853 with the step control of its authors (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I): the
-   estimate of the error mixes orders 5 and 3, steps shrink to a third and grow sixfold at most. */
+/* DOP853 with the step size control of its authors (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations
+   I). The error estimate combines estimates of order 5 and 3; a step size shrinks at most to a third, and grows at most
+   sixfold. */
 typedef struct {
     double slope[DIM], h;
     long steps, evaluations;
@@ -13,7 +14,7 @@ static void control_start(controlled *c, const double x[DIM], double tolerance)
     c->evaluations = 1;
 }
 
-/* The local error of a step over the tolerance, relative and absolute alike. */
+/* The local error of a step divided by the tolerance, which is both the relative and the absolute tolerance. */
 INLINE double error_of(const double (*k)[DIM], const double x[DIM], const double y[DIM], double h, double tolerance)
 {
     double five = 0.0, three = 0.0;
@@ -31,7 +32,7 @@ INLINE double error_of(const double (*k)[DIM], const double x[DIM], const double
     return five > 0.0 ? h * five / sqrt((five + 0.01 * three) * DIM) : 0.0;
 }
 
-/* One step that is accepted, at most to the time `end`; the new time. */
+/* Make one accepted step, at most up to the time `end`; return the new time, or NaN if steps become too small. */
 static double control_step(controlled *c, double x[DIM], double t, double end, double tolerance)
 {
     for (int rejected = 0;; rejected = 1) {
@@ -51,7 +52,7 @@ static double control_step(controlled *c, double x[DIM], double t, double end, d
         const double error = error_of(k, x, y, h, tolerance);
         const double factor = error > 0.0 ? 0.9 * pow(error, -0.125) : 6.0;
         c->evaluations += 11;
-        if (!(error < 1.0)) { /* also where it is not a number */
+        if (!(error < 1.0)) { /* also if the error is not a number */
             c->h = h * (factor > 1.0 / 3.0 ? factor : 1.0 / 3.0);
             if (!(c->h > 1e-14 * (1.0 + t))) return NAN;
             continue;
@@ -65,7 +66,8 @@ static double control_step(controlled *c, double x[DIM], double t, double end, d
     }
 }
 
-/* As measure_run, with a tolerance in the place of the step and the time of a chunk in that of its steps. */
+/* Integrate as measure_run of run_peers.h does, but with a tolerance instead of a step size, and with the time `span`
+   of a chunk instead of a number of steps. */
 int measure_controlled(const double *start, double tolerance, double span, long chunks, double limit, double *out,
                        double *seconds, double *evaluations, double *steps)
 {
@@ -89,7 +91,7 @@ int measure_controlled(const double *start, double tolerance, double span, long 
     return status;
 }
 
-/* The states after all steps to the time `end`, `most` at most; their number. */
+/* Write the states after all steps up to the time `end`, at most `most` states; return their number. */
 long follow_controlled(const double *start, double tolerance, double end, long most, double *out)
 {
     double x[DIM], t = 0.0;

@@ -1,5 +1,5 @@
-/* Sine of each lane, correct to the last bit or two for arguments up to 10^5: the nearest multiple n pi is subtracted
-   in three parts, and what is left, of at most pi/2, goes into Taylor's polynomial of degree 21. */
+/* Sine of each lane, with an error of one or two units in the last place for arguments up to 10^5. The nearest multiple
+   of pi is subtracted in three parts; a Taylor polynomial of degree 21 gives the sine of the remainder. */
 INLINE lanes sine(lanes x)
 {
     const lanes shift = (lanes){ 0.0 } + 0x1.8p52, shifted = x * 0x1.45f306dc9c883p-2 + shift, n = shifted - shift;

@@ -1,4 +1,5 @@
-/* Vectors for STAGES stages: one of eight doubles where the processor has such registers, else two of four. */
+/* SIMD vectors for STAGES stages: one vector, or two vectors of four doubles if the processor has no registers of
+   eight. */
 #if STAGES <= 2
 enum { WIDTH = 2 };
 #elif STAGES <= 4 || !defined(__AVX512F__)
