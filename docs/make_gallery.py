@@ -49,26 +49,29 @@ THUMBNAIL = 190
 LONGEST = 160
 HEAD = """# Gallery
 
-The systems that phigen ships; each picture is a link to its system. `phigen run NAME` integrates a system, `phigen show
-NAME` prints its formulas, and `cp "$(phigen list --path NAME)" .` copies its spec, as a start for your own.
+phigen ships the systems of this page. Each picture links to the entry of its system below. `phigen run NAME` integrates
+a system, `phigen show NAME` prints its formulas, and `cp "$(phigen list --path NAME)" .` copies its spec, as a start
+for your own.
 """
 SYSTEMS = """
 ## Systems
 
-Each figure shows one run: the longest run of the spec. A dot marks the initial state. A system of three coordinates
-also has the level surface of its first Casimir. The tables list the largest errors over the whole run, for phigen and
-for the classical method that the spec names, with the same step size. Errors are relative to the initial value, unless
-that is nearly 0. "H, balance" is the error of the energy balance of a system with time, forces or damping, that is, of
-H minus the work done. "H, change" is the largest change of H in a run with noise.
+Each figure shows one run: the run of the spec with the most steps. A dot marks the initial state. If a system has three
+coordinates, the figure also shows the level surface of its first Casimir. The tables list the largest errors over the
+whole run. The first column is for phigen. If there is a second column, it is for the classical method that the spec
+names, with the same step size. Errors are relative to the initial value, unless the initial value is nearly 0. "H,
+balance" is the error of the energy balance of a system with time, forces or damping: the error of H minus the work
+done. "H, change" is the largest change of H in a run with noise.
 """
 LATTICES = """
 
 ## Lattices
 
-Systems of many identical sites, of any size ([lattices.md](lattices.md)). Each figure shows one run: its fields over
-space and time, or at selected times, and the errors of its conserved quantities. Errors of energy and invariants are
-relative to the initial value or, if that is nearly 0, to the sum of the magnitudes of the terms at all sites. Errors of
-Casimirs at sites are those of the site with the largest error.
+The entries of this section are systems of many identical sites, of any size ([lattices.md](lattices.md)). Each figure
+shows one run: its fields over space and time, or at selected times, and the errors of its conserved quantities. Errors
+of energy and invariants are relative to the initial value. If the initial value is nearly 0, they are relative to the
+sum of the magnitudes of the terms at all sites. For Casimirs at sites, the error is that of the site with the largest
+error.
 """
 
 
