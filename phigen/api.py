@@ -342,4 +342,4 @@ _HINT = "lower-case letters, digits and _, starting with a letter, at most 31"
 
 
 def _malformed(name: str, hint: str) -> tuple[str, str]:
-    return f"the name {name!r} cannot stand in generated code", hint
+    return f"the name {name!r} cannot be used in generated code", hint

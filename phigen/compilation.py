@@ -87,13 +87,13 @@ class _Compiled(ABC):
 
     @property
     def kind(self) -> str:
-        """The kind of the bi-realisation, or the name of the scheme if steps have no bi-realisation."""
+        """The kind of the bi-realisation (the maps α, β), or the name of the scheme if steps have no bi-realisation."""
         return self.scheme_name
 
     @property
     def birealisation(self) -> str | None:
-        """The kind of the bi-realisation, chosen by the compiler or by the spec; None if the scheme uses no
-        bi-realisation."""
+        """The kind of the bi-realisation (the maps α, β) that the compiler or the spec chose; None for schemes without
+        one."""
         return None
 
     @property
@@ -198,7 +198,8 @@ class _Compiled(ABC):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class _CompiledSystem(_Compiled, ABC):
-    """Compilation of a system with a fixed number of coordinates."""
+    """Base class of the compilations of ordinary systems, whose number of coordinates is fixed, unlike that of
+    lattices."""
 
     system: System
     gauge: Gauge = field(default_factory=Gauge)
@@ -262,7 +263,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def label(self) -> str:
-        """The name of the bi-realisation."""
+        """The method in a few words for users: the name of the bi-realisation, the maps α and β."""
         return self.realisation.label
 
     @property
@@ -286,17 +287,18 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def kind(self) -> str:
-        """The kind of the bi-realisation, such as ``constant``."""
+        """The kind of the bi-realisation (the maps α, β), such as ``constant``."""
         return self.realisation.kind
 
     @property
     def birealisation(self) -> str | None:
-        """The kind of the bi-realisation, such as ``constant``."""
+        """The kind of the bi-realisation (the maps α, β), such as ``constant``."""
         return self.realisation.kind
 
     @property
     def reasons(self) -> Mapping[str, str]:
-        """The reasons for the scheme and for the bi-realisation."""
+        """The reasons for the choices of the scheme and of the bi-realisation (the maps α, β), by the label of the
+        choice."""
         reason, automatic = self.realisation.explanation, f"auto picked {self.realisation.kind}, "
         if reason.startswith(automatic):
             reason = "chosen by phigen, " + reason.removeprefix(automatic)
@@ -482,12 +484,12 @@ class CompiledLattice(_Compiled):
 
     @property
     def kind(self) -> str:
-        """The kind of the bi-realisation, or the name of the scheme if the scheme uses no bi-realisation."""
+        """The kind of the bi-realisation (the maps α, β), or the name of the scheme if steps have no bi-realisation."""
         return self.sweeps.kind
 
     @property
     def birealisation(self) -> str | None:
-        """The kind of the bi-realisation of one site; None for a splitting."""
+        """The kind of the bi-realisation (the maps α, β) of one site; None for a splitting."""
         return self.sweeps.site_kind
 
     @property

@@ -218,7 +218,8 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
 
 
 def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None) -> Compilation:
-    """Compile a system by the scheme of its spec; ``early_realisation`` is the result of `_realised_early`."""
+    """Compile a system by the scheme of its spec; ``early_realisation`` is its bi-realisation (α, β), if already
+    known."""
     if early_realisation:
         return _compile_series(spec, source, clock, early_realisation)
     return SCHEME_COMPILERS[spec.scheme](spec, source, clock)
@@ -227,7 +228,7 @@ def _compiled(spec: Spec, source: System, clock: _Clock, early_realisation: BiRe
 def _compile_series(
     spec: Spec, source: System, clock: _Clock, early_realisation: BiRealisation | None = None
 ) -> CompiledSeries:
-    """Compile a system by the scheme series: its bi-realisation, the gauge, the generating function, and the program.
+    """Compile a system by the scheme series: bi-realisation, Casimirs to subtract from H, generating function, program.
 
     ``early_realisation`` is the bi-realisation, if `_realised_early` has found it already.
     """

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, cast
 
-#: Name of a display → the module and the function that make this display.
+#: Name of a display → the module and the function that make it: formulas, a table or a figure of an object.
 DISPLAYS = {
     "formulas of a system": ("phigen.notation.notebook", "system_latex"),
     "page of a system": ("phigen.notation.notebook", "system_html"),
@@ -26,6 +26,9 @@ DISPLAYS = {
 
 
 def display(name: str) -> Callable[..., Any]:
-    """Return the function that makes a display. The function raises `MissingPackageError` if a package is missing."""
+    """Return the function with this name in `DISPLAYS`, which makes formulas, a table or a figure of an object.
+
+    The function raises `MissingPackageError` if a package that it needs is missing.
+    """
     module, function = DISPLAYS[name]
     return cast(Callable[..., Any], getattr(import_module(module), function))

@@ -41,10 +41,10 @@ _TERMINATED = "A termination event occurred."
 class OdeResult:
     """Result of `solve_ivp`, with the fields of SciPy's result.
 
-    ``t`` (points,), ``y`` (DIM, points); ``sol`` is a function of times, or None; ``t_events`` and ``y_events`` have an
-    array for each event, or are None. ``status`` is 0 at the end of the interval, 1 at an event, −1 after a failure.
-    ``h`` is the step and ``trajectory`` the integrated trajectory; its times begin at 0 if the Hamiltonian does not
-    depend on the time.
+    ``t`` (points,) are the times and ``y`` (DIM, points) the states. ``sol`` is a function of times, or None.
+    ``t_events`` and ``y_events`` have an array for each event, or are None. ``status`` is 0 at the end of the interval,
+    1 at an event, −1 after a failure. ``h`` is the step size. ``trajectory`` is the integrated trajectory; its times
+    begin at 0 if the Hamiltonian does not depend on the time.
     """
 
     t: Floats

@@ -45,7 +45,8 @@ STRETCH, FAR_STEPS = 32, 64
 #: copies of the solver.
 _WHOLE_ONLY = ("until", "every", "at", "stop", "section", "retry")
 
-#: An array over the whole lattice, or a function f(first, end) that returns the planes first … end − 1.
+#: An array over the whole lattice, or a function f(first, end) that returns its planes first … end − 1. A plane is the
+#: set of all sites with one index of the first axis.
 Given = Any
 
 
@@ -113,8 +114,9 @@ class DistributedLattice:
         """Integrate as `LatticeSolver.integrate`; all processes call this method with the same arguments.
 
         ``x0`` is an array (coordinates, *sizes), or a function x0(first, end) that returns the planes first … end − 1,
-        of shape (coordinates, end − first, …). A function needs ``sizes``. Parameters at sites are arrays or functions
-        too. Frames go to ``output``, a ``.npy`` file that all processes write.
+        of shape (coordinates, end − first, …), where a plane is the set of all sites with one index of the first axis.
+        A function needs ``sizes``. Parameters at sites are arrays or such functions. Frames are written to ``output``,
+        a ``.npy`` file that all processes share.
 
         ``checkpoints`` is a path at which the state is stored with every frame. If a run is interrupted, the same call
         continues it, on any number of processes; with ``resume=False`` the run starts again, unless files of an
@@ -400,12 +402,11 @@ class _Domain:
         self.dirty = (1 << self.fields) - 1
 
     def state(self) -> Floats:
-        """The planes of this process, (coordinates, planes, …)."""
+        """The state on the planes of this process, (coordinates, planes, …)."""
         return np.array([self.session.planes(field, *self.own) for field in range(self.fields)])
 
     def energy(self) -> float:
-        """Return H of the whole lattice, on all processes. The sums over single planes are added with a single
-        rounding."""
+        """Return H of the whole lattice, on all processes. The sums over the single planes are added by `math.fsum`."""
         self._received(self._request_halos(self.dirty))
         self.dirty = 0
         density = self.session.density()[self.own[0] : self.own[1]]
@@ -426,9 +427,9 @@ class _Domain:
         self._set_solver_time(steps)
 
     def saved_state(self) -> Floats:
-        """Return the planes of this process in the last state from which further steps continue.
+        """Return the planes of this process in the stored state, from which further steps continue.
 
-        The last flow of its last step may be missing, if ``open`` is true.
+        If ``open`` is true, this state lacks the last flow of its last step.
         """
         return np.array([values[self.own[0] : self.own[1]] for values in self.saved])
 

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 class Target:
     """Language in which phigen writes solvers, or a device that runs solvers.
 
-    ``emitter`` is the module with the function ``emit(program, command)``, which returns file names and contents; if
-    ``single_file`` is set, the function takes this argument too. ``loader`` is the module with the function
-    ``load(files, interface)``, which returns a back end; it is empty if Python cannot run the files. ``suffixes`` has
-    the suffixes of all files, the suffix of the main file first. ``default`` marks the targets of specs that name none.
-    ``compiled`` says that a compiler is needed.
+    ``emitter`` is the module with the function ``emit(program, command)``, which returns the files (name → text); if
+    ``single_file`` is set, this function also takes the argument ``single_file``. ``loader`` is the module with the
+    function ``load(files, interface)``, which returns a loaded solver; it is empty if Python cannot run the files.
+    ``suffixes`` has the suffixes of all files, the suffix of the main file first. ``default`` marks the targets of
+    specs that name none. ``compiled`` says that a compiler is needed.
 
-    ``device`` marks a device, such as OpenCL. It runs the files of the target ``device``, together with the files of a
-    target for the host.
+    ``device`` marks a device, such as OpenCL. The device runs the files of the target ``device``, together with the
+    files of a target for the host.
     """
 
     name: str

@@ -1,4 +1,5 @@
-"""Files of a binding, printed from the templates in ``templates/bindings``."""
+"""Files of a binding, a module in another language that calls the generated C; templates are in
+``templates/bindings``."""
 
 from __future__ import annotations
 

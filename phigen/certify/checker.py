@@ -69,26 +69,26 @@ def demand(condition: bool, message: str) -> None:
 
 
 def mag(x: Ball) -> Ball:
-    """Return an upper bound for the absolute values in a ball, as a number without radius.
+    """Return an upper bound for the absolute values in an interval, as an exact number.
 
-    Raises `RefusedError` if the ball is not bounded.
+    Raises `RefusedError` if the interval is not bounded.
     """
     demand(x.is_finite(), "a value is not bounded")
     return x.abs_upper()
 
 
 def square(x: Ball) -> Ball:
-    """Return a ball that contains the squares of all numbers in a ball, but no negative numbers."""
+    """Return an interval that contains the squares of all numbers in an interval, but no negative numbers."""
     return (x.abs_lower() * x.abs_lower()).union(x.abs_upper() * x.abs_upper())
 
 
 def top(values: Iterable[Ball]) -> Ball:
-    """Return a ball that contains the maximum of any numbers taken from the given balls."""
+    """Return an interval that contains the maximum of any numbers taken from the given intervals."""
     return reduce(arb.max, values)
 
 
 def middle(x: Ball) -> Ball:
-    """Return the midpoint of a ball."""
+    """Return the midpoint of an interval, as an exact number."""
     return arb(x.mid())
 
 
@@ -98,7 +98,7 @@ def below(a: Matrix, b: Matrix) -> bool:
 
 
 def interval(ends: Sequence[float]) -> Ball:
-    """Return a ball that contains the interval between two doubles."""
+    """Return the interval (a ball of flint) between two doubles."""
     return arb(ends[0]).union(arb(ends[1]))
 
 
@@ -121,8 +121,8 @@ def identity(n: int) -> Matrix:
 class Evaluation:
     """Evaluation of a list of operations in interval arithmetic, with bounds for the rounding error of each operation.
 
-    Each value is a ball that contains the exact and the computed result. Derivatives of each operation by its operands
-    are stored for `outputs`. ``inputs`` maps names of input operations to the balls that they read.
+    Each value is an interval that contains the exact and the computed result. Derivatives of each operation by its
+    operands are stored for `outputs`. ``inputs`` maps names of input operations to the intervals that they read.
     """
 
     def __init__(self, c: Any, operations: Any, inputs: Mapping[str, Any], exact: bool = False) -> None:
@@ -164,7 +164,8 @@ class Evaluation:
             v.append(x if exact else x + BALL * error)
 
     def outputs(self, indices: Sequence[int], by: Mapping[str, int]) -> tuple[Matrix, ...]:
-        """Return the values of some operations, bounds for their rounding errors, and Jacobians, as matrices of balls.
+        """Return the values of some operations, bounds for their rounding errors, and Jacobians, as matrices of
+        intervals.
 
         The error bounds use the mean value theorem. ``by`` names the inputs by which Jacobians are computed, with their
         sizes.
@@ -209,7 +210,7 @@ def polynomial(c: Any, series: Any, s: Ball) -> tuple[Ball, Ball, Ball]:
 
 
 def carries(c: Any, X: Iterable[Ball]) -> list[Ball]:
-    """Return upper bounds for the compensation terms of the coordinates, for states in the balls X."""
+    """Return upper bounds for the compensation terms of the coordinates, for states in the intervals X."""
     return [c["carry"] * U * mag(x) for x in X]
 
 
@@ -237,10 +238,10 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
 
 
 def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
-    """Return balls for the outputs of a stage that its entry ``of`` lists, with their rounding errors.
+    """Return intervals that contain some outputs of a stage with their rounding errors, by the mean value theorem.
 
-    They are computed by the mean value theorem about the midpoints of X and of ``box``. For small boxes these balls are
-    narrower than those of `run_of`.
+    ``of`` is the key of the stage that lists these outputs. The centre of the expansion are the midpoints of X and of
+    ``box``. For small boxes the intervals are narrower than those of `run_of`.
     """
     _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
     x, u = ([arb(v.mid()) for v in values] for values in (X, box))
@@ -314,7 +315,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     base = column(x + BALL * r for x, r in zip(X, carries(c, X), strict=True)) if based else column([ZERO] * m)
     K = centre - C * (centre - base + at) + (identity(m) - C * A) * (column(box) - centre)
     away = each(mag, centred(c, stage, X, T, leaf, box, run, "away")) + (2 * c["carry"] * U + arb(2) ** -30) * Y
-    demand(below(away, reach), "a start is out of reach")
+    demand(below(away, reach), "the first iterate may be out of reach of the solution")
     beyond = reach + each(mag, C) * d_error + high * stage.get("difference", 0)
     inside = zip(box, K.entries(), beyond.entries(), strict=True)
     demand(all(v.contains_interior(k + BALL * r) for v, k, r in inside), KRAWCZYK)
@@ -326,12 +327,13 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     noise = 2 * (residual_error(reach) + A_size * Y * U * solves)
     q, shaken, share = stalling(stage, each(mag, identity(m) - A * M.inv()), noise, low, high)
     e, rest = column([ZERO] * m), column([ZERO] * m)
-    for stop in stage["stops"]:  # limits for a correction, for the last one, for their ratio
+    # Each rule that ends the iteration limits a correction ("now"), the one before, or the ratio of both ("part").
+    for stop in stage["stops"]:
         errors = [worst_of(share * stop["now"] / stop.get("rate", 1))] if "now" in stop else []
         before = [share * stop["before"]] if "before" in stop else []
         before += [share * shaken / (stop["part"] - q)] if q < arb(stop.get("part", 0)) else []
         errors += [missed(worst_of(v)) + U * Y * solves for v in before]
-        demand(bool(errors), "a rule to stop bounds nothing")
+        demand(bool(errors), "a rule that ends the iteration bounds no error")
         e = each(arb.max, e, reduce(lambda a, b: each(arb.min, a, b), errors))
     rest, small, x_u = missed(e), column([ZERO] * n), A.inv() * (d_x - based * identity(m) if based else d_x)
     if stage["gain"]:
@@ -345,10 +347,11 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
 
 def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matrix) -> tuple[Ball, Ball, Ball]:
-    """Return contraction rate and noise of the norms that the C computes for corrections, and a factor for these norms.
+    """Return how corrections shrink in the norm of the C: the contraction rate, the noise of rounding, a factor of the
+    norm.
 
-    ``factor`` bounds one correction by the correction before. The norm of the C is the root mean square over the stages
-    of a Gauss method, and the maximum for other methods.
+    ``factor`` bounds one correction by the correction before. The norm is the root mean square over the stages of a
+    Gauss method, and the maximum for other methods.
     """
     m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
     scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]
@@ -362,7 +365,7 @@ def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matri
 
 
 def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
-    """Return bounds for the errors of a step from states in X, and balls that contain the states after the step.
+    """Return bounds for the errors of a step from states in X, and intervals that contain the states after the step.
 
     Stages are treated one after another; ``leaf`` has their boxes of unknowns.
     """
@@ -387,14 +390,14 @@ def check(c: Any, domain: Sequence[Sequence[float]], node: Any) -> tuple[int, li
     """
     if "at" in node:
         low, high = [list(d) for d in domain], [list(d) for d in domain]
-        demand(domain[node["axis"]][0] < node["at"] < domain[node["axis"]][1], "a box is divided outside")
+        demand(domain[node["axis"]][0] < node["at"] < domain[node["axis"]][1], "a box is divided outside of itself")
         low[node["axis"]][1] = high[node["axis"]][0] = node["at"]
         (m, a), (n, b) = (check(c, part, below) for part, below in zip((low, high), node["parts"], strict=True))
         return m + n, [max(pair) for pair in zip(a, b, strict=True)]
     *X, T = [interval(d) for d in domain]
     bounds, image = step(c, X, T, node)
     for bound, claim in zip(bounds, c["bound"], strict=True):
-        demand(bound <= arb(claim), f"the bound is {float(bound):.4g} where {claim:.4g} is claimed")
+        demand(bound <= arb(claim), f"the bound is {float(bound):.4g}, but {claim:.4g} is claimed")
     return 1, [max(float(mag(x)), float(mag(y))) for x, y in zip(X, image, strict=True)]
 
 

@@ -164,7 +164,7 @@ class _Search:
             bounds_above = [math.nextafter(float(mag(b)), math.inf) for b in bounds]
             largest = [max(float(mag(x)), float(mag(y))) for x, y in zip(X, image, strict=True)]
             ulps = max(b / math.ulp(x) for b, x in zip(bounds_above, largest, strict=True))
-            demand(ulps <= self.within, f"the bound is {ulps:.3g} ulp where {self.within:g} are asked for")
+            demand(ulps <= self.within, f"the bound is {ulps:.3g} ulp, more than the accepted {self.within:g} ulp")
             self.leaves.append((bounds_above, largest))
             return leaf
         except (RefusedError, ZeroDivisionError, ValueError) as failure:
@@ -193,7 +193,7 @@ def _widest(domain: Box) -> int | None:
 
 
 def _ends(x: Any) -> list[float]:
-    """Return the lower and the upper end of a ball as doubles, rounded outwards."""
+    """Return the lower and the upper end of an interval as doubles, rounded outwards."""
     low, high = math.nextafter(float(x.lower()), -math.inf), math.nextafter(float(x.upper()), math.inf)
     return [low, high]
 

@@ -46,7 +46,7 @@ class ExactMap:
         self._inverses: dict[int, Any] = {}
 
     def __call__(self, x: Numbers, t: float) -> list[Any]:
-        """Return the result of a step from (x, t), as balls of `BITS` bits."""
+        """Return the state after a step from the state x at the time t, in `BITS` bits."""
         with _precise():
             x, t = [arb(v) for v in x], arb(t)
             for number, stage in enumerate(self._c["stages"]):
@@ -71,7 +71,7 @@ class ExactMap:
             u = [arb((v - d).mid()) for v, d in zip(u, delta, strict=True)]
             if all(abs(d.mid()) < SOLVED for d in delta):
                 return u
-        raise RuntimeError(f"the exact map of {self._c['name']} is not found at {[float(v) for v in x]}")
+        raise RuntimeError(f"the equation of the exact map is not solved at {[float(v) for v in x]}")
 
 
 def observed(c: Mapping[str, Any], exact: Mapping[str, Any], library: Any, count: int, seed: int = 0) -> list[float]:

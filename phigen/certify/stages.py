@@ -322,7 +322,10 @@ def _largest(listing: Listing, sizes: Sequence[int]) -> int:
 def _measured(
     facts: Mapping[str, Any], listing: Listing, x: Sequence[int], terms: Sequence[Sequence[int]], orders: Sequence[int]
 ) -> list[list[int]]:
-    """Append, for some orders, the thresholds below which the C neglects a term; return pairs of term and threshold."""
+    """Append operations for the thresholds below which the C neglects terms of a Taylor series, for some ``orders``.
+
+    Returns pairs of indices: a term, and its threshold.
+    """
     starts = [listing.add("abs", i) for i in x]
     least = listing.add("mul", listing.add("exact", facts["least_share"]), listing.sum(starts))
     negligible, pairs = listing.add("exact", facts["negligible"]), []

@@ -61,7 +61,7 @@ def binaries(unit: MockupUnit, platforms: Collection[str] = ()) -> dict[str, byt
     available = compilers()
     unavailable = sorted(set(platforms) - set(available))
     if unavailable:
-        hint = "pip install ziglang compiles for all of them"
+        hint = "pip install ziglang installs a compiler for all platforms"
         raise ToolchainError(f"no compiler for {', '.join(unavailable)}\n  hint: {hint}")
     libraries = {}
     with tempfile.TemporaryDirectory(prefix="phigen-") as scratch:

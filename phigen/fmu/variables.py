@@ -51,7 +51,7 @@ def first_run(spec: Spec) -> Run:
     Raises `SpecError` for lattices, and for a spec without such a run.
     """
     if spec.lattice:
-        hint = "phigen show --expand SIZES prints a small lattice as an ordinary spec, of which there can be an FMU"
+        hint = "phigen show --expand SIZES prints a small lattice as an ordinary spec, which can become an FMU"
         raise SpecError(
             [spec.diagnostic(("lattice",), f"{spec.name} is a lattice, for which there are no FMUs yet", hint)]
         )

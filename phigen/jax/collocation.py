@@ -42,7 +42,7 @@ Carry = tuple[Any, Any, Any]
 
 
 class _Traced(Arrays):
-    """Visitor that evaluates expressions on arrays of JAX."""
+    """Evaluator of symbolic expressions, whose symbols have arrays of JAX as values."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         super().__init__(values, jnp)
@@ -180,8 +180,10 @@ def _stacked(values: Sequence[Any], stages: int | None, dtype: Any) -> Any:
 
 
 def _inverse_mixing(table: Tableau, dtype: Any) -> Any:
-    """Return the transpose of μ⁻¹ for the matrix μ of the method, which converts unknowns at the stages to
-    increments."""
+    """Return (μ⁻¹)ᵀ, where μ is the matrix of weights that gives the unknowns at the stages from the increments.
+
+    It converts predicted unknowns to increments.
+    """
     return jnp.asarray(np.linalg.inv(np.array(table.mixing)).T, dtype)
 
 

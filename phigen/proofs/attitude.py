@@ -159,9 +159,9 @@ def path_statement(system: System, group: Group) -> Statement:
 
 
 def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) -> Iterator[Statement]:
-    """Yield the statements for a splitting: ∇H_k of each part is constant along its flow, and the parts add up to H.
+    """Yield the statements on the attitude for a splitting H = Σ H_k: each ∇H_k is constant along the flow of H_k.
 
-    Casimirs that were subtracted from H are added again.
+    A last statement says that the parts add up to H, with Casimirs that were subtracted from H.
     """
     system, splitting, group = compilation.system, compilation.splitting, attitude.group
     elements = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
@@ -198,8 +198,11 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
 
 
 def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]:
-    """Yield the rates of the coordinates of free rigid bodies along the flows of other terms of a part; all must be
-    0."""
+    """Yield the rates of the coordinates of free rigid bodies along flows of those terms that a part has besides the
+    bodies.
+
+    All rates must be 0.
+    """
     for factor in turning.factors if turning.bodies else ():
         rates = hamiltonian_vector_field(system.poisson, gradient(factor, system.coordinates))
         rate_of = dict(zip(system.coordinates, rates, strict=True))

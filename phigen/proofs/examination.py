@@ -96,7 +96,7 @@ def hint_of(spec: Spec, group: str) -> str:
     """
     form = spec.poisson
     if group == DAMPING:
-        return "what adds energy is a force: forces: {covector: …}, or {vector: …}"
+        return "a negative λ adds energy, which forces can do: forces: {covector: …}, or {vector: …}"
     if group != CASIMIRS or not isinstance(form, LieAlgebraForm) or not form.family:
         return ""
     return (

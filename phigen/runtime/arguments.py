@@ -149,7 +149,7 @@ def expect_no_noise(argument: str, interface: Interface) -> None:
     The parts of a step would use other random numbers than the whole step.
     """
     if interface.noise:
-        raise TypeError(f"{argument} is not available with noise: parts of a step are not on the same path")
+        raise TypeError(f"{argument} is not available with noise: a shorter step would draw other random numbers")
 
 
 def times_within(times: ArrayLike, t: Floats) -> Floats:
@@ -172,9 +172,7 @@ def rows_at(t: Floats, x: Floats, requested_times: Floats) -> Floats:
     apart = np.abs(t[nearest] - requested_times)
     if (apart > 1e-9 * np.ptp(t)).any():
         earliest_between = float(requested_times[int(np.argmax(apart))])
-        message = (
-            f"with noise only states that are stored can be asked for: {earliest_between!r} is between two of them"
-        )
+        message = f"with noise only stored states can be returned: the time {earliest_between!r} is between two of them"
         raise ValueError(f"{message}, where the path is not known; stride=1 stores all steps")
     rows: Floats = x[nearest]
     return rows
@@ -317,10 +315,11 @@ def states(x: ArrayLike, argument: str, interface: Interface) -> Floats:
 
 
 def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface, members: int) -> Floats:
-    """Return the initial group elements of all members, (members, interface.element): attitude, then position.
+    """Return the initial attitudes and positions of all members as an array (members, numbers): attitude, then
+    position.
 
-    An argument is one attitude or position for all members, or has a first axis of members. The defaults are the
-    identity and the origin.
+    ``attitude0`` and ``position0`` are single values for all members, or have a first axis of members. The defaults are
+    the identity and the origin.
     """
     if not interface.attitude:
         first(np.eye(1), None, interface)  # raises the `TypeError` that says why this system has no attitude

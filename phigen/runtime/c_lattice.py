@@ -44,8 +44,8 @@ _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "init": (_INT, (_POINTER,) * 6),
 }
 
-#: Signatures of additional functions: if the Hamiltonian depends on the time (grids and pairs, then graphs), and with
-#: noise.
+#: Signatures of additional functions: for an H that depends on the time, ``_IN_TIME`` on grids and pairs and
+#: ``_GRAPH_IN_TIME`` on graphs; for noise, ``_NOISY``.
 _PASSED: dict[str, tuple[Any, tuple[Any, ...]]] = {"passed": (_INT, (_POINTER, _DOUBLE, _SIZE))}
 _IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 4 + (_DOUBLE, _POINTER))}
 _GRAPH_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
@@ -129,8 +129,8 @@ class CLatticeSession:
         self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
         self._observed = len(interface.observables), len(interface.observed_fields)
-        # one copy of the state: before the last flow of a step; with compensation, also the terms of this and the full
-        # state
+        # `saved` returns the state before the last flow of a step and, with compensation, the compensation terms of
+        # this state and of the state after the flow.
         self._saved_states = 3 if interface.compensated else 1
         self._slow_steps = interface.slow_steps
         self._steps_per_call = max(1, _UPDATES_PER_CALL // math.prod(x0.shape[1:]))
@@ -390,7 +390,7 @@ class CLattice:
         if not hasattr(self._c, "stages"):
             raise ValueError(
                 f"{self.interface.name} has no caller-driven stepping: that needs a split lattice on a grid, "
-                "without a seam, compiled with profile fast"
+                "without a boundary seam, compiled with profile fast"
             )
         sweeps = [SweepStage() for _ in range(self._c.stages() + (not self.interface.noise))]
         for k, stage in enumerate(sweeps):

@@ -153,9 +153,9 @@ def _key(files: Mapping[str, str], compiler: Compiler) -> str:
 
 @cache
 def _machine() -> str:
-    """Return the properties of the processor that -march=native depends on.
+    """Return the properties of the processor on which code compiled with -march=native depends.
 
-    They are part of the key, because machines with different processors may share a home folder and its cache.
+    The key of a cache entry contains them, because machines with different processors may share a home folder.
     """
     relevant_keys = ("model name", "flags", "Features", "CPU implementer", "CPU part", "isa")
     try:

@@ -42,7 +42,7 @@ _MOST_NEWTON = 8
 #: A point inside a step is reached by this number of equal smaller steps. The numbers are tried in this order, since a
 #: single step without a predictor may not converge.
 SUBSTEPS = (1, 2, 4, 8)
-#: Absolute tolerance of a fraction of a step: fractions closer than this give the same state.
+#: Absolute tolerance for the fraction of a step at which a zero lies: a smaller difference does not change the state.
 _RESOLUTION = 1e-18
 _ITERATIONS = 100
 #: Direction of a crossing → signs s for which s·g increases through zero as time increases.

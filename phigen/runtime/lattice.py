@@ -998,7 +998,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return ", ".join([str(len(self.coordinates)), *(f"N_{axis}" for axis in self.interface.axes)])
 
     def state(self, x: ArrayLike, argument: str) -> Floats:
-        """Return a copy of a state. Raises `ValueError` for sizes that do not fit, and for non-finite values."""
+        """Return a copy of a state (coordinates, *sizes); ``argument`` is its name in messages.
+
+        Raises `ValueError` for sizes that do not fit the lattice, and for values that are not finite.
+        """
         interface = self.interface
         copy = arguments.real(x, argument)
         if copy.ndim != 1 + len(interface.axes) or copy.shape[0] != len(interface.coordinates):
@@ -1114,7 +1117,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
                 return ParameterError(f"{name}: {beyond_range}", **{**facts, "step": 0})
             numbers = ", ".join(f"{n} = {float(v)!r}" for n, v in values.items() if np.ndim(v) == 0)
             reason = "a coefficient computed from parameters alone is not finite"
-            reason += ", or the part B of H is not negative where it starts" * self.interface.monitored
+            reason += ", or B in H = A + B (monitor: log) is not negative at the start" * self.interface.monitored
             return ParameterError(f"{name}: no step can be made with {numbers}: {reason}", **{**facts, "step": 0})
         step_text = f"step {error.step} of size {h!r} failed" if error.step >= 0 else "a step failed"
         if error.members:

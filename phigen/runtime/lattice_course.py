@@ -142,7 +142,8 @@ class LatticeCourse:
 
     @classmethod
     def restored(cls, solver: LatticeSolver, beginning: Beginning, arrays: Mapping[str, Any]) -> LatticeCourse:
-        """Return the course that was saved as ``arrays``; ``beginning`` are its initial arguments."""
+        """Return the integration that `saved` stored as ``arrays``; ``beginning`` are the arguments with which it
+        began."""
         course = object.__new__(cls)
         course.__setstate__({"solver": solver, "at": beginning, "saved": arrays})
         return course
@@ -180,14 +181,15 @@ class ObservedCourse(Retrying):
 
     @classmethod
     def begun(cls, solver: LatticeSolver, beginning: Beginning, retry: int = 0) -> ObservedCourse:
-        """Return a new course at its start."""
+        """Return a new integration at its start; a failing step is halved at most ``retry`` times."""
         return cls(cast("Followed", LatticeCourse(solver, beginning)), retry)
 
     @classmethod
     def restored(
         cls, solver: LatticeSolver, beginning: Beginning, retry: int, arrays: Mapping[str, Any]
     ) -> ObservedCourse:
-        """Return the course that was saved as ``arrays``; ``beginning`` are its initial arguments."""
+        """Return the integration that `saved` stored as ``arrays``; ``beginning`` are the arguments with which it
+        began."""
         course = cls(cast("Followed", LatticeCourse.restored(solver, beginning, arrays)), retry)
         course._extra, *course.retried = arrays["parts"].tolist()
         return course

@@ -88,7 +88,8 @@ class LatticeRun:
 
     @property
     def times(self) -> Floats:
-        """The times of the complete rows, after the times of the earlier run if this run continues one."""
+        """The times of the complete rows. If this run continues an earlier run, the times of the earlier run come
+        first."""
         if self.solver.interface.monitored:
             earlier_times = [] if self.plan.past is None else self.plan.past.t[:-1].tolist()
             return np.array([*earlier_times, *(self.plan.begin + t for t in self.clocks)])

@@ -91,7 +91,8 @@ def recordable(interface: LatticeInterface) -> tuple[str, ...]:
 
 
 def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
-    """Return the energy and the observables of a trajectory as a series."""
+    """Return the energy and the observables of a trajectory as a `LatticeSeries`, which has only its first and last
+    state."""
     x, solver = trajectory.x, trajectory.solver
     columns = {"energy": trajectory.energy}
     columns |= {name: trajectory.observed[:, k] for k, name in enumerate(solver.interface.observables)}

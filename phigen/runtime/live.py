@@ -173,7 +173,7 @@ class LiveSession:
         try:
             by(values)
         except BackendError as error:
-            cause = "or the monitor not positive there" if self.solver.interface.monitored else "too large"
+            cause = "or the monitor not positive there" if self.solver.interface.monitored else "since it is too large"
             name = self.solver.interface.name
             raise StepError(
                 f"{name}: the state is not finite, {cause}", step=self.steps, status=error.status

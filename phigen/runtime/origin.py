@@ -87,7 +87,7 @@ def mark(path: Path, origin: Origin) -> None:
 
 
 def read_origin(path: Path) -> Origin | None:
-    """Return the origin of a file, or None if the file has none."""
+    """Return the provenance that a file contains (a spec, a run and a command); None if it contains none."""
     suffix = path.suffix.lower()
     if path.is_dir():
         return _within((path / ".zattrs").read_bytes()) if (path / ".zattrs").is_file() else None

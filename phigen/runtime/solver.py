@@ -98,16 +98,20 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **by_keyword: float,
     ) -> Trajectory:
-        """Make ``steps`` steps of size ``h`` from ``x0`` (DIM,), storing every ``stride``-th state and the last.
+        """Make ``steps`` steps of size ``h`` from ``x0`` (DIM,), and return the trajectory of every ``stride``-th state
+        and the last.
 
-        A negative ``h`` integrates backwards in time. ``t0`` is the time of ``x0``, 0 by default, for Hamiltonians that
-        depend on the time. With ``until`` in place of ``steps``, the last step is shortened to end at that time. A
-        failing step is repeated in 2, 4, …, 2**retry equal parts; this is a different map, which is Poisson too and
-        stays on the same leaf. ``attitude0`` and ``position0`` are initial values for systems that reconstruct them,
-        by default the identity and the origin. With noise, the random numbers are a function of ``seed``, ``member``
-        and the number of the step, which begins with ``step0``, all 0 by default; ``increments`` (steps, draws)
-        replaces them. ``progress`` is called from time to time with the number of steps done. Raises `StepError`, whose
-        ``trajectory`` ends with the state before the failing step.
+        A negative ``h`` integrates backwards in time; with a monitor (dt = g dτ), ``h`` is a step in τ. ``t0`` is the
+        time of ``x0``, 0 by default, for Hamiltonians that depend on the time. With ``until`` in place of ``steps``,
+        the last step is shortened to end at that time. A failing step is repeated as 2, 4, …, up to 2**retry smaller
+        steps; together they are another map than one whole step, but also a Poisson map, and keep the Casimirs.
+        ``attitude0`` and ``position0`` are initial values for systems that reconstruct them, by default the identity
+        and the origin.
+
+        With noise, the random numbers are a function of ``seed``, ``member`` and the number of the step, where
+        ``step0`` is the number of the first step; all three are 0 by default. Increments of the noise can be passed as
+        ``increments`` (steps, draws) instead. ``progress`` is called from time to time with the number of steps done.
+        Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
         """
         noise_arguments = {"seed": seed, "member": member, "step0": step0}
         beginning = self._beginning(x0, "x0", h, parameters, by_keyword, t0, noise_arguments, (attitude0, position0))
@@ -719,7 +723,7 @@ class Solver(Named[Backend, Interface]):
             if settings:
                 message += f" with {settings}: a coefficient computed from parameters alone is not finite"
             if self.interface.monitored:
-                message += f"{', or' if settings else ':'} where it starts the monitor is not positive"
+                message += f"{', or' if settings else ':'} the monitor is not positive at the start"
             return ParameterError(message, step=0, status=error.status, trajectory=trajectory, members=error.members)
         step_text = f"{name}: step {error.step} of size {h!r} failed" if error.step >= 0 else f"{name}: a step failed"
         if error.members:

@@ -20,7 +20,7 @@ _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _HINT = "gcc of version 10 or later, or one named in the environment variable CC, such as CC=arm-none-eabi-gcc"
 #: Names that gcc gives to calls through a pointer, and to functions of OpenMP that call others through a pointer.
 _BY_POINTER = ("__indirect_call", "GOMP_")
-_TIMEOUT = 300.0  # seconds
+_TIMEOUT = 300.0  # time limit of a command of the compiler, in seconds
 
 
 @dataclass(frozen=True)

@@ -246,7 +246,7 @@ def test_damping_takes_energy_where_its_rate_is_not_negative(rate, more, verdict
     assert (stated.verdict, stated.detail) == (verdict, detail)
     if verdict == "refuted":
         assert "a.yaml:7:10: error: λ ≥ 0" in refutation(examination)
-        assert "what adds energy is a force" in refutation(examination)
+        assert "a negative λ adds energy" in refutation(examination)
 
 
 def test_damping_of_which_nothing_is_known_has_no_statement():

@@ -188,5 +188,5 @@ def test_too_small_sizes_and_open_ends_beside_have_no_seam() -> None:
 
 def test_a_lattice_with_a_seam_has_no_steps_by_hand() -> None:
     backend: Any = solver("volterra", (7,), "c").backend
-    with pytest.raises(ValueError, match="without a seam"):
+    with pytest.raises(ValueError, match="without a boundary seam"):
         backend.stages()

@@ -132,7 +132,7 @@ def test_parameters_that_cannot_be_leave_a_session_unchanged(target: str) -> Non
         ({"m": [1, 2]}, ValueError, r"must be a number or have shape \(3,\)"),
         ({"m": -1}, ValueError, "'m' must be positive at all sites"),
         ({"n": 1}, TypeError, "'n'"),
-        ({"m": 1e200}, StepError, "not negative where it starts"),
+        ({"m": 1e200}, StepError, "not negative at the start"),
     ):
         with pytest.raises(error, match=message):
             session.set_parameters(changes)

@@ -229,7 +229,7 @@ def test_a_failure_tells_the_physical_time_of_the_last_good_state(kepler):
 
 def test_without_parameters_a_start_is_refused_for_its_monitor_alone():
     solver = solver_of(compiled_text(BODY.replace("1/(1 + x1**2)", "x1").split("runs")[0]), "c")
-    with pytest.raises(StepError, match="no step can be made: where it starts the monitor is not positive"):
+    with pytest.raises(StepError, match="no step can be made: the monitor is not positive at the start"):
         solver.integrate([-0.3, 1, 0.2], 0.1, 10)
 
 

@@ -173,8 +173,8 @@ class DeviceSolver:
             frames[1 : rows + 1, part] = stored_rows.transpose(0, 2, 1)
 
     def _kernels(self, *, common: bool) -> Kernels:
-        """Return the compiled kernels: for members that share their coefficients if ``common``, else for different
-        coefficients."""
+        """Return the compiled kernels: for members that all have the same coefficients (``common``), or coefficients of
+        their own."""
         if common not in self._compiled:
             defined = {**self._group(), **self.defined, **({f"{self.interface.name}_COMMON": 1} if common else {})}
             self._compiled[common] = Kernels(self.device, self._header, self.interface.name, defined)

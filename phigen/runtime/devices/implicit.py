@@ -63,7 +63,7 @@ class ImplicitSession(DeviceLatticeSession):
 
 
 def stepping_module(text: str, name: str, *, single: bool) -> Any:
-    """Return the NumPy module of a lattice, with the functions that evaluate its equation replaced by kernels on a
+    """Return the NumPy module of a lattice, with the functions of its implicit equation replaced by kernels on a
     device.
 
     In ``single`` precision, thresholds of the iteration are those of the C in single precision.
