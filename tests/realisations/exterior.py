@@ -27,7 +27,7 @@ def wedge(left: Sequence[Expression], right: Sequence[Expression]) -> Form:
 
 
 def combine(*parts: tuple[Fraction | int, Form]) -> Form:
-    """A linear combination."""
+    """Return a linear combination of forms."""
     keys = sorted({key for _, form in parts for key in form})
     return {key: total(number(Fraction(c)) * form[key] for c, form in parts if key in form) for key in keys}
 
@@ -44,7 +44,7 @@ def pull_back(form: Form, images: Sequence[Expression], names: Sequence[str]) ->
 
 
 def differential(f: Expression, names: Sequence[str]) -> list[Expression]:
-    """df."""
+    """Return the components of df."""
     return [derivatives([f], name)[0] for name in names]
 
 
@@ -81,7 +81,7 @@ def at_time(images: Sequence[Expression], time: Fraction | int) -> list[Expressi
 
 
 def after(outer: Sequence[Expression], inner: Sequence[Expression], names: Sequence[str]) -> list[Expression]:
-    """outer ∘ inner."""
+    """Return the composition outer ∘ inner."""
     return substitute(outer, dict(zip(names, inner, strict=True)))
 
 

@@ -1,4 +1,4 @@
-"""The three axioms: proved for what the catalogue builds, refuted for what only looks like it."""
+"""The three axioms: proved for bi-realisations of the catalogue, refuted for wrong ones that resemble them."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def verdicts(statements: list[Statement]) -> list[str]:
 
 
 def custom(coordinates, poisson, alpha, beta, extra=""):
-    """Statements on the user's own α and β."""
+    """Return the statements on α and β of a spec."""
     text = (
         f"phigen: 1\nname: t\ncoordinates: [{coordinates.replace(' ', ', ')}]\npoisson: {poisson}\nhamiltonian: 1\n"
         f"order: 2\nbirealisation: {{kind: custom, alpha: {alpha}, beta: {beta}}}\n{extra}"
@@ -228,7 +228,7 @@ def test_mixed_brackets_are_checked_for_all_pairs(beta, pair):
 
 
 def broken(realisation):
-    """The same with twice the quadratic terms in α, and in β, so that β(x, p) = α(x, −p) still holds."""
+    """Return the bi-realisation with doubled quadratic terms in α and in β, so that β(x, p) = α(x, −p) still holds."""
     p = [momentum(c) for c in realisation.coordinates]
     twice = {name: 2 * symbol(name) for name in p}
     half = [a + (b - a) / 2 for a, b in zip(realisation.alpha, realisation.beta, strict=True)]
@@ -245,7 +245,7 @@ def test_what_the_symmetry_gives_is_not_multiplied_out_again():
     statements = check(s, realisation)
     assert (statements[BETA].verdict, statements[BETA].detail) == (PROVED, "as for α, by β(x, p) = α(x, −p)")
     assert verdicts(check(s, broken(realisation))[ALPHA:FORMS]) == [REFUTED] * 3
-    wrong = replace(realisation, beta=tuple(realisation.alpha))  # whatever it says of itself
+    wrong = replace(realisation, beta=tuple(realisation.alpha))  # although its record claims otherwise
     assert verdicts(check(s, wrong)[ALPHA:FORMS]) == [PROVED, REFUTED, REFUTED]
 
 

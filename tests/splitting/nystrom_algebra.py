@@ -14,7 +14,7 @@ ONE = 10**DIGITS
 
 @cache
 def extended(word, letter):
-    """The normal form of a word with a letter after it."""
+    """Return the normal form of a word extended by a letter."""
     if letter == "V" or not word.endswith("VVV"):
         return {word + letter: 1}
     coefficients = defaultdict(int)
@@ -32,7 +32,7 @@ def _written(word, letters):
 
 
 def times(element, letter):
-    """An element times a letter."""
+    """Return the product of an element and a letter."""
     product = defaultdict(int)
     for word, value in element.items():
         for w, c in extended(word, letter).items():
@@ -41,7 +41,7 @@ def times(element, letter):
 
 
 def combined(*terms):
-    """The sum of multiples of elements."""
+    """Return a linear combination of elements."""
     coefficients = defaultdict(int)
     for factor, element in terms:
         for word, value in element.items():
@@ -50,7 +50,7 @@ def combined(*terms):
 
 
 def gradient(element):
-    """An element times [V, [V, T]]."""
+    """Return the product of an element and [V, [V, T]]."""
     after = {"": element}
     for word in ("V", "T", "VV", "VT", "TV", "VVT", "VTV", "TVV"):
         after[word] = times(after[word[:-1]], word[-1])
@@ -58,7 +58,7 @@ def gradient(element):
 
 
 def exponential(element, act, time, degree):
-    """An element times exp(time · act), up to a degree."""
+    """Return the product of an element and exp(time · act), up to a degree."""
     total = term = element
     k = 0
     while any(term.values()):
@@ -69,7 +69,7 @@ def exponential(element, act, time, degree):
 
 
 def defects(method, degree):
-    """For each degree the Euclidean norm of the difference between a step and the flow of T + V."""
+    """Return, for each degree, the Euclidean norm of the difference between a step and the flow of T + V."""
     step, multiples = {"": ONE}, iter(method.multiples)
     for i, time in enumerate(method.times):
         kicks = i % 2 != method.kicks_first

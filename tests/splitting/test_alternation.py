@@ -1,4 +1,4 @@
-"""Coefficients of splitting methods: their order conditions, for any number of parts, and the flows they stand for."""
+"""Coefficients of splitting methods: order conditions for any number of parts, and the flows of a step."""
 
 from fractions import Fraction
 from itertools import pairwise, product
@@ -8,12 +8,14 @@ import pytest
 
 from phigen.scheme.alternation import ALTERNATIONS, find, orders, schedule
 
-#: Coefficients are published with 15 digits at least.
+#: Tolerance of order conditions: published coefficients have at least 15 digits.
 TOLERANCE = 1e-14
 
 
 def word_coefficients(flows, parts, degree):
-    """Coefficients of the words of at most so many letters in exp(t_n A_n) … exp(t_1 A_1), A_i not commuting."""
+    """Return the coefficients of the words of at most ``degree`` letters in exp(t_n A_n) … exp(t_1 A_1), where the A_i
+    do not commute.
+    """
     words = {(): 1.0}
     for part, time in flows:
         longer = {}
@@ -26,7 +28,7 @@ def word_coefficients(flows, parts, degree):
 
 
 def defects(method, parts, degree):
-    """For each degree the largest difference from exp(A_1 + … + A_m)."""
+    """Return, for each degree, the largest difference from exp(A_1 + … + A_m)."""
     steps = schedule(method, parts)
     coefficients = word_coefficients([(part, steps.times[row]) for part, row in steps.flows], parts, degree)
     words = {d: product(range(parts), repeat=d) for d in range(1, degree + 1)}

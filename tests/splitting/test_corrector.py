@@ -15,7 +15,7 @@ PLANE = "coordinates: [x, y, px, py]\npoisson: {canonical: {q: [x, y], p: [px, p
 PARAMETERS = "parameters: {eps: {value: 0.001, small: true}}\n"
 KEPLER = "hamiltonian: (px**2 + py**2)/2 - 1/sqrt(x**2 + y**2) - eps*x**2*(1 + y)\nscheme: splitting\n"
 SMALL = PLANE + PARAMETERS + KEPLER
-#: The same with a field that leaves radial orbits radial.
+#: The system `SMALL` with a field for which radial orbits remain radial.
 RADIAL = SMALL.replace("*(1 + y)", "")
 START = [1, 0, 0, 1.1]
 #: A free symmetric top in a weak field, on a linear bracket with a Casimir.
@@ -39,7 +39,7 @@ def test_all_names_are_offered():
 
 @pytest.mark.parametrize("name", CORRECTED[1:])
 def test_a_run_of_one_step_is_a_quadrature_of_the_stated_order(name):
-    """To first order in ε a run is that of a quadrature, with B at the times that flows of A have taken so far."""
+    """To first order in ε a run is a quadrature, with B evaluated at the times that the flows of A have reached."""
     end = BY_NAME[name].corrector
     times = [*(-t for t in reversed(end)), Fraction(1), Fraction(1), *end]
     nodes, clock = [], Fraction(0)
@@ -71,7 +71,7 @@ def test_the_error_in_the_second_power_of_epsilon_is_left():
 
 
 def test_the_modified_flow_removes_the_error_of_the_second_power_of_the_step():
-    """The corrector is balanced: otherwise an error of ε² h³ would be left."""
+    """Without a balanced corrector, an error of order ε² h³ would remain."""
     integrator = solver(compilation("wisdom-holman-modified-17"), "c")
     errors = [np.ptp(integrator.integrate(START, h, round(48 / h), stride=1).energy) for h in (0.2, 0.1)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4, abs=0.3)
@@ -112,7 +112,9 @@ def test_states_do_not_depend_on_the_outputs(profile):
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize(("stride", "kernel"), [(1, ""), (4, ""), (9, "modified-"), (None, "")])
 def test_gradients_of_runs_are_differences(target, stride, kernel):
-    """Along states and parameters, with rows at which runs end and begin anew; the last run is shorter."""
+    """Gradients along states and parameters; at each row a run ends and another one starts, and the last run is
+    shorter.
+    """
     integrator = solver(compilation(f"wisdom-holman-{kernel}7", adjoint=True), target)
     x, h, steps, d, eps = np.array(START) + 0.1, 0.3, 9, 1e-4, 0.02
     source = np.random.default_rng(1)
@@ -159,10 +161,13 @@ def test_the_tangent_in_javascript_is_that_of_c():
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_failed_step_leaves_the_last_good_state(target):
-    """A radial orbit falls into the centre."""
+    """The step fails since a radial orbit falls into the centre."""
     integrator = solver(compilation("wisdom-holman-5", RADIAL), target)
     fall = [1, 0, 0, 0]
-    for h, steps in ((3.0, 1), (0.3, 3)):  # a corrector fails, that before the first step or that after the last
+    for h, steps in (
+        (3.0, 1),
+        (0.3, 3),
+    ):  # a corrector fails: the one before the first step, or the one after the last step
         with pytest.raises(StepError, match="NOT_FINITE") as failed:
             integrator.integrate(fall, h, steps, stride=steps)
         np.testing.assert_array_equal(failed.value.trajectory.x[-1], fall)

@@ -14,7 +14,7 @@ from phigen.splitting.parts import split
 SPEC = spec_of("earth_moon")
 START = np.array([float(v) for v in SPEC.runs["years"].initial])
 MONTH = 27.3
-#: The energy of the orbit, which errors are relative to; that of the spin is larger.
+#: Energy of the orbit; errors are relative to it. The energy of the spin is larger.
 ORBIT = 1.2
 
 
@@ -40,7 +40,7 @@ def test_orbit_and_spin_are_one_part_and_the_oblateness_is_the_small_one():
 
 @pytest.mark.slow
 def test_two_steps_a_month_are_as_good_as_forty_of_kinetic_energy_and_potential(monkeypatch):
-    """At an energy error of 1e-8, methods of order 4 of both."""
+    """Compare methods of order 4 of both splittings at an energy error of 1e-8."""
     monkeypatch.setattr(compiler, "split", lambda system, **_: split(system, motions=False))
     plain = compile_spec(SPEC)
     assert not any(flow.has_motion for flow in plain.splitting.flows)
@@ -54,7 +54,7 @@ def test_spin_and_total_angular_momentum_are_kept_to_rounding():
     total = np.cross(q, p) + s
     assert np.ptp(np.linalg.norm(s, axis=1)) < 1e-13
     assert np.ptp(total, axis=0).max() < 1e-13 * np.linalg.norm(total[0])
-    assert np.ptp(s, axis=0).max() > 1e-3  # it precesses
+    assert np.ptp(s, axis=0).max() > 1e-3  # the spin precesses
 
 
 def test_a_step_is_a_poisson_map():

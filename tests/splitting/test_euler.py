@@ -24,9 +24,9 @@ BODY = (
     f"{SO3}parameters: {{A: 1, B: 2, C: 3}}\nhamiltonian: (x**2/A + y**2/B + z**2/C)/2\nscheme: splitting\n"
     "casimirs: {S: x**2 + y**2 + z**2}\nruns: {one: {initial: [0.3, -0.5, 0.8], step: 0.1, steps: 10}}\n"
 )
-#: Moments: three different ones, symmetric bodies, and nearly symmetric ones.
+#: Moments of inertia: three different ones, symmetric bodies, and nearly symmetric ones.
 MOMENTS = [(1, 2, 3), (1, 1, 3), (3, 2, 2), (1, 1 + 1e-9, 2)]
-#: Near the separatrix, on it, on the axes, elsewhere, and at rest.
+#: Starts: near the separatrix, on it, on the axes, elsewhere, and at rest.
 STARTS = [
     (1e-2, 1, 1e-2), (1e-8, 1, 0), (np.sqrt(3) / 2, 0, 0.5), (1, 0, 0), (0, 1, 0), (0, 0, -1), (0.3, -0.5, 0.8),
     (0, 0, 0),
@@ -40,7 +40,7 @@ def body(extras=""):
 
 
 def expected(x, moments, h):
-    """The end of a step by a Taylor method in 30 digits, which knows nothing of elliptic functions."""
+    """Return the end of a step by a Taylor method in 30 digits, which does not use elliptic functions."""
     with mpmath.workdps(30):
         a = [1 / mpmath.mpf(m) for m in moments]
         factors = [a[2] - a[1], a[0] - a[2], a[1] - a[0]]
@@ -64,7 +64,7 @@ def _taylor(x, factors, h, order=28):
 @pytest.mark.thin(4)
 @pytest.mark.parametrize("moments", MOMENTS)
 def test_a_step_of_any_size_ends_on_the_orbit_to_rounding(moments):
-    """The derivative of the flow multiplies the rounding of the start: by at most 1e3 in these steps."""
+    """The derivative of the flow multiplies the rounding errors of the start by at most 1e3 in these steps."""
     values = dict(zip("ABC", moments, strict=True))
     for start, h in product(STARTS, STEPS):
         x = np.array(start)
@@ -78,7 +78,9 @@ def test_a_step_of_any_size_ends_on_the_orbit_to_rounding(moments):
 
 
 def test_small_increments_have_all_digits():
-    """Compensated sums add them to the state: a relative error of the increment, not of the state, counts."""
+    """Compensated sums add increments to the state, so the error relative to the increment matters, not that relative
+    to the state.
+    """
     x, h = np.array([0.3, -0.5, 0.8]), 1e-6
     integrator = solver(compile_text(BODY.replace("scheme", "profile: small\nscheme"), 4), "c")
     session = integrator.session(np.array(x))
@@ -95,7 +97,7 @@ def test_targets_agree_and_javascript_has_the_flow():
 
 
 def test_members_in_lanes_are_those_one_by_one():
-    """Steps beyond the range of the lanes among them, and states where nothing moves."""
+    """Some steps exceed the range of the lane functions, and some states are at rest."""
     integrator = solver(body("adjoint: true\n"), "c")
     states = np.concatenate([np.array(STARTS), np.random.default_rng(2).normal(size=(29, 3))])
     for h in (0.05, 0.7, 6.0):
@@ -138,7 +140,7 @@ def test_gradients_along_state_and_moments_are_differences(target):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_derivatives_are_exact_where_the_state_is_on_the_separatrix_to_the_last_digit(target):
-    """Two of the E_i are equal there, in floating point too, but their derivatives are not."""
+    """On the separatrix two of the E_i are equal, in floating point too, and their derivatives are not."""
     x, weights, moments, d = np.array([0.5, 0, 1]), np.array([1, -2, 0.5]), np.array([0.25, 1, 4]), 1e-3
     integrator = solver(body("adjoint: true\n"), target)
 
@@ -171,7 +173,7 @@ def test_the_flow_is_proved_and_a_wrong_sign_is_refuted(monkeypatch):
 
 
 def test_the_time_of_turning_over_has_all_digits_close_to_the_separatrix():
-    """The difference of P and Q is 1e-16 here. Errors are those of C in the middle of a turn-over, 2e-16 over C."""
+    """The difference of P and Q is 1e-16 here. The errors are those of C in the middle of a reversal, 2e-16 over C."""
     for start, h, allowed in (((1e-8, 1, 1e-8), 70.0, 3e-8), ((1e-8, 1, 1.7e-8), 120.0, 1e-15)):
         x = np.array(start)
         exact = expected(x, (1, 2, 3), h)
@@ -181,7 +183,9 @@ def test_the_time_of_turning_over_has_all_digits_close_to_the_separatrix():
 
 
 def _attitude(x, moments, h, sign):
-    """The attitude after a time by a method of order 8, a rotation matrix; ``sign`` is -1 for momenta in space."""
+    """Return the attitude after a time by a method of order 8, a rotation matrix; ``sign`` is −1 for momenta in
+    space.
+    """
     inverse = 1 / np.array(moments)
 
     def rates(_, y):
@@ -194,7 +198,7 @@ def _attitude(x, moments, h, sign):
 
 
 def _matrix(q):
-    """The matrix of a quaternion; matrices as they are."""
+    """Return the matrix of a quaternion, or a matrix unchanged."""
     if np.size(q) == 9:
         return np.reshape(q, (3, 3))
     skew = _bracket(q[1:])
@@ -207,7 +211,9 @@ ATTITUDES = [(1, "quaternion"), *(pytest.param(-1, kind, marks=pytest.mark.slow)
 
 @pytest.mark.parametrize(("sign", "kind"), ATTITUDES)
 def test_the_attitude_of_the_exact_flow_is_exact(sign, kind):
-    """For steps of any size, all orders of the moments, momenta in the body and in space, in all targets."""
+    """The attitude is exact for steps of any size, all orders of the moments, momenta in the body and in space, in all
+    targets.
+    """
     spatial = BODY.replace("-", "+") if sign < 0 else BODY
     spatial = spatial.replace("+0.5", "-0.5").replace("y: +z, z: y}, y: {z: +x", "y: z, z: -y}, y: {z: x")
     compiled = compile_text(f"{spatial}reconstruct: {kind}\n", 4)
@@ -228,7 +234,9 @@ def test_the_attitude_of_the_exact_flow_is_exact(sign, kind):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_attitudes_lose_digits_only_where_the_momentum_turns_over(target):
-    """As 1/(1 + x·x'/|x|²), which is 2e-8 after 69.8, and 2 after two turns. Short steps lose none."""
+    """The error grows as 1/(1 + x·x'/|x|²), where x' is the end of the step; 1 + x·x'/|x|² is 2e-8 after the time 69.8,
+    and 2 after two reversals. Short steps lose no digits.
+    """
     x, solve = np.array([1e-4, 1.0, 0.7e-4]), solver(body("reconstruct: quaternion\n"), target)
     for h, allowed in ((69.818, 2.5e-8), (140.0, 2e-12)):
         run, short = solve.integrate(x, h, 1), solve.integrate(x, h / 500, 500)
@@ -239,7 +247,9 @@ def test_attitudes_lose_digits_only_where_the_momentum_turns_over(target):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_quaternions_of_long_steps_keep_their_length(target):
-    """Their real parts may be negative, where a correction of the length would lengthen it."""
+    """The real part of a quaternion may be negative; a correction of its length with the wrong sign would
+    increase it.
+    """
     x = np.array([0.3, 0.2, 1.0])
     run = solver(body("reconstruct: quaternion\n"), target).integrate(x, -50.0, 40)
     space = [_matrix(q) @ y for q, y in zip(run.attitude, run.x, strict=True)]
@@ -268,7 +278,7 @@ def test_where_the_body_is_split_in_rotations():
     assert [f.has_motion for f in linear.splitting.flows].count(True) == 1
 
 
-#: t√P and Q/P, with small arguments, many turns, and both ends of the modulus.
+#: Pairs (t√P, Q/P), with small arguments, many revolutions, and both ends of the modulus.
 ARGUMENTS = [(u, m) for u in (1e-3, 0.3, 0.999, 1.001, 2.5, -7.0, 300.0) for m in (0, 1e-12, 0.3, 0.9, 1 - 1e-4)]
 
 
@@ -284,7 +294,7 @@ def test_the_amplitude_is_that_of_jacobi(p):
 
 
 def test_the_integrals_are_those_of_the_second_kind():
-    """∫sn² dt = (u − E(am))/m, and Carlson's R_D is mpmath's."""
+    """∫sn² dt is (u − E(am))/m, and Carlson's R_D agrees with that of mpmath."""
     for u, m in ARGUMENTS:
         if m > 1e-3:
             _, _, _, phi = special.ellipj(u, m)

@@ -1,4 +1,4 @@
-"""Flows of parts of H: found in closed form, and proved; what has none is refused by name."""
+"""Flows of parts of H: those with a closed form are found and proved, and errors name parts without one."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED
 BODY = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}\n"
 PLANE = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
 
-#: A system, and how its coordinates move along the flows of the parts.
+#: Systems, each with the formulas of its coordinates along the flows of the parts.
 SYSTEMS = {
     "kick and drift": (PLANE + "hamiltonian: p**2/2 + p**4 - cos(q)", ["p shifted", "q shifted"]),
     "a kink between its kicks": (PLANE + "hamiltonian: p**2/2 + 2*abs(q)", ["q shifted", "p shifted"]),
@@ -189,7 +189,9 @@ def test_what_has_no_elementary_flow_is_refused_by_name_and_place(text, named):
 
 
 def test_two_spins_turn_by_two_cross_products():
-    """With their sum, the second takes what the first has found; a factor of all brackets is a factor of the time."""
+    """The flow uses the sum of both spins; the second spin reuses values of the first. A common factor of all brackets
+    is a factor of the time.
+    """
     text = SYSTEMS["two spins"][0].replace("a*u + b*v + c*w", "J*(a*u + b*v + c*w)")
     flow = compile_text(f"parameters: {{J: 1.3}}\n{text}\norder: 2\n", scheme="splitting").program.step.flows[0]
     counts = operation_counts(flow.roots)

@@ -31,7 +31,9 @@ def orbit(extras=""):
 
 
 def start(eccentricity, pericentre=True):
-    """A state on an orbit with the semi-major axis 1, or the pericentre 1 if it is open, in a plane askew."""
+    """Return a state on an orbit in an inclined plane, with semi-major axis 1 or, if the orbit is open, with pericentre
+    distance 1.
+    """
     e = eccentricity if pericentre else -eccentricity
     q = abs(1 - e) if eccentricity < 1 else 1.0
     speed = np.sqrt(MU / q * (1 + e))
@@ -44,7 +46,9 @@ def increments():
 
 
 def expected(x, h):
-    """The end of a step, from the formulas in 40 digits with another solution of the universal Kepler equation."""
+    """Return the end of a step, from the formulas in 40 digits with another solver for the universal Kepler
+    equation.
+    """
     with mpmath.workdps(40):
         at = dict(zip(("x", "y", "z", "px", "py", "pz"), map(mpmath.mpf, x), strict=True))
         at |= {"m": mpmath.mpf(MASS), "k": mpmath.mpf(3), "h:": mpmath.mpf(h)}
@@ -56,7 +60,7 @@ ORBITS = [(e, True) for e in (0, 0.3, 0.999, 1.5)] + [(e, False) for e in (0.9, 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_a_step_of_any_size_ends_on_the_orbit_to_rounding(target):
-    """At a pericentre rounding of the start is multiplied by the derivative of the flow, up to 1e7."""
+    """At a pericentre, the derivative of the flow multiplies rounding errors of the start by up to 1e7."""
     for e, pericentre in ORBITS:
         x = start(e, pericentre)
         for h in (0.01, 4.0, -2.0):
@@ -66,7 +70,7 @@ def test_a_step_of_any_size_ends_on_the_orbit_to_rounding(target):
 
 
 def test_the_expected_end_is_that_of_the_equations_of_motion():
-    """By a Runge–Kutta method, which knows nothing of universal variables."""
+    """The reference is a Runge–Kutta method, which does not use universal variables."""
     x, h = start(0.6), 1.5
     end = solve_ivp(
         lambda _, s: [*(s[3:] / MASS), *(-3 * s[:3] / np.linalg.norm(s[:3]) ** 3)],
@@ -128,7 +132,7 @@ def test_gradients_along_state_mass_and_strength_are_differences(target):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_members_do_what_single_trajectories_do(target):
-    """Some of a pack in the short way, some beyond its reach, and one on a radial orbit."""
+    """Some members of a batch use the fast iteration, some are outside of its range, and one is on a radial orbit."""
     states = np.array([start(e, p) for e, p in ORBITS[1:]] + [[2, 0, 0, 0.5, 0, 0]])
     for h in (0.01, 0.4):
         together = solver(orbit(), target).ensemble(states, h, 4)
@@ -185,6 +189,8 @@ def test_what_is_proved_fails_for_other_increments(monkeypatch):
 
 
 def test_beside_other_terms_the_parts_are_as_few_as_before():
-    """T + V and a Kepler motion with a perturbation are two parts each; here the first comes first."""
+    """Both splittings, T + V and a Kepler motion with a perturbation, have two parts; here the first one is
+    preferred.
+    """
     system = compile_text(ORBIT.replace("hamiltonian: ", "hamiltonian: 0.7*x**2 + "), 4).system
     assert [flow.has_motion for flow in split(system).flows] == [False, False]

@@ -1,4 +1,6 @@
-"""Kepler motions where a step is impossible or unusual: the same status in every target, and the state is not lost."""
+"""Kepler motions for which a step is impossible or unusual: the status is the same in every target, and the state is
+not changed.
+"""
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ MADE = compile_text(
 )
 USUAL = [1, 0, 0.1, 0, 2, 0.3]
 
-#: Starts and steps that have no end, and why.
+#: Starts and steps without a final state, with the reason.
 IMPOSSIBLE = {
     "at the centre": ([0, 0, 0, 1, 0, 0], 0.1),
     "falls from rest beyond the centre": ([1, 0, 0, 0, 0, 0], 2.0),
@@ -24,7 +26,7 @@ IMPOSSIBLE = {
     "a step that overflows": (USUAL, 1e300),
 }
 
-#: Starts, steps and parameters whose motion is followed: signs of m and k, hyperbolas, many turns in one step.
+#: Starts, steps and parameters with a final state: signs of m and k, hyperbolas, many revolutions in one step.
 POSSIBLE = {
     "past a pericentre": ([1, 0, 0, 0, 0.2, 0], 2.5, {}),
     "no attraction": (USUAL, 0.1, {"k": 0}),

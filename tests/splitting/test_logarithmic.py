@@ -130,4 +130,4 @@ def test_the_eccentric_orbit_of_the_corpus_is_that_of_dop853():
     here, finer = (solver.integrate(x0, step, until=times[-1], stride=50).at(times) for step in (h, h / 2))
     np.testing.assert_allclose(here, finer, rtol=0, atol=1e-11)
     there = solve_ivp(lambda t, x: solver.vector_field(x), (0, 12.5), x0, "DOP853", times, rtol=3e-14, atol=1e-15)
-    np.testing.assert_allclose(here, there.y.T, rtol=0, atol=3e-10)  # what DOP853 loses near the planet
+    np.testing.assert_allclose(here, there.y.T, rtol=0, atol=3e-10)  # the error of DOP853 near the planet

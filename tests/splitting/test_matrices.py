@@ -22,7 +22,8 @@ from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED
 
 PAIRS = "coordinates: [q1, q2, p1, p2]\npoisson: {canonical: {q: [q1, q2], p: [p1, p2]}}\n"
 
-#: Hamiltonians whose flow is exp(tA); one that is unstable, one with a Jordan block of four rows, one with a constant.
+#: Hamiltonians whose flow is exp(tA), for instance an unstable one, one with a Jordan block of four rows, one with a
+#: constant.
 LINEAR = {
     "oscillators": PAIRS
     + "parameters: {k: 2, c: 0.3}\nhamiltonian: p1**2/2 + p2**2/3 + k*q1**2/2 - q2**2 + c*q1*q2 + p1*q2/5",
@@ -39,17 +40,17 @@ LINEAR = {
 
 
 def compilation(text):
-    """The splitting of a text, with tangents and gradients."""
+    """Compile a text as a splitting, with tangents and gradients."""
     return compile_text(text + "\n", order=4, scheme="splitting", tangent=True, adjoint=True)
 
 
 def without_adjoint(text):
-    """The same without gradients, which JavaScript lacks."""
+    """Compile a text as a splitting without gradients, which JavaScript lacks."""
     return compile_text(text + "\n", order=4, scheme="splitting")
 
 
 def field_matrix(system, parameters):
-    """A and the constant part of π∇H, a linear field."""
+    """Return A and the constant part of π∇H, an affine field."""
     names = system.coordinates
     field = hamiltonian_vector_field(system.poisson, gradient(system.hamiltonian, names))
     columns = [evaluate(derivatives(field, c), {**parameters, **dict.fromkeys(names, 0)}) for c in names]
@@ -101,7 +102,8 @@ def test_steps_are_poisson_maps_with_the_gradients_of_differences(name):
             assert pulled.parameters_bar[key] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-7, abs=1e-8)
 
 
-#: Beside a nonlinear term: a screw motion, and a coupling to values that stand still along the flow of the part.
+#: Linear parts of systems with a nonlinear term: a screw motion, and a coupling to coordinates that are constant along
+#: the flow of the part.
 NONLINEAR = {
     "an algebra of a matrix": (
         "coordinates: [s, x, y, z, a, b]\nparameters: {k: 0.3}\n"
@@ -133,7 +135,8 @@ def test_composed_with_other_parts_they_have_the_order_of_the_method(name):
     assert 12 < errors[0] / errors[1] < 22
 
 
-#: Systems with a constant matrix A, whose exponential needs no transpose: without parameters, and with one elsewhere.
+#: Systems with a constant matrix A, for whose exponential the reverse pass has no transpose: without parameters, and
+#: with a parameter elsewhere.
 CONSTANT = {
     "none": LINEAR["oscillators"].replace("parameters: {k: 2, c: 0.3}\n", "").replace("k*", "").replace("c*", ""),
     "beside A": NONLINEAR["a drive that stands still"][0]
@@ -165,7 +168,7 @@ def test_javascript_computes_the_same_numbers():
 
 
 def test_printed_formulas_are_the_flow():
-    """The printed entries of A give the exponential whose entries move the coordinates."""
+    """The exponential of the printed matrix A agrees with the flow of the coordinates."""
     compiled_system = without_adjoint(LINEAR["a saddle and a field"])
     listed = dict(flows.formulas(compiled_system, None))
     values = {"k": 0.7, "c": 1.3, "q1": 0.3, "q2": -0.2, "p1": 0.5, "p2": 0.1}

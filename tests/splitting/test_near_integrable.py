@@ -1,4 +1,6 @@
-"""Methods for H = A + εB: order conditions in exact arithmetic, measured errors in ε and h, and who gets them."""
+"""Methods for H = A + εB: order conditions in exact arithmetic, measured errors in ε and h, and the systems to which
+they apply.
+"""
 
 from fractions import Fraction
 from itertools import combinations
@@ -19,7 +21,7 @@ START = [1, 0, 0, 1.1]
 
 
 def defects(method):
-    """What the conditions of its generalised order leave, of ε and of ε²."""
+    """Return the residuals of the conditions of the generalised order of a method, in ε and in ε²."""
     c = [sum(method.a[: k + 1]) for k in range(len(method.b))]
     powers = range(method.generalised[0])
     linear = [sum(b * x**k for b, x in zip(method.b, c, strict=True)) - Fraction(1, k + 1) for k in powers]
@@ -65,7 +67,7 @@ def test_the_error_in_the_first_power_of_epsilon_has_its_order(name):
 
 
 def test_the_error_in_the_second_power_of_epsilon_has_its_order():
-    """Where h is small, ε²h² is what is left of (8, 2), and nothing visible of (8, 4)."""
+    """For small h, the error of (8, 2) is ε²h², and that of (8, 4) is below rounding."""
     second = [worst_energy("saba-8-2", 2, eps, 0.1) for eps in (0.01, 0.001)]
     assert second[0] / second[1] == pytest.approx(100, rel=0.1)
     assert worst_energy("aba-8-4", 4, 0.01, 0.1) < second[0] / 100
@@ -122,7 +124,7 @@ def test_without_a_small_part_the_names_are_errors_at_their_place(case):
 
 
 def planets(count, mass="0.00001"):
-    """Planets about a star of mass 1 in democratic heliocentric coordinates."""
+    """Return the spec of planets about a star of mass 1 in democratic heliocentric coordinates."""
     bodies = range(1, count + 1)
     alone = " + ".join(f"(px{i}**2 + py{i}**2)/(2*m{i}) - m{i}/sqrt(x{i}**2 + y{i}**2)" for i in bodies)
     star = " + ".join(f"({' + '.join(f'p{axis}{i}' for i in bodies)})**2/2" for axis in "xy")
@@ -137,9 +139,10 @@ def planets(count, mass="0.00001"):
 
 @pytest.mark.parametrize("mass", ["0.00001", "{value: 0.00001, small: true}"])
 def test_planets_about_a_star_are_motions_and_a_perturbation_that_is_one_part(mass):
-    """The kinetic energy of the star, a square of the sum of momenta, is left whole: it commutes with distances.
+    """The kinetic energy of the star, a square of the sum of momenta, remains one term: it commutes with
+    distances.
 
-    A mass that is declared to be small divides p²/2m, so the potential of the star is no small part beside it.
+    A mass that is declared small divides p²/2m, so the potential of the star is not a small part in comparison.
     """
     compilation = compile_text(planets(3, mass), 4)
     assert [len(flow.pieces) for flow in compilation.splitting.flows] == [3, 0]

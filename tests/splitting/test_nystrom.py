@@ -69,7 +69,7 @@ def test_a_changed_coefficient_breaks_the_conditions():
 
 
 def composition_of(text, order, name="auto"):
-    """The name of the composition, and whether kicks are modified."""
+    """Return the name of the composition, and whether its kicks are modified."""
     step = compile_text(text + f"composition: {name}\n", order, "splitting").program.step
     return step.composition, bool(step.schedule.multiples)
 
@@ -101,7 +101,7 @@ def test_either_part_may_be_the_one_that_kicks():
     assert derivatives([v], "p")[0] != 0
 
 
-#: What would be of Nyström type but for one term or power.
+#: Systems that miss the Nyström type by one term or power.
 FAILING = {
     "a quartic kinetic energy": PLANE + "hamiltonian: p**4 + p**2/2 + q**2/2 + cos(q)\n",
     "a kinetic energy with P1**4": TOP + "hamiltonian: P1**4/8 + G2\n",
@@ -139,7 +139,9 @@ def test_three_parts_and_orders_that_a_name_lacks_are_refused():
 
 @cache
 def forced(name, method):
-    """A system of the corpus with a method, and its tangent map; without packs of members, in short C."""
+    """Return the solver of a system of the corpus with a method and the tangent map; short C without batches of
+    members.
+    """
     compiled_system = small(compiled(name, method.order, "splitting"))
     (kick,) = [
         k for k in kicks(compiled_system.system, split(compiled_system.system)) if k.modified or not method.multiples
@@ -156,11 +158,11 @@ def forced(name, method):
 
 @cache
 def reference(name):
-    """The solver of a high order."""
+    """Return a solver of high order."""
     return solver(small(compiled(name, 10, "splitting")), "c")
 
 
-#: Times over which errors are between those of rounding and 1.
+#: Times over which errors are larger than rounding and smaller than 1.
 SPANS = {"kowalevski_top": 6, "henon_heiles": 8, "nambu_pendulum": 4}
 
 

@@ -24,7 +24,7 @@ def planets():
 
 
 def bodies(x):
-    """Positions and velocities of the Sun and the planets about their centre of mass."""
+    """Return positions and velocities of the Sun and the planets about their centre of mass."""
     q, p = np.zeros((2, PLANETS + 1, 3))
     q[1:], p[1:] = x.reshape(2, PLANETS, 3)
     p[0] = -p[1:].sum(axis=0)
@@ -32,7 +32,7 @@ def bodies(x):
 
 
 def newton(_, y):
-    """Accelerations of all bodies by all others."""
+    """Return the velocities and the accelerations of all bodies by gravity."""
     q, v = y.reshape(2, PLANETS + 1, 3)
     between = q[np.newaxis] - q[:, np.newaxis]
     cubes = (np.square(between).sum(axis=-1) + np.eye(PLANETS + 1)) ** 1.5
@@ -62,7 +62,7 @@ def test_steps_of_five_days_keep_energy_and_angular_momentum_to_rounding():
 
 @pytest.mark.slow
 def test_a_corrector_removes_what_is_of_first_order():
-    """At one flow of each part for a step."""
+    """Steps consist of one flow of each part."""
     errors = {}
     for name in ("wisdom-holman", "wisdom-holman-17"):
         integrator = solver(compile_spec(replace(SPEC, composition=name, order=2, profile="small")), "c")

@@ -25,7 +25,7 @@ AXES = {2: "xy", 3: "xyz"}
 
 
 def text(count, axes=2, more="", masses="", change="jacobi"):
-    """Bodies of a system with planets of a thousandth; coordinates body by body."""
+    """Return the spec of a star and planets of a thousandth of its mass; coordinates are ordered body by body."""
     bodies, names = range(count), AXES[axes]
     q = [f"{a}{i}" for i in bodies for a in names]
     masses = masses or "m0: 1.5, " + ", ".join(f"m{i}: {{value: 0.00{i}, positive: true}}" for i in bodies[1:])
@@ -48,7 +48,7 @@ def compiled(count, change, composition="auto", order=4, axes=2, **options):
 
 
 def start(count, axes=2):
-    """Planets at 1, 2.8, … with speeds near those of circles, about the centre of mass; some motion of all."""
+    """Return planets at distances 1, 2.8, … with nearly circular speeds about the centre of mass, which moves."""
     masses = np.array([1.5, *(0.001 * i for i in range(1, count))])
     q, v = np.zeros((2, count, axes))
     for i in range(1, count):
@@ -62,7 +62,7 @@ def start(count, axes=2):
 
 
 def reference(count, axes, until):
-    """Newton's equations of all bodies by a Runge–Kutta method."""
+    """Return the solution of Newton's equations of all bodies by a Runge–Kutta method."""
     masses = np.array([1.5, *(0.001 * i for i in range(1, count))])
 
     def rate(_, y):
@@ -100,7 +100,7 @@ def test_the_parts_and_their_flows_are_proved(change):
 
 
 def test_a_wrong_change_of_coordinates_is_refuted():
-    """One momentum changes by a little more than its motion says."""
+    """In the wrong change, one momentum has a slightly larger coefficient than the canonical one."""
     system = system_from_spec(spec.loads("phigen: 1\nname: bodies\n" + text(3)))
     parts = split_bodies(system, "jacobi")
     motion = parts.flows[0].motion
@@ -120,7 +120,7 @@ def test_a_step_is_a_poisson_map(change):
 
 
 def test_two_bodies_in_jacobi_coordinates_move_exactly():
-    """Along a conic section and with their centre of mass, in one step of any size."""
+    """They move along a conic section, with a uniform centre of mass, in one step of any size."""
     compilation = compiled(2, "jacobi")
     assert len(compilation.splitting.flows) == 1
     once, often = (solver(compilation, "c").integrate(start(2), 50 / n, n).x[-1] for n in (1, 500))
@@ -136,7 +136,9 @@ def test_total_momentum_and_angular_momentum_are_kept_to_rounding():
 
 
 def test_jacobi_coordinates_have_the_smaller_errors():
-    """The star's momentum is a part of B in the others: 10 times the error, with a corrector."""
+    """In democratic heliocentric coordinates B contains the momentum of the star: with a corrector, the error is 10
+    times as large.
+    """
     errors = {}
     for change in RELATIVE:
         integrator = solver(compiled(3, change, "wisdom-holman-17", order=2), "c")
@@ -149,7 +151,7 @@ SPIN = ", L1, L2, L3"
 
 
 def test_a_body_that_rotates_has_its_rotation_among_the_motions():
-    """A symmetric top beside the bodies, coupled to a position: its rotation is in A, the torque in B."""
+    """A symmetric top is coupled to the position of a body: its rotation is in A, the torque in B."""
     lines = text(2, 3, more=" + L3**2/5 + 0.001*L1*x1").replace("pz1]\n", f"pz1{SPIN}]\n", 1)
     q = "x0, y0, z0, x1, y1, z1"
     lines = lines.replace(
@@ -194,7 +196,7 @@ def test_other_systems_are_refused_at_the_key(case):
     assert diagnostic.hint
 
 
-#: Starts and steps of two bodies that have no end: at one place, a fall onto one another, and an overflow.
+#: Starts and steps of two bodies without a final state: at the same place, on a collision course, and with an overflow.
 IMPOSSIBLE = {
     "at one place": ([0.1, 0.2, 0.1, 0.2, 0, 0, 0.001, 0], 0.1),
     "falls from rest": ([0, 0, 1, 0, 0, 0, 0, 0], 3.0),
@@ -224,7 +226,7 @@ PARABOLA = 0.001 * np.sqrt(2 * 1.501) / 1.501 * 1.5
     "momentum", [PARABOLA, 3 * PARABOLA, 0.05 * PARABOLA], ids=["parabola", "hyperbola", "ellipse"]
 )
 def test_orbits_of_any_kind_are_followed_past_the_pericentre_and_back(momentum):
-    """In one step there and one back, about the centre of mass."""
+    """One step forward and one step back, about the centre of mass."""
     start_of_orbit = [0, 0, 1, 0, 0, -momentum, 0, momentum]
     compilation = compiled(2, "jacobi")
     ends = [solver(compilation, target).integrate(start_of_orbit, 1.5, 1).x[-1] for target in TARGETS]
@@ -243,7 +245,7 @@ def test_a_mass_that_is_not_positive_is_refused_before_the_first_step(mass):
 
 @precisely
 def canonical_error(change, h):
-    """The largest entry of DΦ J DΦᵀ − J for the flow of A, in many digits, with coefficients as the code has them."""
+    """Return the largest entry of DΦ J DΦᵀ − J for the flow of A, in many digits, with the coefficients of the code."""
     compilation = compiled(3, change, "saba-4-2", 2)
     step, names = compilation.program.step, compilation.program.coordinates
     masses = {"G": 1.0, "m0": 1.1, "m1": 0.0007, "m2": 0.0013}
@@ -267,4 +269,4 @@ def canonical_error(change, h):
 
 @pytest.mark.parametrize("change", RELATIVE)
 def test_rounded_quotients_of_masses_leave_the_change_canonical(change):
-    assert canonical_error(change, 0.003) < 1e-21  # with unlike roundings of m_i/M_i in a form and its inverse 3e-19
+    assert canonical_error(change, 0.003) < 1e-21  # 3e-19 if a form and its inverse round m_i/M_i differently

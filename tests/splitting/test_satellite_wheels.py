@@ -20,7 +20,9 @@ def satellite():
 
 
 def equations(_, x):
-    """Euler's equations of a body with moments I, of the turning directions N and G, and of the wheels."""
+    """Return the derivatives by Euler's equations of a body with moments I, of the rotating directions N and G, and of
+    the wheels.
+    """
     moments, wheel, n = np.array([1, 1.6, 2]), 0.05, 0.3
     m, normal, vertical, momenta = x[:3], x[3:6], x[6:9], x[10::2]
     rate = (m - momenta) / moments - n * normal
@@ -32,7 +34,7 @@ def equations(_, x):
 
 @pytest.mark.slow
 def test_it_solves_the_equations_of_the_body_with_order_four():
-    """A Runge–Kutta method solves equations that are written down by hand."""
+    """The reference is a Runge–Kutta method for equations that are written by hand."""
     exact = solve_ivp(equations, (0, 4), START, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
     integrator = solver(satellite(), "c")
     errors = [np.abs(integrator.integrate(START, 4 / n, n).x[-1] - exact).max() for n in (20, 40, 80)]

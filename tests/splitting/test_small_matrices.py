@@ -1,4 +1,6 @@
-"""Linear motions whose matrix depends on coordinates that the flow keeps, by the theorem of Cayley and Hamilton."""
+"""Linear flows whose matrix depends on coordinates that are constant along the flow, by the theorem of Cayley and
+Hamilton.
+"""
 
 from functools import cache
 
@@ -13,7 +15,7 @@ from phigen.splitting.statements import check
 from phigen.symbolic import remainders
 from phigen.symbolic.verdict import PROVED, REFUTED
 
-#: Two oscillators that are coupled in all ways; c and d are Casimirs, which enter as functions that are no polynomials.
+#: Two oscillators with all possible couplings; the Casimirs c and d enter through functions that are not polynomials.
 COUPLED = """
 coordinates: [q1, p1, q2, p2, c, d]
 parameters: {k: 1.3, l: 0.7}
@@ -25,7 +27,8 @@ scheme: splitting
 PI = np.zeros((6, 6))
 PI[0, 1] = PI[2, 3] = 1
 PI -= PI.T
-#: A generic state; one where the matrix has two blocks; one where all eigenvalues are equal, so that it is nilpotent.
+#: States: a generic one; one for which the matrix has two blocks; one for which all eigenvalues are equal, so that the
+#: matrix is nilpotent.
 STATES = {"generic": [0.4, -1.2, 0.9, 0.3, -0.5, 1.1], "blocks": [1, 2, 3, 4, 0, 0], "nilpotent": [1, 2, 3, 4, 0, 0]}
 
 
@@ -59,7 +62,7 @@ def test_a_step_is_the_exponential_of_the_matrix(target):
 
 @pytest.mark.parametrize("rows", [2, 3, 4])
 def test_every_number_of_rows_up_to_four(rows):
-    """x ↦ {x, z} is a linear map of an Abelian ideal, with a matrix whose powers satisfy no short relation."""
+    """x ↦ {x, z} is a linear map of an Abelian ideal; its matrix satisfies no polynomial equation of lower degree."""
     a = np.random.default_rng(rows).integers(-3, 4, size=(rows, rows)) + np.diag(np.arange(rows) + 1)
     names = [f"x{i}" for i in range(rows)]
     brackets = ", ".join(

@@ -38,17 +38,17 @@ ROD = PLANE + "parameters: {g: 1}\nhamiltonian: p**2/2 - g*cos(q)\n"
 
 
 def splitting_of(name, order):
-    """The solver of a system of the corpus as a splitting, with its tangent map."""
+    """Return the solver of a system of the corpus as a splitting, with its tangent map."""
     return compile_spec(described(name)[0], order=order, scheme="splitting", tangent=True)
 
 
 @cache
 def short(name, order):
-    """The splitting with short C: what that lacks are packs of members."""
+    """Return the splitting with short C, which lacks batches of members."""
     return small(compiled(name, order, "splitting"))
 
 
-#: Times over which errors are between those of rounding and 1.
+#: Times over which errors are larger than rounding and smaller than 1.
 SPANS = {"spin_chain5": 1.5, "kowalevski_top": 6, "predator_prey": 12, "toda3": 6, "charged_particle": 2}
 
 

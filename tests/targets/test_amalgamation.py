@@ -22,7 +22,7 @@ PACKAGE = Path(phrases.__file__).parents[2]
 
 
 def expanded(lines, *definitions):
-    """The lines with these macros."""
+    """Return the lines with these macros expanded."""
     macros = Macros()
     for definition in definitions:
         macros.define(f"#define PHI_{definition}")
@@ -72,7 +72,7 @@ def test_macros_that_are_given_too_little_are_no_code():
 
 @cache
 def with_derivatives(name, composition):
-    """The program of a system of the corpus, with the derivatives of its steps."""
+    """Return the program of a system of the corpus, with the derivatives of its steps."""
     chosen = replace(spec_of(name), composition=composition)
     return compile_spec(chosen, order=4, tangent=True, adjoint=True).program
 
@@ -96,7 +96,9 @@ def with_derivatives(name, composition):
 )
 @pytest.mark.parametrize("profile", ["fast", "small"])
 def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, profile, tmp_path):
-    """Names are those of the solver from the beginning, so that printed macros are of use to the runtime too."""
+    """Names have the prefix of the solver before macros are expanded, so that macros printed for the model apply to the
+    runtime too.
+    """
     source, _, code = runtime_of(replace(with_derivatives(name, composition), profile=profile))
     runtime_files = {str(f.relative_to(RUNTIME)): f.read_text(encoding="utf-8") for f in RUNTIME.rglob("*.[ch]")}
     (tmp_path / "none").mkdir()
@@ -170,7 +172,7 @@ static int n_by_macro(void) { return 1; }
 
 
 def test_functions_without_use_are_left_out_with_what_is_said_of_them():
-    """Comments call nothing, and what calls one another is not called by that."""
+    """Names in comments are not calls, and functions that only call one another are unused."""
     assert [line for line in without_unused(USED.split("\n"), "n_") if line] == [
         "/* A table. */",
         "enum { n_SIZE = 2 }; /* of it */",
@@ -211,7 +213,7 @@ def test_every_phrase_is_used_by_the_runtime_or_printed():
 
 
 def test_phrases_have_a_text_for_each_condition_and_no_name_of_sizes():
-    """A phrase by the name of an enumerator would take its place wherever it is declared."""
+    """A phrase with the name of an enumeration constant would replace the constant in its declaration."""
     names = [name.split("(")[0] for choice in phrases.ALL for name in choice.phrases]
     assert len(names) == len(set(names))
     for choice in phrases.ALL:

@@ -40,7 +40,7 @@ ARGUMENTS |= dict.fromkeys(("amplitude", "amplitude1", "amplitude2"), (z / 4, x 
 ARGUMENTS |= {"amplitude3": (z / 4, x + y, x, -y)}  # 1 − nS² ≥ 1
 ARGUMENTS |= {f"{name}{k}": (z / 4, x, -y, x - y, x) for name in ("exprem", "expquo") for k in range(4)}
 
-#: Arguments of φ and its derivatives: near 0, farther, and beyond 16, of either sign.
+#: Arguments of φ and its derivatives: near 0, larger, and beyond 16, with both signs.
 SPECIAL_ARGUMENTS = {"near": x / 5, "near-": -x / 5, "far": 9 * z - 20 * y, "far-": 17 * x - 20 * z}
 
 EXPONENTS = [2, 3, -1, HALF, -HALF, Fraction(1, 3), Fraction(-3, 2), Fraction(5, 7)]
@@ -50,19 +50,20 @@ NUMBERS = [Fraction(n) for n in (1, -1, 3, -7, 2**53 - 1, 2**53, 2**53 + 1, 10**
 NUMBERS += [Fraction(1, 3), Fraction(-7, 11), Fraction(1, 1024), Fraction(123456789, 1000003), Fraction(10**7 + 1, 3)]
 NUMBERS += [Fraction(1, 10**39), Fraction(-1, 10**17), Fraction("0.1"), Fraction("-3.14159"), Fraction(2, 10**6 + 3)]
 
-#: Relative to the value. φ' and φ'' occur in Newton matrices and in what multiplies a last correction, nowhere else.
+#: Bounds relative to the value. φ' and φ'' occur only in Newton matrices, and as factors of a last correction.
 BOUNDS = {"phi1": 1e-13, "phi2": 1e-13, "sinroot1": 1e-14, "arcroot1": 1e-14, "exprel1": 1e-14}
-#: Those of elliptic integrals occur in derivatives; exponentials of matrices round at each doubling of t.
+#: Derivatives of elliptic integrals occur in gradients and tangent maps; exponentials of matrices round at each
+#: doubling of t.
 BOUNDS |= {"amplitude1": 1e-14, "amplitude2": 1e-14, **{f"exprem{k}": 3e-15 for k in range(4)}}
 
 
 def binary(op, a, b):
-    """A node exactly so, not simplified."""
+    """Return a binary node without simplification."""
     return raw(op, (a, b))
 
 
 def cases():
-    """Names and expressions."""
+    """Yield names and expressions."""
     for name in FUNCTIONS:
         if name in SPECIAL:
             yield from ((f"{name} {where}", call(name, e)) for where, e in SPECIAL_ARGUMENTS.items())
@@ -88,7 +89,9 @@ def cases():
 
 
 def nested():
-    """Every operator as the operand of every other, from a fresh constant each: what is shared becomes a temporary."""
+    """Yield every operator as the operand of every other one, each with its own constant, since shared subexpressions
+    become temporaries.
+    """
     constants = (number(1 + Fraction(k, 1024)) for k in range(1000))
 
     def made(form):
@@ -128,7 +131,7 @@ def nested():
 
 @pytest.fixture(scope="module")
 def everything():
-    """A program whose Casimirs are all the cases."""
+    """Return a program whose Casimirs are all the cases."""
     base = compile_text(
         "coordinates: [x, y, z]\npoisson: {matrix: [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]}\nhamiltonian: x\n"
     )
@@ -143,7 +146,7 @@ def everything():
 
 
 def size_of_operands(e, value_of):
-    """The magnitude that rounding is relative to: the value, or the operands of its outermost sum."""
+    """Return the magnitude to which rounding errors are relative: the value, or the operands of its outermost sum."""
     return max(abs(value_of[node]) for node in ([e, *e.args] if e.op in ("add", "sub") else [e]))
 
 

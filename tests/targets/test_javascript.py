@@ -1,4 +1,4 @@
-"""Generated JavaScript, run by Node: equal to the other targets to round-off, errors included."""
+"""Generated JavaScript, run by Node, agrees with the other targets to round-off, including errors."""
 
 import json
 import re
@@ -67,7 +67,7 @@ order: 4
 runs: {r: {initial: [0.4, -0.2, -0.7, 0.4, 0.1, -0.4], step: 0.1, steps: 20}}
 """
 
-#: What the corpus does not ask for: every kind of step, with one stage and with several, kicks, composed paths.
+#: Cases that the corpus lacks: every kind of step, with one stage and with several, kicks, composed paths.
 VARIANTS = {
     "splitting": lambda: compiled("toda3", 4, "splitting"),
     "flow": lambda: compiled("rigid_body_paper", 2, "splitting"),
@@ -81,13 +81,14 @@ VARIANTS = {
     "gauge of two Casimirs": lambda: compile_spec(spec.loads(f"phigen: 1\nname: t\n{TWO_BODIES}")),
     "modified": lambda: _modified(spec_of("rigid_body"), 2),
     "modified, not symmetric": lambda: _modified(spec.loads(f"phigen: 1\nname: t\n{EULER}"), 1),
-    # Paths cut into pieces, one whose expansion only looks finished, and steps that need the exact matrix.
+    # Paths that are divided into segments, a path whose expansion only seems to converge, and steps that need the exact
+    # matrix.
     "path, in pieces": lambda: compile_text(f"{TURNING}birealisation: karasev\norder: 2\n{TURNING_RUN}"),
     "path, with a gap": lambda: compile_text(f"{GAP}birealisation: karasev\norder: 2\n"),
     "path, large steps": lambda: compile_text(f"{BODY}birealisation: karasev\norder: 4\n{LARGE_RUN}"),
 }
 
-#: Every kind of step with its derivative.
+#: Cases with derivatives, for every kind of step.
 VARIED = {
     "newton": lambda: _varied(f"{BODY}casimirs: {{C: x1**2 + x2**2 + x3**2}}\norder: 4\n{RUN}"),
     "newton, composed": lambda: _varied(f"{BODY}order: 6\ncomposition: kahan-li\n{RUN}"),
@@ -122,7 +123,7 @@ def compilation_of(case):
 
 
 def node(folder, jobs):
-    """The answers to jobs (compilation, options, h, steps)."""
+    """Return Node's answers to requests (compilation, options, h, steps)."""
     listed = []
     for k, (compilation, options, h, steps) in enumerate(jobs):
         (text,) = emit(compilation.program, "js", COMMAND).values()
@@ -134,7 +135,7 @@ def node(folder, jobs):
 
 
 class Answers(dict):
-    """What the solvers of cases say of the first run of their spec, each asked when a test first wants to know."""
+    """Answers of the solvers of cases to the first run of their spec, computed when a test first needs them."""
 
     def __init__(self, folders, jobs):
         self.folders, self.jobs = folders, jobs
@@ -147,13 +148,13 @@ class Answers(dict):
         return self[case]
 
 
-@pytest.fixture(scope="session")  # of a module it would be made anew for every system
+@pytest.fixture(scope="session")  # with the scope of a module it would be computed for every system
 def answers(tmp_path_factory):
     return Answers(tmp_path_factory, lambda case: (compilation_of(case), None, STEPS))
 
 
 def apart(actual, expected):
-    """The largest difference, in sizes of the largest expected number."""
+    """Return the largest difference, relative to the largest expected number."""
     actual, expected = np.asarray(actual, dtype=float), np.asarray(expected, dtype=float)
     return float(np.max(np.abs(actual - expected), initial=0.0) / (np.max(np.abs(expected), initial=0.0) or 1.0))
 
@@ -167,7 +168,7 @@ def test_steps_are_those_of_numpy_to_roundoff(case, answers):
     assert answer["t"] == STEPS * at.h
     assert apart(answer["x"], expected) < 1e-13
     assert np.max(np.abs(answer["carry"])) < 1e-15 * np.max(np.abs(expected))
-    assert np.any(answer["carry"]) or case == "path, in pieces"  # of changes larger than the state all sums are exact
+    assert np.any(answer["carry"]) or case == "path, in pieces"  # sums are exact if changes are larger than the state
 
 
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
@@ -187,7 +188,7 @@ def test_copies_go_on_by_themselves(case, answers):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("case", slow_but(QUICK, [*NAMES, *VARIANTS, "duffing", "kepler_eccentric", "thruster_body"]))
 def test_parts_of_steps_find_events_where_sections_do(case, answers):
-    """With time, a monitor, forces, attitude, and every kind of step."""
+    """Cases with time, a monitor, forces, attitudes, and every kind of step."""
     at, answer = setting(compilation_of(case)), answers[case]["crossings"]
 
     def g(x, *_):
@@ -209,13 +210,15 @@ def test_a_step_of_another_size_is_guessed_from_none_before(case, answers):
 
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
 def test_what_rounding_took_from_the_state_is_part_of_it(case, answers):
-    """Left out of the equation for y it would be lost to the order of the step: here 1e-2 of it, and more."""
+    """If the equation for y ignored the compensation term, the error would be of the order of the step: here 1e-2 of
+    the term, and more.
+    """
     if isinstance(compilation_of(case).program.step, kinds.Newton):
         assert answers[case]["carried"] <= 1e-7
 
 
 def test_a_step_that_leads_elsewhere_is_tried_again(tmp_path):
-    """The equation of step 12 has a solution of 280 times the energy too, which the guess for it leads to."""
+    """The equation of step 12 has a second solution of 280 times the energy, to which its predictor leads."""
     (answer,) = node(tmp_path, [(compile_text(RATTLEBACK), {"x0": [0.02, 0.3, -1]}, 0.42, 15)])
     assert answer["done"] == {"value": 15}
     assert answer["growth"] < 2
@@ -224,7 +227,7 @@ def test_a_step_that_leads_elsewhere_is_tried_again(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("case", QUICK)
 def test_steps_are_those_of_c_to_roundoff(case, answers):
-    """That C and NumPy agree everywhere is another test."""
+    """Another test compares C with NumPy in all cases."""
     at = setting(compilation_of(case))
     expected = solver(compilation_of(case), "c").integrate(at.x, at.h, STEPS, **at.parameters).x[-1]
     assert apart(answers[case]["x"], expected) < 1e-13
@@ -261,7 +264,7 @@ def test_the_gauge_is_chosen_as_in_numpy_or_given(case, answers, tmp_path):
     jobs = [{"x0": at.x, "gauge": multiples}, {"x0": [1e200] * len(at.x)}]
     prescribed, far = node(tmp_path, [(compilation, options, at.h, 3) for options in jobs])
     assert apart(prescribed["x"], module.integrate(at.x, at.h, 3, gauge=multiples)[-1]) < 1e-14
-    if "formula" not in case:  # of states so large the leading error is infinite
+    if "formula" not in case:  # for such large states the leading error is infinite
         assert not np.any(far["gauge"])
         assert not np.any(module.gauge([1e200] * len(at.x)))
 
@@ -310,7 +313,7 @@ def test_members_may_have_parameters_steps_and_times_of_their_own(case, answers)
     assert apart(answer["x"], expected) < 1e-13
 
 
-#: Systems and steps that end in an error: far too large ones for each kind of step, and what leads to another energy.
+#: Systems and step sizes that fail: far too large steps for each kind of step, and a solution at another energy.
 FAILING = [("rigid_body", 40.0), ("sir_epidemic", 300.0), ("pendulum_euler", 1e200), ("toda3", 1e3), ("kepler", 30.0)]
 FAILING += [("a splitting that runs to infinity", 0.5), ("a composition, too large", 5.0)]
 ENDING = {
@@ -403,7 +406,7 @@ def test_names_of_the_user_may_be_words_of_javascript(tmp_path):
     assert apart(answer["x"], expected.x[-1]) < 1e-14
 
 
-#: Reads modules without running them.
+#: Script that parses modules without executing them.
 PARSED = """
 const vm = require("node:vm"), fs = require("node:fs");
 for (const identifier of process.argv.slice(1))

@@ -15,7 +15,7 @@ x, y = symbol("x"), symbol("y")
 
 
 def kernel(*values):
-    """Of x and y, with the values as those of an array, and one value of another."""
+    """Return a kernel of x and y with an array of the values as one output, and a single value as another."""
     return Kernel("k", "a kernel", {"at": ("x", "y")}, (Output("first", (x,)), Output("matrix", values)))
 
 

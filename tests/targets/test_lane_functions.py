@@ -1,4 +1,4 @@
-"""The functions for the loops over lanes agree with the library to a few units of the last place."""
+"""Functions for loops over SIMD lanes agree with the library to a few units in the last place."""
 
 import pytest
 from support import run, slow_but, tool, write
@@ -7,11 +7,11 @@ from phigen.lanes.lane_functions import LANE_FORMULAS, LANE_FUNCTIONS, with_form
 from phigen.symbolic.special import SPECIAL
 from phigen.targets.c.amalgamation import Amalgam
 
-#: Largest argument, and units of the last place; sums of exponentials lose one or two.
+#: Largest argument, and error in units in the last place; sums of exponentials lose one or two.
 RANGES = {"log": (1e308, 2), "exp": (600.0, 2), "expm1": (600.0, 3), "sin": (1e8, 2), "cos": (1e8, 2)}
 SINGLE = {"log": (3e38, 2), "exp": (80.0, 2), "expm1": (80.0, 2), "sin": (8192.0, 2), "cos": (8192.0, 2)}
 
-#: Where functions are compared, for −1 ≤ t ≤ 1.
+#: Arguments at which functions are compared, for −1 ≤ t ≤ 1.
 ARGUMENTS = {"log": "exp(LARGE * t), 1.0 + 0.5 * t * t * t", "others": "REACH * t, 3.0 * t * t * t"}
 
 MAIN = """
@@ -43,7 +43,9 @@ COMPILED = [("double", FAST), ("double", "-O0"), ("float", FAST), ("float", "-O0
 @pytest.mark.parametrize(("real", "flags"), slow_but([("double", FAST), ("float", "-O0")], COMPILED))
 @pytest.mark.parametrize("name", RANGES)
 def test_lane_functions_agree_with_the_library(real, name, flags, tmp_path):
-    """Over the whole range and, closer together, near 0; no number beyond it, so that steps there are made singly."""
+    """Arguments cover the whole range and, more densely, a neighbourhood of 0. Beyond the range values are NaN, so that
+    steps there are computed one by one.
+    """
     single = real == "float"
     reach, units = (SINGLE if single else RANGES)[name]
     switches = {f"CALLS_{f.upper()}": f == name for f in RANGES} | {"COMPOSED": True, "SINGLE": single}

@@ -49,7 +49,7 @@ def test_what_is_written(case):
     slow_but(["pendulum"], of=["pendulum", "rigid_body", "duffing", "kepler_eccentric", "guiding_centre", "toda"]),
 )
 def test_machine_code_is_that_of_the_profile_small(name, tmp_path):
-    """So parentheses and braces have changed no meaning."""
+    """Equal machine code shows that parentheses and braces do not change the meaning."""
     compilers = []
     for profile, without in (("small", ("ensemble", "kicks")), ("certified", ())):
         files = emit(compile_spec(spec_of(name), profile=profile, without=without).program, "c", "x")

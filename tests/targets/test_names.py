@@ -1,4 +1,4 @@
-"""Coordinates and parameters may be called anything; titles may contain anything."""
+"""Coordinates and parameters may have any name, and titles any text."""
 
 import ast
 import keyword
@@ -47,12 +47,14 @@ t1 t12 t_1 t1_ t2 u v w a b c d e i j k m n p q r s x y h coef work lane params 
 step integrate hamiltonian casimirs DIM ORDER CASIMIRS _filled _sum _values np_ int_ params_ lambda_ I_ I__ out energy
 p_x p_p_x phi0 _phi0 tuple list float_ self_ M_E_ x0 steps stride X0 N S O H E_ J alpha jacobian"""
 
-#: Some names of every kind that cannot stand everywhere, and names that the output uses itself.
+#: Names of every kind that are reserved somewhere, and names that generated code uses itself.
 AWKWARD = _AWKWARD.split()
 
 
 def check_c(compilation, tmp_path):
-    """The C compiles without a warning as C99 and with GNU's macros; the header after all others, as C++ too."""
+    """Check that the C compiles without warnings as C99 and with GNU's macros, and its header after all others, also as
+    C++.
+    """
     name = compilation.program.name
     others = [h for h in OTHER_HEADERS if h not in NOT_OF_CPP]
     after = "".join(f"#include <{h}.h>\n" for h in others) + f'#include "{name}.h"\n'
@@ -64,7 +66,7 @@ def check_c(compilation, tmp_path):
 
 
 def preprocessed(compiler, language, standard, headers, *options):
-    """What the preprocessor makes of the headers."""
+    """Return the output of the preprocessor for the headers."""
     text = "".join(f"#include <{h}.h>\n" for h in headers if language == "c" or h not in NOT_OF_CPP)
     command = [tool(compiler), "-x", language, f"-std={standard}", "-E", *options, "-"]
     return subprocess.run(command, input=text, capture_output=True, text=True, check=True).stdout
@@ -73,7 +75,8 @@ def preprocessed(compiler, language, standard, headers, *options):
 @pytest.mark.parametrize(("compiler", "language", "standard"), DIALECTS)
 def test_no_macro_of_the_standard_headers_is_an_identifier(compiler, language, standard):
     defined = preprocessed(compiler, language, standard, OWN_HEADERS + OTHER_HEADERS, "-dM")
-    # A macro with arguments is none where no parenthesis follows, and none follows a name of ours.
+    # A macro with parameters is not expanded without a parenthesis, and generated code puts none after names of the
+    # model.
     macros = re.findall(r"^#define (\w+)(?!\S)", defined, re.MULTILINE)
     assert {"INT_MAX", "errno", "__STDC_HOSTED__"} < set(macros)
     assert [m for m in macros if m not in C_RESERVED] == []
@@ -82,7 +85,7 @@ def test_no_macro_of_the_standard_headers_is_an_identifier(compiler, language, s
 @pytest.mark.parametrize("standard", ["c99", "gnu17"])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_what_is_not_reserved_can_stand_in_c(compiler, standard, tmp_path):
-    """All identifiers of the headers that are left: as a member, and as a variable, with warnings about shadowing."""
+    """All other identifiers of the headers are tried as a member and as a variable, with warnings about shadowing."""
     words = set(re.findall(r"[A-Za-z_]\w*", preprocessed(compiler, "c", standard, OWN_HEADERS + OTHER_HEADERS, "-P")))
     names = sorted(w for w in words if w not in C_RESERVED)
     assert {"lgamma", "abs", "div", "clock"} < set(names)
@@ -108,12 +111,12 @@ def test_what_is_not_reserved_can_stand_in_javascript(tmp_path):
 
 
 def quoted(names):
-    """A YAML list of names."""
+    """Return a YAML list of names."""
     return "[" + ", ".join(f"'{n}'" for n in names) + "]"
 
 
 def agree(compilation, x0, parameters=None):
-    """C and NumPy make the same step, and compute the same vector field."""
+    """Check that C and NumPy make the same step, and compute the same vector field."""
     solvers = [solver(compilation, target) for target in TARGETS]
     steps = [s.step(x0, h=0.01, parameters=parameters or {}) for s in solvers]
     fields = [s.vector_field(x0, parameters=parameters or {}) for s in solvers]
@@ -124,7 +127,7 @@ def agree(compilation, x0, parameters=None):
 
 
 def chunks(energy, size=60):
-    """The sum in pieces that fit into one line of a spec."""
+    """Return the sum in parts that fit into lines of a spec."""
     terms = energy.split(" + ")
     return [" + ".join(terms[i : i + size]) for i in range(0, len(terms), size)]
 
@@ -176,7 +179,9 @@ def test_every_awkward_name_can_be_a_parameter(tmp_path):
 
 
 def macros_of_solvers(name):
-    """The phrases and macros of the runtime in C, and what macros of a solver with that name, or its guards, may be."""
+    """Return the phrases and macros of the runtime in C, and the possible names of macros and include guards of a
+    solver with this name.
+    """
     runtime = (resources.templates() / "c/runtime").glob("*.[ch]")
     defined = {m for file in runtime for m in re.findall(r"#define (PHI_\w+)", file.read_text("utf-8"))}
     every = {m for m in defined | phrases.names() if not m.startswith("PHI_FILE_")}
@@ -205,7 +210,7 @@ def test_parameters_may_have_the_names_of_all_macros_of_the_runtime(tmp_path):
 
 
 def test_coordinates_may_have_the_names_of_macros_and_functions_of_the_solver(tmp_path):
-    """Coordinates are variables of functions that call others of the solver."""
+    """Coordinates are local variables of functions that call other functions of the solver."""
     compilation = compile_text(
         "coordinates: [PHI_COPY, t_versin, T_H, t_DIM]\nparameters: {PHI_UNROLL: 2, phi_x: 3, t_TOLERANCE: 1}\n"
         "poisson: {canonical: {q: [PHI_COPY, T_H], p: [t_versin, t_DIM]}}\norder: 2\nprofile: fast\n"
@@ -227,7 +232,7 @@ def test_the_header_says_which_parameter_a_changed_member_is():
 
 
 def test_names_may_be_those_of_momenta_and_of_functions_that_are_called(tmp_path):
-    """The generated code names ∂S/∂x `p_x`, which is what many call the momentum, and computes abs by `fabs`."""
+    """Generated code has the name `p_x` for ∂S/∂x, which many use for a momentum, and calls `fabs` for abs."""
     compilation = compile_text(
         "coordinates: [x, p_x, fabs, pow]\nparameters: {k: 2}\n"
         "poisson: {canonical: {q: [x, fabs], p: [p_x, pow]}}\n"
@@ -281,7 +286,9 @@ TITLES = [
 
 
 def test_titles_and_descriptions_are_harmless(tmp_path):
-    """Without comments, the code is that of a spec without title and descriptions; its edits are still noticed."""
+    """Without comments, the code equals that of a spec without title and descriptions; changes of its text are still
+    detected.
+    """
     bare = titled("")
     code = without_comments(bare, tmp_path)
     for title in TITLES:
@@ -294,7 +301,7 @@ def test_titles_and_descriptions_are_harmless(tmp_path):
 
 
 def titled(title):
-    """A small system with that title, and a parameter with that description."""
+    """Return a small system with this title, and with a parameter that has it as description."""
     escaped = title.replace("'", "''")
     return compile_text(
         f"title: '{escaped}'\ncoordinates: [q, p]\nparameters: {{k: {{value: 1, description: '{escaped}'}}}}\n"
@@ -303,7 +310,7 @@ def titled(title):
 
 
 def without_comments(compilation, folder):
-    """The tokens of the C after its comments are gone, with trigraphs replaced, and the syntax tree of the Python."""
+    """Return the tokens of the C without comments and with trigraphs replaced, and the syntax tree of the Python."""
     sources = files(compilation, "c") | files(compilation, "numpy")
     texts = {name: re.sub(r"[0-9a-f]{64}", "", text) for name, text in sources.items()}
     write(folder, texts)

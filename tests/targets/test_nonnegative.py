@@ -49,7 +49,7 @@ def test_zero_is_allowed_and_less_is_not(text, target):
     np.testing.assert_allclose(solver.step(x, 0.1, k=0.0), moved, atol=1e-15)
     with pytest.raises(ValueError, match="'k' must be nonnegative, not -1"):
         solver.step(x, 0.1, k=-1.0)
-    backend = solver.backend  # the generated code refuses it too
+    backend = solver.backend  # generated code refuses the value too
     values = solver.values({}, {}, (4,)) if text is CHAIN else {"k": 0.0, "m": 1.0}
     for name in ("k", "w") if text is CHAIN else ("k",):
         negative = -1e-300 * np.ones_like(values[name])

@@ -1,4 +1,4 @@
-"""Numerical policies are written once, in phigen/scheme/policies.py, and printed into all targets."""
+"""Numerical policies are defined once, in phigen/scheme/policies.py, and printed into all targets."""
 
 import re
 from dataclasses import fields, replace
@@ -16,7 +16,7 @@ RUNTIMES = [
     *resources.templates().glob("numpy/*.jinja"),
 ]
 
-#: A system of each kind of implicit step, and numbers of policies that its code has.
+#: A system for each kind of implicit step, with policies whose numbers its code contains.
 CASES = {
     "rigid_body": {
         "start_policy": "probe_step",
@@ -55,7 +55,7 @@ def test_no_runtime_file_defines_a_number_of_a_policy():
 
 
 def test_small_numbers_of_the_runtimes_have_names():
-    """A threshold in the middle of an expression is a policy, written in each language anew."""
+    """A threshold inside an expression would be a policy that is defined separately in each language."""
     threshold = re.compile(r"(?<![\w.])[0-9.]+e-[0-9]+\b|2(?:\.0)? ?\*\* ?-[0-9]+")
     for file in (f for f in RUNTIMES if not f.name.startswith(("lane_functions", "philox", "fmu"))):
         for line in file.read_text(encoding="utf-8").splitlines():
@@ -68,7 +68,7 @@ def test_small_numbers_of_the_runtimes_have_names():
 
 
 def test_constants_that_runtimes_import_are_those_of_the_record():
-    """A number that no runtime reads would be a comment; one that is missing, a mistake in a target."""
+    """Every constant must be read by a runtime, and every constant that a runtime reads must be defined."""
     for file in RUNTIMES:
         text = file.read_text(encoding="utf-8")
         for names, policy in re.findall(r'import \{ (.*) \} from "\./(\w+)\.mjs"', text):

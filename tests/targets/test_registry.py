@@ -1,4 +1,4 @@
-"""The registry of targets, from which every list of them derives."""
+"""The registry of targets, from which all lists of targets derive."""
 
 import json
 

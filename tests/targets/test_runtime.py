@@ -1,4 +1,4 @@
-"""The runtime of the C, as it lies in templates/c/runtime, with a pendulum written by hand: no generator takes part."""
+"""The C runtime in templates/c/runtime, compiled with a pendulum that is written by hand, without the generator."""
 
 import re
 from math import sin
@@ -21,14 +21,14 @@ LEFT_OUT = ["-I.", "-include", "left_out.h"]
 INCLUDED = [f"-I{BY_HAND}", f"-I{RUNTIME}", *LEFT_OUT]
 WARNINGS = ("all", "extra", "pedantic", "conversion", "double-promotion", "shadow", "no-unused-function", "error")
 OF_LATTICES = ("lattice", "rows", "graph")
-#: The layer of FMUs is written for one model; tests/fmu compile it with the same warnings.
+#: Prefix of files of the FMU layer, which is printed for one model; tests/fmu compile it with the same warnings.
 OF_MODELS = ("fmu",)
-#: That of devices is compiled with its languages by tests/devices.
+#: Prefix of files for devices; tests/devices compile them in their languages.
 OF_DEVICES = ("device",)
 STRICT = ["-std=c99", *(f"-W{warning}" for warning in WARNINGS)]
 
-#: -O1 would take four times as long, sums of pointers with numbers a third more: tests/generated/test_compilers.py has
-#: these looked at.
+#: Options of the sanitisers. -O1 would take four times as long, and checks of pointer arithmetic a third more;
+#: tests/generated/test_compilers.py has these checks.
 SANITISED = ["-O0", "-fsanitize=address,undefined", "-fno-sanitize=pointer-overflow", "-fno-sanitize-recover"]
 
 IMPLICIT = [
@@ -48,7 +48,7 @@ EXPLICIT += [(kind, "FAST", "ADJOINT") for kind in ("EXPLICIT", "SPLITTING")]
 
 @pytest.fixture(autouse=True)
 def printed(tmp_path):
-    """Headers in place of what the emitter puts together: constants, phrases, files that are left out."""
+    """Return a folder with headers that replace those of the emitter: constants, phrases, files that are left out."""
     sizes = ("DIFFERENCES", "DIRECTIONS")
     texts = {name: C.text(policy, sizes) for name, policy in POLICIES.items()}
     lines = ['#include "declarations.h"']
@@ -66,12 +66,12 @@ def printed(tmp_path):
 
 
 def defined(switches):
-    """The compiler's options for switches."""
+    """Return the compiler options for switches."""
     return [f"-DPHI_{switch}=1" for switch in switches]
 
 
-#: Each switch with one kind of step that has code for it, and all that go together; tests/generated/test_compilers.py
-#: has the fast code of implicit steps looked at.
+#: Sets of switches: each switch with one kind of step that has code for it, and all compatible ones together.
+#: tests/generated/test_compilers.py checks the fast code of implicit steps.
 FEW = [(kind, *more) for kind in ("NEWTON", "PATH") for more in ((), ("COMPOSED", "ADJOINT", "TANGENT"))]
 FEW += [("NEWTON", "GAUGE"), ("NEWTON", "FAST", "ADJOINT"), ("EXPLICIT",), ("EXPLICIT", "FAST", "ADJOINT")]
 FEW += [("EXPLICIT", "ADJOINT"), ("SPLITTING", "FAST", "ADJOINT"), ("SPLITTING", "TANGENT"), ("GAUSS", "ADJOINT")]
@@ -83,7 +83,9 @@ FEW += [("EXPLICIT", "ADJOINT"), ("SPLITTING", "FAST", "ADJOINT"), ("SPLITTING",
     [pytest.param(s, marks=() if s in FEW else pytest.mark.slow, id=" ".join(s)) for s in [*IMPLICIT, *EXPLICIT]],
 )
 def test_pendulum_by_hand_moves_as_it_should(switches, tmp_path):
-    """With the sanitisers: energy, time, reversibility, many as one, failures, the tangent map (see main.c)."""
+    """Check with the sanitisers: energy, time, reversibility, steps in one call and one by one, failures, the tangent
+    map (see main.c).
+    """
     main = [*defined(switches), *INCLUDED, BY_HAND / "main.c", "-o", "main", "-lm"]
     run([tool("gcc"), *STRICT, *SANITISED, *main], tmp_path)
     printed = [float(v) for v in run([tmp_path / "main"], tmp_path).split()]
@@ -92,7 +94,7 @@ def test_pendulum_by_hand_moves_as_it_should(switches, tmp_path):
 
 
 def midpoint_rule(steps=10, h=0.05, g=1.5):
-    """q and p after steps of the implicit midpoint rule, by fixed-point iteration."""
+    """Return q and p after steps of the implicit midpoint rule, solved by fixed-point iteration."""
     q, p = 1.0, 0.2
     for _ in range(steps):
         a, b = q, p
@@ -110,7 +112,9 @@ def test_runtime_compiles_without_a_warning_by_clang(switches, tmp_path):
 
 
 def test_pendula_of_a_lattice_by_hand_move_as_they_should(tmp_path):
-    """With the sanitisers: energy, reversibility, the field, failures, sizes that are not allowed (see main.c)."""
+    """Check with the sanitisers: energy, reversibility, the field, failures, sizes that are not allowed (see
+    main.c).
+    """
     main = ["-I", CHAIN, "-I", RUNTIME, *LEFT_OUT, CHAIN / "main.c", "-o", "main", "-lm"]
     run([tool("gcc"), *STRICT, *SANITISED, *main], tmp_path)
     assert run([tmp_path / "main"], tmp_path) == "ok\n"
@@ -118,7 +122,7 @@ def test_pendula_of_a_lattice_by_hand_move_as_they_should(tmp_path):
 
 @pytest.mark.parametrize("flags", [["-O2"], ["-O2", "-fopenmp=libgomp"]], ids=" ".join)
 def test_lattices_compile_without_a_warning_by_clang(flags, tmp_path):
-    """clang may have no omp.h."""
+    """The test compiles without OpenMP, since clang may have no omp.h."""
     main = [*flags, "-I", CHAIN, "-I", RUNTIME, *LEFT_OUT, CHAIN / "main.c"]
     run([tool("clang"), *STRICT, "-fsyntax-only", *main], tmp_path)
 
@@ -142,7 +146,7 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
     ids=lambda p: p.name,
 )
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
-    """Parts of a file, which it includes in its midst, do so with all of it."""
+    """A file that is included in the middle of another one is compiled with that file."""
     while whole := whole_of(path):
         path = whole
     kinds = {"batches.c": "SPLITTING", "adjoint_segments.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
@@ -163,14 +167,16 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
 
 
 def whole_of(path):
-    """The file that includes a part in its midst, and that the part includes at its head, if there is one."""
+    """Return the file that includes a part in its middle and is itself named at the head of the part, if there
+    is one.
+    """
     included = [RUNTIME / file for file in re.findall(r'#include "(\w+\.c)"', head(path))]
     here = f'#include "{path.name}"'
     return next((f for f in included if here in f.read_text(encoding="utf-8") and here not in head(f)), None)
 
 
 def head(path):
-    """What is before the first line of code or comment."""
+    """Return the lines before the first line of code or comment."""
     return re.match(r"(#.*\n|\n)*", path.read_text(encoding="utf-8"))[0]
 
 
@@ -198,7 +204,7 @@ def test_lines_are_broken_before_what_binds_least():
 
 
 def test_conditions_are_broken_before_comparisons_rather_than_behind():
-    """But best between them."""
+    """A break between two comparisons is preferred to both."""
     wide, wider = "a" * 40, "b" * 62
     assert fitted(f"    if ({wide} && {wider} >= 1) return 0;").split("\n")[1] == f"        && {wider} >= 1) return 0;"
     assert fitted(f"    if ({wider} + {wide[:30]} >= 12345) return;").split("\n")[1].strip() == ">= 12345) return;"

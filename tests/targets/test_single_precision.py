@@ -1,4 +1,4 @@
-"""C in single precision: what is written, what it computes, and what is refused."""
+"""C in single precision: its text, its results, and refusals."""
 
 import ctypes
 import re
@@ -34,12 +34,12 @@ WRITTEN = {
     ),
 }
 
-#: Newton steps with a gauge, along paths, composed splittings, a monitor, noise, Gauss collocation; lattices that call
-#: functions in rows, are stiff, or a graph.
+#: Systems with Newton steps and a gauge, paths, composed splittings, a monitor, noise, Gauss collocation; lattices that
+#: call functions in rows, with stiff steps, or on a graph.
 SYSTEMS = ("rigid_body", "nambu_pendulum", "henon_heiles", "kepler_eccentric", "thermal_spin", "kowalevski_gauss")
 LATTICES = ("sine_gordon", "toda", "kdv", "food_web")
 
-#: Functions of the library that compute in double precision.
+#: Functions of the library in double precision.
 DOUBLE = re.compile(
     r"^ +U (sin|cos|tan|exp|expm1|log|log1p|pow|sqrt|fabs|fmin|fmax|floor|copysign|cbrt|sinh|cosh)$", re.M
 )
@@ -53,7 +53,9 @@ def test_what_is_written(case):
 
 @cache
 def in_single(name, **extras):
-    """The compilation of a system of the corpus in single precision, and in double with the same short code."""
+    """Return the compilation of a system of the corpus in single precision, and in double precision with the same short
+    code.
+    """
     double_compilation = small(as_given(name)) if not extras else compile_spec(spec_of(name), **extras, profile="small")
     program = replace(double_compilation.program, extras=replace(double_compilation.program.extras, real="float"))
     return replace(double_compilation, program=program), double_compilation
@@ -62,7 +64,7 @@ def in_single(name, **extras):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", [*SYSTEMS, *LATTICES])
 def test_there_is_no_double_in_it(name, tmp_path):
-    """No promotion, no conversion back, no function of the library that takes doubles."""
+    """The code has no promotion to double, no conversion back, and no function of the library that takes doubles."""
     write(tmp_path, emit(in_single(name)[0].program, "c", ""))
     flags = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Werror", "-Wdouble-promotion", "-Wfloat-conversion"]
     run([tool("gcc"), *flags, "-Wno-unknown-pragmas", "-c", f"{name}.c"], tmp_path)
@@ -79,7 +81,9 @@ def numbers(compilation):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_steps_are_those_of_double_precision_to_its_digits(name):
-    """Over a hundred steps, Casimirs by themselves; at most as near as numbers of 24 digits can be."""
+    """Compare states after a hundred steps, and Casimirs separately; the tolerance is the precision of numbers with 24
+    bits.
+    """
     (single, other), (at, parameters) = in_single(name), numbers(in_single(name)[0])
     start = np.array(at.x, dtype=np.float32).astype(float)
     in_floats, right = (solver(c, "c").integrate(start, at.h, 100, **parameters) for c in (single, other))
@@ -103,7 +107,7 @@ def test_lattices_move_as_in_double_precision(name):
 
 @pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "nambu_pendulum", "kowalevski_gauss"]))
 def test_derivatives_are_those_of_double_precision(name):
-    """The tangent map of a step, and gradients of a run; along paths they are traced one by one."""
+    """Compare the tangent map of a step and gradients of a run; paths are traced one by one."""
     (single, other), (at, parameters) = in_single(name, tangent=True, adjoint=True), numbers(in_single(name)[0])
     (_, tangent), (_, right) = (solver(c, "c").step_tangent(at.x, at.h, **parameters) for c in (single, other))
     assert 1e-9 < np.abs(tangent - right).max() < ONE_STEP
@@ -130,7 +134,7 @@ def test_a_session_and_an_ensemble():
 
 
 def test_it_stays_on_the_leaf_for_a_million_steps():
-    """As in double precision: rounding does not add up."""
+    """As in double precision, rounding errors of Casimirs do not accumulate."""
     single, _ = in_single("rigid_body")
     at, parameters = numbers(single)
     run = solver(single, "c").integrate(at.x, at.h, 1_000_000, stride=10_000, **parameters)
@@ -152,7 +156,7 @@ real: float
     ("wrong", "said"), [({"x": 1e39}, "q = 1e+39"), ({"k": -1e39}, "k = -1e+39"), ({"h": 1e39}, "the step h = 1e+39")]
 )
 def test_a_number_beyond_single_precision_is_named_and_costs_its_member_alone(tmp_path, wrong, said):
-    """And numpy does not warn of its own."""
+    """NumPy must not warn in addition."""
     (tmp_path / "large.yaml").write_text(LARGE, encoding="utf-8")
     solver = phigen.compile(tmp_path / "large.yaml", target="c")
     numbers_given = {"x": 1.0, "k": 1.0, "h": 0.1} | wrong
@@ -188,7 +192,7 @@ def test_a_site_beyond_single_precision_is_named():
     [("rigid_body", ("phi0", "phi1")), ("satellite_wheels", ("cosroot", "sinroot", "sin", "versin"))],
 )
 def test_functions_have_the_length_that_24_bits_need(name, functions, tmp_path):
-    """Tables end where terms are below rounding, no coefficient is replaced by a limit, and all digits are right."""
+    """Tables end at terms below rounding, no coefficient is replaced by a limit, and all digits are right."""
     compilation = compile_spec(spec_of(name), profile="small", real="float")
     files = emit(compilation.program, "c", "x")
     wrapped = [f"float at_{f}(float s);\nfloat at_{f}(float s) {{ return {name}_{f}(s); }}\n" for f in functions]

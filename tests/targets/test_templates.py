@@ -1,4 +1,4 @@
-"""Templates are loops over printed strings, with parts that may be left out: what is decided, is decided in Python."""
+"""Templates are loops over printed strings with optional parts; all decisions are made in Python."""
 
 import re
 
@@ -17,7 +17,7 @@ def test_every_target_has_templates():
 
 @pytest.mark.parametrize("path", TEMPLATES, ids=IDS)
 def test_template_is_a_chapter_at_most(path):
-    """A template is a chapter of the output; what takes more is several, or is no template but code."""
+    """A template is at most one chapter of the output; longer ones must be divided, or become code."""
     text = path.read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 150
 

@@ -1,4 +1,4 @@
-"""The lexer of C, and what its tokens are read for."""
+"""The lexer of C, and the functions that read its tokens."""
 
 from phigen import resources
 from phigen.targets.c.tokens import TokenKind, lexemes, names, tokens, without_word
