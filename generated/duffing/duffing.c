@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 8f80ff7d79d9372ab221efd544bac3926e1ec6872e0176483aeb7ba6df1da636
+ * body-sha256: 0e1c920cf911b283bfc55b59ddbf71811fc3aefeb090cca01f66bf3037566f26
  */
 #include "duffing.h"
 #include <float.h>
@@ -258,7 +258,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define duffing_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
+#define duffing_FLOOR 1e-6 /* least size of a component of y, as a fraction of the largest */
 
 #define duffing_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */

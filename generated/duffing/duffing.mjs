@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c6d9b849ae779d486e7f1584f4d04ec5775ae267b73bda71dc0c2493d64a73eb
+ * body-sha256: 30c0e6e0e4262726382b8a9cfc0986f5ef8bd1b1fb7a308f2df1363b1f3d85dd
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -176,7 +176,7 @@ function vectorField(params, t, x, out) {
 /** A step size for which coefficients are finite. */
 const PROBE_STEP = 1e-100;
 
-/** Smaller components of y count as this fraction of the largest. */
+/** Least size of a component of y, as a fraction of the largest. */
 const FLOOR = 1e-6;
 
 /** A correction below this may be rounding. */

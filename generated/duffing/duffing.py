@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 303edbf42115b335e4b2d060879ce8f25a58ce1a442b7a8670a819f94d88a5be
+# body-sha256: b33a66b8541d714fbcc30d7914cc6aae652452ede475e5b6e7b597eca6bd0fdb
 import numpy as np
 
 VERSION = "0.1.0"
@@ -239,7 +239,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
+FLOOR = 1e-6  # least size of a component of y, as a fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
 SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 

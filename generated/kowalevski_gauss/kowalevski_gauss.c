@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: 4bd96dc3449d841d8055ebb068167aa64f6e843b0dbba002cd099c8d3466701c
+ * body-sha256: f2cd2c91ac1d1306f390c18bcdee7b3848d3a03dbe985f6cbaf88cb381b4215d
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -524,7 +524,7 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, double point[k
 }
 
 enum {
-    /* growing changes after transients: with more sweeps of this kind, the step is too large */
+    /* changes that may grow after transients before the step fails as too large */
     kowalevski_gauss_MOST_RISING = 3,
     /* steps between comparisons of the predictors; a comparison costs as much as two sweeps */
     kowalevski_gauss_TRIALS = 32,

@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 90288f3fc189eb8f933ac9edd129ac9add22202db724d41e55eb366b795bcaac
+# body-sha256: 72677f2471e716f8b9ada996be71effb7d66b75e7f7017181ad47078c514012a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -201,7 +201,7 @@ def _next_frame(coef, x, z, k):
         ])
 
 
-MOST_RISING = 3  # growing changes after transients: with more sweeps of this kind, the step is too large
+MOST_RISING = 3  # changes that may grow after transients before the step fails as too large
 SOLVED = 2e-18  # largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs
 STALLED = 0.8  # ratio of successive changes from which on sweeps do not help; with 0.4 Casimirs drifted
 ROUNDING = 4e-16  # sweeps end at a change below this with at least the ratio STALLED

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 7474840c22dadf3a18bbd36817578ee64124f4d6a7f9999476c9bcb9d5441ce2
+ * body-sha256: 2c5574f1e56e56eb58386789b9d190ed9d0fe0a817ecdc33fe5b5cf13dff72d6
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -232,7 +232,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define predator_prey_FLOOR 0.0 /* smaller components of y count as this fraction of the largest */
+#define predator_prey_FLOOR 0.0 /* least size of a component of y, as a fraction of the largest */
 
 #define predator_prey_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */

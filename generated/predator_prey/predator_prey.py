@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 6fc2be5e256ab3464da8e28ac99c8e59b6d59e3a890583c0e4c8ed5f0ffdf23e
+# body-sha256: d13b7542a5c87c55b35b8631fc9697b9f9998a2e2933e376748b25cac9772500
 import numpy as np
 
 VERSION = "0.1.0"
@@ -233,7 +233,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 0.0  # smaller components of y count as this fraction of the largest
+FLOOR = 0.0  # least size of a component of y, as a fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
 SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 7ac3858a92a884027b8ac4b2d6a6ec747f1258d5ea99d381843a7a421520266f
+ * body-sha256: ac047caf0c3c8b902b5c5b8d9e16247e43a5bfea8bcf0ec83a75413d9699bb7a
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -660,7 +660,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define rigid_body_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
+#define rigid_body_FLOOR 1e-6 /* least size of a component of y, as a fraction of the largest */
 
 #define rigid_body_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 948e3486fc320c642655c7cade71787f7fb423195f027dee109a8c46cc3fcec5
+ * body-sha256: 0b9861e472e6fa41b60644b305073694e7b8841b9c22a747c37228bfde0b8af7
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -455,7 +455,7 @@ function vectorField(params, x, out) {
 /** A step size for which coefficients are finite. */
 const PROBE_STEP = 1e-100;
 
-/** Smaller components of y count as this fraction of the largest. */
+/** Least size of a component of y, as a fraction of the largest. */
 const FLOOR = 1e-6;
 
 /** A correction below this may be rounding. */

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d7af75b97f6165d305b4aeea695b6629508856a037ef98e76cf977665f1cede6
+# body-sha256: a33c3255b68ff7926a92692e7e43ae162437d9285cb130b94fcbecb175f0eba5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -485,7 +485,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
+FLOOR = 1e-6  # least size of a component of y, as a fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
 SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 0efb03223e14bca8fc96c48bc552fea8c12fc49984ea091a252fd8a283bc3415
+ * body-sha256: 753345e63ff3787a6d18f80f8edb262bfd503c63274b76455e07c880b3ad3753
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -289,7 +289,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define thermal_spin_FLOOR 1e-6 /* smaller components of y count as this fraction of the largest */
+#define thermal_spin_FLOOR 1e-6 /* least size of a component of y, as a fraction of the largest */
 
 #define thermal_spin_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */

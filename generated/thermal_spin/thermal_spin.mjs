@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a2315cff01d44c340963e722ca1e5b291648c56f897612d45996d536eaf543eb
+ * body-sha256: c1f078bd4797ab081a98c213d7a280a91e04314b66d756bfa493396acc89b643
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -273,7 +273,7 @@ function vectorField(params, x, out) {
 /** A step size for which coefficients are finite. */
 const PROBE_STEP = 1e-100;
 
-/** Smaller components of y count as this fraction of the largest. */
+/** Least size of a component of y, as a fraction of the largest. */
 const FLOOR = 1e-6;
 
 /** A correction below this may be rounding. */

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: dc56902097a96878a6add8a746d7489dca8577c3d1cdf58b42f6177d59b0626b
+# body-sha256: bdca6972b1807342deffc7f2b537d94f447238c19c46e629875ddb7479132a2c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -329,7 +329,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # smaller components of y count as this fraction of the largest
+FLOOR = 1e-6  # least size of a component of y, as a fraction of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
 SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 

@@ -117,8 +117,8 @@ def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) 
 
 
 def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
-    """Return the form ⟨x, coordinates of P E_i P⟩ in the first representation where P E_i P lies in the algebra, P = Σ
-    p_a E_a.
+    """Return the form ⟨x, coordinates of P E_i P⟩ of P = Σ p_a E_a, in the first representation where P E_i P lies in
+    the algebra.
 
     The second result describes this representation. Raises `SpecError`, with the representations that were tried, if
     there is none.

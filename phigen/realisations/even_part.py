@@ -183,7 +183,7 @@ def _nilpotent(tower: Tower, matrix: Sequence[Vector], x: Vector) -> EvenPart | 
 
 def _semisimple(tower: Tower, matrix: Sequence[Vector], x: Vector, root: Poly) -> EvenPart | None:
     s = tower.expression(root)
-    first = times(matrix, times(matrix, x))  # N x
+    first = times(matrix, times(matrix, x))  # N x with N = M²
     residual = [a + s * b for a, b in zip(times(matrix, times(matrix, first)), first, strict=True)]  # (N + s) N x
     simplest = f"φ(s), s = {_shown(s)}"
     if _vanish(tower, residual):

@@ -96,13 +96,19 @@ def _path_element_kernel(group: Group, system: System) -> Kernel:
     """Return the kernel of the group element of a step along a path, as a function of the covector p."""
     p = [symbol(c) for c in system.coordinates]  # the inputs p_i get the names of the coordinates x_i
     inputs = {"p": system.coordinates}
-    return Kernel("along", "the increment of p", inputs, (Output("turn", tuple(_element_less_one(group, p, False))),))
+    return Kernel(
+        "along",
+        "the group element of the covector p, minus 1",
+        inputs,
+        (Output("turn", tuple(_element_less_one(group, p, False))),),
+    )
 
 
 def _element_less_one(group: Group, p: list[Expression], cayley: bool) -> list[Expression]:
     """Return the group element of the covector p, minus 1: its exponential, or its Cayley transform if ``cayley``.
 
-    The exponential of a matrix is computed later: then the result is p and a bound for its squared norm.
+    If it is the exponential of a matrix, the generated code computes it later; the result is then p and a bound for the
+    squared size of the matrix.
     """
     if not group.matrices:
         return [*element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=cayley)]
@@ -113,7 +119,10 @@ def _exponential(group: Group) -> Kernel:
     names = tuple(f"p{i}" for i in range(1, len(group.matrices) + 1))
     values = exponential(group, [symbol(n) for n in names])
     return Kernel(
-        "exponential", "the exponential of a small P, less 1", {"p": names}, (Output("element", tuple(values)),)
+        "exponential",
+        "exp(P) - 1 for a small matrix P with components p",
+        {"p": names},
+        (Output("element", tuple(values)),),
     )
 
 
@@ -159,7 +168,8 @@ def _carrier(group: Group) -> tuple[Symbol, ...]:
 def _element_after_flow(system: System, group: Group, turning: Turning, time: Expression) -> list[Expression]:
     """Return the group element of a step, minus 1, after one more flow.
 
-    It is the product of the element before this flow, which has symbols, and of the elements of the flow over ``time``.
+    It is the product of the element before this flow, whose entries are symbols, and of the elements of the flow over
+    ``time``.
     """
     element_before, factors = [symbol(s) for s in _carrier(group)], factor_elements(system, group, turning, time)
     return joined(group, [element_before, joined(group, factors)]) if factors else element_before

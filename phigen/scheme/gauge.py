@@ -55,8 +55,10 @@ class Gauge:
 
     @property
     def symbols(self) -> tuple[str, ...]:
-        """The symbols of the values that are constant on a trajectory: the free λ or, with a monitor, the energy level
-        e."""
+        """The symbols of the values that are constant on a trajectory.
+
+        These are the multiples λ of Casimirs that the solver chooses or, with a monitor, the energy level e.
+        """
         return (LEVEL,) if self.monitor else self.multiples
 
     @property
@@ -95,8 +97,10 @@ class Gauge:
         return self.monitor * (hamiltonian + symbol(LEVEL)) if self.monitor else hamiltonian
 
     def pace(self, system: System) -> Expression:
-        """Return the factor of ∇H + ζ in the system that is discretised: g if there are a monitor g and forces, else
-        1."""
+        """Return the factor that multiplies ∇H + ζ in the system that is discretised, where ζ is the covector force.
+
+        It is g if there are a monitor g and forces, else 1.
+        """
         return self.monitor if self.monitor and system.forces else ONE
 
     def applied(self, system: System) -> System:

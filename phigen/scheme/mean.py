@@ -40,7 +40,7 @@ def along_mean(n: int) -> Kernel:
         ("alpha_y", "increment_y", "jacobian", "increment_jacobian"), (*path_rows, *mean_rows), strict=True
     )
     outputs = [Output(name, tuple(e for row in matrix for e in row)) for name, matrix in named_rows]
-    purpose = "derivatives along the mean of a path"
+    purpose = "derivatives of alpha and beta - alpha with respect to the mean of a path"
     return Kernel("along_mean", purpose, inputs, (*outputs, Output("reciprocal", tuple(reciprocals))))
 
 

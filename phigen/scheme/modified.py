@@ -80,8 +80,8 @@ def modified_hamiltonian(
 
 
 def expect_modified(system: System, realisation: BiRealisation, stages: int) -> None:
-    """Raise `SpecError` for compositions, forces and approximate bi-realisations, which have no modified Hamiltonian
-    here."""
+    """Raise `SpecError` for compositions, forces and approximate bi-realisations, for which no modified Hamiltonian is
+    computed."""
     if stages > 1 or not realisation.exact or system.forces:
         obstacle = "a composition" if stages > 1 else "a system with forces"
         obstacle = obstacle if realisation.exact else "an approximate bi-realisation"

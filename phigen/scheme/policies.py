@@ -54,7 +54,7 @@ class MeasurePolicy(Policy):
     For coordinates that keep their sign and may differ much in size, the floor is 0.
     """
 
-    floor: float = number(1e-6, "smaller components of y count as this fraction of the largest")
+    floor: float = number(1e-6, "least size of a component of y, as a fraction of the largest")
 
 
 @dataclass(frozen=True)
@@ -96,9 +96,7 @@ class GaussPolicy(Policy):
     """Fixed-point sweeps over the stages of a Gauss method: when they end, when a step fails, how predictors are
     compared."""
 
-    most_rising: int = count(
-        3, "growing changes after transients: with more sweeps of this kind, the step is too large"
-    )
+    most_rising: int = count(3, "changes that may grow after transients before the step fails as too large")
     solved: float = number(
         2e-18, "largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs"
     )
@@ -160,7 +158,7 @@ class TangentPolicy(Policy):
 class GaussTangentPolicy(Policy):
     """Sweeps that solve the linear equations for the derivatives of the stages of a Gauss step."""
 
-    tangent_solved: float = number(1e-17, "a relative change below this is rounding;")
+    tangent_solved: float = number(1e-17, "a relative change below this is rounding")
     tangent_nearly_solved: float = number(1e-13, "a residual below this may be rounding: see TANGENT_SHRINKING")
     tangent_shrinking: float = number(
         0.4, "ratio of successive residuals below TANGENT_NEARLY_SOLVED that shows rounding"
@@ -182,10 +180,8 @@ class GaussAdjointPolicy(Policy):
 class PathTangentPolicy(Policy):
     """The Taylor series of a path together with its variation, for the derivatives of a step."""
 
-    tangent_negligible: float = number(1e-18, "terms that rounding hides in their sum, in sizes of start and sum")
-    tangent_rounded_slope: float = number(
-        1e-13, "rounding of slopes, in sizes of the path and its slope: variations add some"
-    )
+    tangent_negligible: float = number(1e-18, "terms below this fraction of start and sum are rounding")
+    tangent_rounded_slope: float = number(1e-13, "rounding of slopes with variations, relative to path and slope")
 
 
 @dataclass(frozen=True)

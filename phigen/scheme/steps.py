@@ -233,9 +233,9 @@ class Factorisation:
 class Newton(_Staged):
     """Step by Newton's method: it solves α(y, ∇S_h(y)) = x for y; then x' = x + (β − α)(y, ∇S_h(y)).
 
-    ``linearise`` is one iteration. ``eliminate`` solves linear equations with the Newton matrix.
-    ``eliminate_transposed`` solves those with its transpose, if gradients were requested. For many right-hand sides
-    there is ``invert``, ``factors``, or neither of the two. Where a kernel is None, the runtime uses a loop.
+    ``linearise`` is one iteration. ``eliminate`` solves linear equations with the Newton matrix, and
+    ``eliminate_transposed``, if gradients were requested, equations with the transposed matrix. For many right-hand
+    sides there is ``invert``, ``factors``, or neither of the two. Where a kernel is None, the runtime uses a loop.
     ``centred`` says that y is the mean of x and x'.
     """
 

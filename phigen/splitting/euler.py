@@ -63,8 +63,10 @@ class EulerMotion:
         return self._placed(names, rates)
 
     def increments(self, names: Sequence[str]) -> list[Expression]:
-        """Return the increments of all coordinates ``names`` in the flow over the time `TIME`; others than those of the
-        body get 0."""
+        """Return the increments of all coordinates ``names`` in the flow over the time `TIME`.
+
+        Coordinates that do not belong to the body have the increment 0.
+        """
         return self._placed(names, self.addition(symbol(TIME)).changes())
 
     def addition(self, time: Expression) -> Addition:
@@ -146,7 +148,8 @@ class Addition:
 
 
 def levels_of(x: Vector, factors: Vector) -> list[Expression]:
-    """Return the first integrals E_i = α_j α_k x_i² of the free rigid body."""
+    """Return the first integrals E_i = α_j α_k x_i² of the free rigid body ẋ_i = α_i x_j x_k; ``factors`` are the
+    α_i."""
     return [factors[j] * factors[k] * e**2 for e, (j, k) in zip(x, CYCLIC, strict=True)]
 
 

@@ -1,10 +1,10 @@
 """Kick parts: parts V of H = T + V with {V, {V, {V, T}}} = 0, for methods of Runge–Kutta–Nyström type.
 
 The condition holds if T resembles a kinetic energy, quadratic in the coordinates that the flow of V changes. Such pairs
-exist for every Poisson structure: p²/2 with a potential V(q), or on se(3)* a quadratic form of the momenta with a
-function of γ. In the Lie algebra that T and V generate, many brackets with several V then vanish, so a method has fewer
-order conditions. Since V commutes with {V, {V, T}}, V + κ{V, {V, T}} may also have an elementary flow: a kick with
-modified potential.
+exist for every Poisson structure: p²/2 with a potential V(q), or on se(3)* a quadratic form of the angular momenta with
+a function of the direction of gravity. In the Lie algebra that T and V generate, many brackets with several V then
+vanish, so a method has fewer order conditions. Since V commutes with {V, {V, T}}, V + κ{V, {V, T}} may also have an
+elementary flow: a kick with modified potential.
 
 The bracket is {f, g} = ∇f·π∇g. The opposite sign leads to the same formulas, since the number of brackets in every
 formula is even.
