@@ -227,7 +227,7 @@ class Recorder:
         return path.suffix.lower() == ".csv"
 
     def save(self, seconds: float = 0.0) -> None:
-        """Write all files and a checkpoint to the disk, if the last checkpoint is older than a number of seconds."""
+        """Write all files and a checkpoint to the disk, if the last checkpoint is at least ``seconds`` old."""
         path = self.files.checkpoint
         if path is None or time.monotonic() - self._saved < seconds:
             return

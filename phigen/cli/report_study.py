@@ -75,10 +75,10 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
 
 
 def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[Floats], float] | None:
-    """Return a function that maps a state to the largest error of its Casimirs, relative to their values at x0.
+    """Return a function that maps a state to the largest change of a Casimir since x0; None for systems without
+    Casimirs.
 
-    The error of each Casimir is divided by the size that `phigen.geometry.conservation.units` gives for it. The result
-    is None for systems without Casimirs.
+    The change of each Casimir is divided by the size that `phigen.geometry.conservation.units` gives for this Casimir.
     """
     from phigen.geometry.conservation import units
     from phigen.study.precision import ROUNDING

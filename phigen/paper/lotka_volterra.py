@@ -54,7 +54,7 @@ class Approach:
 
 
 def approach() -> Approach:
-    """Return the trajectories of the run of the spec by all methods."""
+    """Return the trajectories of all methods for the run `RUN` of the spec, and the exact states."""
     trajectories = {}
     for label, order in reversed(OWN.items()):
         compilation, solver = compiled(SPEC, order)
