@@ -231,7 +231,7 @@ class _CompiledSystem(_Compiled, ABC):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """Call that one of the three functions which is for this kind of compilation, with this compilation; return its
+        """Call the function for the scheme of this compilation (series, splitting or gauss) with it, and return the
         result."""
 
     @property

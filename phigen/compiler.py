@@ -373,7 +373,8 @@ def _turns_bodies(spec: Spec, system: System) -> bool:
 
 
 def _compile_gauss(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
-    """Compile a system by the scheme gauss: the unknowns of the collocation, the gauge, and the program."""
+    """Compile a system by the scheme gauss: unknowns of the collocation, Casimirs to subtract from H, and the
+    program."""
     expect_offered(spec)
     plan = plan_gauss(spec)
     realisation = clock.timed("momentum maps", lambda: realise_gauss(spec, source))

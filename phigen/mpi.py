@@ -274,7 +274,10 @@ class _Domain:
     # --- steps
 
     def advance(self, steps: int) -> None:
-        """Make a number of steps, including the last flow of the last step. Raises `StepError`."""
+        """Make a number of steps. Raises `StepError`.
+
+        The last flow of a step is merged with the first flow of the next step; after the last step it is applied alone.
+        """
         if steps:
             self._put_all(self.saved)
         end, stretch = self.steps + steps, STRETCH

@@ -240,8 +240,8 @@ def run_of(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, u: Balls = (), exac
 def centred(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any, box: Balls, run: Evaluation, of: str) -> Matrix:
     """Return intervals that contain some outputs of a stage with their rounding errors, by the mean value theorem.
 
-    ``of`` is the key of the stage that lists these outputs. The centre of the expansion are the midpoints of X and of
-    ``box``. For small boxes the intervals are narrower than those of `run_of`.
+    ``of`` is the key of the stage that lists these outputs. The expansion is about the midpoints of X and of ``box``.
+    For small boxes the intervals are narrower than those of `run_of`.
     """
     _, error, by_u, by_x = run.outputs(stage[of], {"u": len(box), "x": len(X)})
     x, u = ([arb(v.mid()) for v in values] for values in (X, box))

@@ -153,7 +153,7 @@ class Collocation:
     def _scale(self, x: Any) -> Any:
         """Return the sizes (unknowns, 1) to which changes of the unknowns are relative: |x| or 1.
 
-        x| is for unknowns that are coordinates or functionals of x, 1 for all others.
+        The size is |x| for unknowns that are coordinates or functionals of x, and 1 for all others.
         """
         size = jnp.sqrt(jnp.sum(x**2))
         size = jnp.where(size > 0, size, 1)

@@ -4,7 +4,7 @@ g₀ and g₁ are the attitudes before and after a step, as group elements, and 
 momentum in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, and the momentum in space is constant. If x is the momentum in space,
 g₁ = τ g₀, and the momentum in the body is constant. The product of τ and a rotation that fixes x conserves the momentum
 as well, so a second statement is needed, on the rate of rotation: for h → 0 it must be ∇H, where H includes the
-Casimirs that the gauge subtracted.
+Casimirs that were subtracted from it for the step.
 """
 
 from __future__ import annotations

@@ -55,7 +55,7 @@ def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
     """Return the statement that the monitor g, which rescales time by dt = g dτ, is positive; {} without a monitor."""
     if spec.monitor is None or isinstance(spec.monitor, str):
         return {}
-    positive = [p.name for p in spec.parameters if p.positive]  # not those that may be 0, since g could then be 0
+    positive = [p.name for p in spec.parameters if p.positive]  # parameters that may be 0 do not prove g > 0
     return {MONITOR: (positivity("g > 0", spec.monitor, positive, _starts(system, spec)),)}
 
 

@@ -49,10 +49,8 @@ class Backend(Protocol):
         ...
 
     def with_gauge(self, gauge: Floats) -> Backend:
-        """Return a back end whose trajectories all use the gauge ``gauge``: one number for each Casimir of the gauge.
-
-        The gauge are the multiples of Casimirs that are subtracted from H.
-        """
+        """Return a back end that subtracts fixed multiples of Casimirs from H; ``gauge`` has one number for each
+        Casimir."""
         ...
 
     def ensemble(self, members: Members, threads: int | None = None, attitudes: Floats | None = None) -> Floats:

@@ -290,8 +290,8 @@ class CSolver:
         """Whether the derivatives of all members can be computed together, by one call of C for each segment of the
         run.
 
-        This is not possible for several segments if H depends on the time or has a gauge, since the C would take the
-        initial values of time and gauge at the start of each segment.
+        This is not possible for several segments if H depends on the time or if Casimirs are subtracted from H: the C
+        would choose the time and the multiples of Casimirs anew at the start of each segment.
         """
         if not hasattr(self._c, "pullback_each"):
             return False

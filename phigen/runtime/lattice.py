@@ -855,7 +855,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         divided among ``threads``, by default one for each core; large lattices are integrated one after another, each
         by all threads. With noise, member k uses the random numbers of ``member`` + k. Raises `StepError`: its
         ``members`` are the failed members, and its ``trajectory`` the array of states, in which failed members have
-        their last state, and later rows repeat NaN.
+        their last state or, with a stride, NaN in the rows after the failure.
         """
         times = self._times(t0, by_keyword)
         draws = arguments.draws(self.interface, by_keyword, {"seed": seed, "member": member, "step0": step0})

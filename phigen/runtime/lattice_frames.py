@@ -209,7 +209,8 @@ class Frames:
 
 
 def stream_path(path: str | Path) -> Path | None:
-    """Return the path if frames are written to such a file one by one; None if the file is written at the end.
+    """Return the path if its suffix is that of a file to which frames are written one by one; None if the file is
+    written at the end.
 
     Raises `ValueError` for suffixes of no known format.
     """

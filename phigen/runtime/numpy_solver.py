@@ -42,8 +42,8 @@ class AttitudeState(NamedTuple):
     """Attitude of a session, as a product of group elements.
 
     ``first`` is the group element at the time ``begun``. ``element`` is the product of the increments of all steps
-    since then, ``lost`` its compensation term. ``rate`` is the rotation per unit of time that the Casimirs of the gauge
-    add.
+    since then, ``lost`` its compensation term. ``rate`` is the rotation per unit of time due to the Casimirs that are
+    subtracted from H; None if there are none.
     """
 
     first: Floats
@@ -204,7 +204,7 @@ class NumpySession:
             raise BackendError(status, self.steps, self._x.copy())
 
     def _follow(self, flows: str) -> None:
-        """Apply a corrector to the state: the flows that the attribute of the module with the name ``flows`` lists."""
+        """Apply a corrector to the state; ``flows`` is the name of the attribute of the module that lists its flows."""
         x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
         if not np.isfinite(x).all():
             raise BackendError("NOT_FINITE", self.steps, self._x.copy())

@@ -122,7 +122,10 @@ class DeviceSolver:
         return failed
 
     def _batch(self, members: Members) -> int:
-        """Return the number of members in a launch: as many as fit into memory, but not more than a second of work."""
+        """Return the number of members in a launch: as many as fit into memory, but at most about a second of work.
+
+        Short runs have at least `_MEMBERS_PER_UNIT` members for each compute unit, if memory suffices.
+        """
         device, rows = self.device, members.steps // members.stride if members.stride else 0
         size = np.dtype(self._real).itemsize
         of_member = size * (self.interface.dimension * (rows + 1) + len(members.parameters) + 3) + 1
@@ -204,7 +207,7 @@ class DeviceSolver:
     def _has_common_coefficients(self, members: Members) -> bool:
         """Whether all members can share their coefficients, which are then one argument of the kernel.
 
-        This needs equal parameters, step sizes and gauges.
+        This needs equal parameters, equal step sizes, and equal multiples of the Casimirs that are subtracted from H.
         """
         same = np.ndim(members.h) == 0 and not any(np.ndim(v) for v in members.parameters.values())
         has_chosen_gauge = self._holds_gauge and self._gauge is None
@@ -221,8 +224,10 @@ class DeviceSolver:
         return self.device.constants(coefficients)
 
     def _gauge_argument(self) -> Any:
-        """Return a buffer with the gauge that was set for all members; None if the kernel chooses it from each initial
-        state."""
+        """Return a buffer with the multiples of Casimirs to subtract from H, if they are fixed for all members.
+
+        Returns None if the kernel chooses the multiples from each initial state.
+        """
         return None if self._gauge is None else self._written(np.array(self._gauge, self._real))
 
     @property
