@@ -9,7 +9,7 @@ from phigen.cli import group
 
 @pytest.fixture
 def phigen():
-    """Runs a command line in this process."""
+    """Return a function that runs a phigen command line in this process."""
     runner = CliRunner()
 
     def run(*args):
@@ -26,7 +26,7 @@ def in_tmp(tmp_path, monkeypatch):
 
 @pytest.fixture
 def write(in_tmp):
-    """Writes a spec into the working directory: write("a.yaml", name="a")."""
+    """Return a function that writes a spec into the working directory, as in ``write("a.yaml", name="a")``."""
 
     def make(file, text=GOOD, *, name=None, order=2):
         path = Path(file)

@@ -261,7 +261,7 @@ def regenerate_line(path):
     [
         ([], "a.c", "phigen build a.yaml"),
         (["--order", "4", "-o", "x/y"], "a.c", "phigen build a.yaml --order 4"),
-        (["--order", "2"], "a.py", "phigen build a.yaml"),  # what the spec says anyway
+        (["--order", "2"], "a.py", "phigen build a.yaml"),  # 2 is the order of the spec, so the line omits it
         (["--profile", "small"], "a.c", "phigen build a.yaml --profile small"),
         (["--profile", "fast"], "a.c", "phigen build a.yaml"),
         (["--profile", "small"], "a.py", "phigen build a.yaml --profile small"),

@@ -1,4 +1,6 @@
-"""Certificates: written next to what was verified, tied to it, and noticed when they are about something else."""
+"""Certificates of ``phigen build --certify``: they name the checksums of the verified files, and ``--check`` reports a
+certificate of another spec or other files.
+"""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The settings of docs/choosing.md have the errors that it says; its commands work."""
+"""The page docs/choosing.md: its settings have the errors that it states, and its commands work."""
 
 import re
 import shlex
@@ -19,14 +19,14 @@ TEXT = (DOCS / "choosing.md").read_text(encoding="utf-8")
 
 
 def rows(heading):
-    """The cells of the table under a heading."""
+    """Return the rows of the table under a heading of the page, as lists of cells."""
     section = TEXT.split(f"\n## {heading}\n")[1].split("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("| ")]
     return [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in lines[1:]]
 
 
 def energy_error(name, kind, order, step, gauge="auto"):
-    """The largest relative error of the energy of the first run up to t = 10,000."""
+    """Return the largest relative energy error of the first run of a spec, integrated up to t = 10,000."""
     candidate = built(name, Setting(kind, int(order), gauge, "auto" if kind == SPLITTING else "none"))
     spec, system, _ = described(name)
     run = next(iter(spec.runs.values()))
@@ -78,7 +78,7 @@ def test_commands_work(phigen, in_tmp):
         measured, budget = None, 1
         while (
             not (measured and "To paste into the spec" in measured.stdout) and budget < 100
-        ):  # a busy machine measures less
+        ):  # a busy machine measures fewer settings in the budget
             measured = phigen(*shlex.split(command), "--budget", str(budget))
             budget *= 5
         assert measured.exit_code == 0, measured.stderr

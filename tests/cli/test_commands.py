@@ -47,7 +47,7 @@ def test_check_refutes_with_residual_and_goes_on(phigen, write):
     assert result.exit_code == 5
     assert "refuted              Jacobi identity" in result.stdout
     assert "residual: -x*y" in result.stdout
-    assert "S_2 = 0" in result.stdout  # of the good one
+    assert "S_2 = 0" in result.stdout  # a statement about good.yaml
 
 
 def test_one_wrong_bracket_is_one_error_and_not_those_that_follow_from_it(phigen, write):
@@ -70,7 +70,7 @@ def test_wrong_birealisation_is_one_error_in_the_names_of_the_spec(phigen, write
     head = "phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
     maps = "alpha: [x - x*y*p_y/2, y + x*y*p_x/2], beta: [x + x*y*p_y/2, y - x*y*p_x/2]"
     result = phigen("build", write("a.yaml", f"{head}birealisation: {{kind: custom, {maps}}}\ninvariants: {{F: x}}\n"))
-    assert result.stderr.count(": refuted (") == 2  # the other is that x is invariant
+    assert result.stderr.count(": refuted (") == 2  # one for the maps, one for the invariant x
     assert "p:" not in result.stderr
     assert "p_x=" in result.stderr
 
@@ -126,7 +126,9 @@ def test_show_log_canonical_s3_and_modified_hamiltonian(phigen):
 
 
 def test_terms_that_are_too_many_are_told_and_the_others_shown(phigen, in_tmp, monkeypatch):
-    """The code has the series as a graph; what is printed of it ends where it cannot be expanded."""
+    """Generated code evaluates the series as a graph of shared subexpressions. Its printed form ends before the first
+    term that is too long when expanded.
+    """
     monkeypatch.setattr("phigen.spec.limits.SERIES_TERMS", 8)
     series = json.loads(phigen("show", SPECS / "henon_heiles.yaml", "--order", 6, "--json").stdout)
     assert (list(series["series"]), series["series_not_written_from"]) == (["S_1", "S_3"], 5)
@@ -180,7 +182,9 @@ def test_latex_is_balanced_and_complete(phigen, name):
 
 @pytest.mark.slow
 def test_latex_defines_what_it_uses(phigen):
-    """λ of a gauge, φ of the exponential, and the modified Hamiltonian that was asked for."""
+    """The output defines λ of the gauge and φ of the exponential map, and shows the modified Hamiltonian up to the
+    requested term.
+    """
     latex = phigen("show", SPECS / "rigid_body.yaml", "--latex", "--modified", "2").stdout
     assert "\\varphi(s) &= \\frac{1}{s}" in latex
     assert "S_{1} &= H - \\lambda_{C} C = " in latex
@@ -197,7 +201,9 @@ def test_modified_hamiltonian_in_latex_is_refused_where_it_is_not_computed(phige
 
 
 def test_show_names_each_correction_once(phigen):
-    """-S_3 of the untruncated series, or by the general algorithm: the same term under the same name."""
+    """The first correction of H is −S_3 of the untruncated series. With --modified it is computed by the general
+    algorithm. In both cases it is printed once, as H_2.
+    """
     pages = [
         phigen("show", SPECS / "lotka_volterra.yaml", "--order", "2", *m).stdout for m in ([], ["--modified", "1"])
     ]
@@ -357,7 +363,9 @@ def test_demo_keeps_the_casimir_at_roundoff_up_to_the_singularity(phigen, target
 
 
 def test_check_tells_what_a_target_of_the_spec_refuses(phigen, in_tmp):
-    """As build does: of each target that the spec asks for, at its place."""
+    """Like ``phigen build``, ``phigen check`` reports an error for each target of the spec that cannot have the solver,
+    with the place in the spec.
+    """
     text = (SPECS / "pendulum_euler.yaml").read_text(encoding="utf-8")
     without_targets = "\n".join(line for line in text.splitlines() if not line.startswith(("targets", "adjoint")))
     Path("p.yaml").write_text(without_targets + "\nadjoint: true\ntargets: [c, js]\n", encoding="utf-8")
@@ -368,7 +376,9 @@ def test_check_tells_what_a_target_of_the_spec_refuses(phigen, in_tmp):
 
 
 def test_all_triples_that_fail_the_jacobi_identity_are_listed_on_request(phigen, write):
-    """They are those whose cyclic sum is not 0, each with it: (a, b, d) alone vanishes here."""
+    """With -v, check lists the triples of coordinates whose cyclic sum in the Jacobi identity is not 0, with the sum.
+    In this example the sum vanishes only for (a, b, d).
+    """
     brackets = "{a: {b: c, c: a*d, d: 1}, b: {c: a, d: b}, c: {d: c}}"
     text = f"phigen: 1\nname: j\ncoordinates: [a, b, c, d]\npoisson: {{brackets: {brackets}}}\nhamiltonian: a\n"
     path = write("j.yaml", text)

@@ -1,4 +1,4 @@
-"""``phigen compare``: methods side by side, with numbers that agree with what they name."""
+"""``phigen compare``: its table of methods has the steps, errors and Poisson defects of the methods that it names."""
 
 import json
 from pathlib import Path
@@ -28,7 +28,7 @@ def body(in_tmp):
     return "gyro.yaml"
 
 
-@pytest.mark.slow  # it builds some twenty candidates
+@pytest.mark.slow  # it compiles about twenty solvers
 @pytest.mark.parametrize("equal", ["step", "work"])
 def test_numbers_are_those_of_the_methods(phigen, body, equal):
     result = phigen("compare", body, "--equal", equal, "--budget", "300", "--json", "--plot", "c.svg")
@@ -46,7 +46,8 @@ def test_numbers_are_those_of_the_methods(phigen, body, equal):
         if entry["poisson"]:
             assert entry["defect"] < 1e-12, title
             assert entry["casimirs"] < 1e-13, title
-    # Far above rounding; at equal work the step depends on the load of the machine, and errors are of its fifth power.
+    # This bound is far above round-off. At equal work the step of RK4 depends on the load of the machine, and its
+    # errors are proportional to the fifth power of the step.
     least = 1e-10 * min(1.0, (entries["RK4"]["step"] / 0.2) ** 5)
     assert entries["RK4"]["defect"] > least
     assert entries["RK4"]["casimirs"] > least

@@ -1,4 +1,4 @@
-"""Stages of the compiler on stderr: when they are shown, and that they leave nothing behind."""
+"""Display of the stages of the compiler on stderr: when it appears, and that it is erased at the end."""
 
 import io
 import re
@@ -14,13 +14,13 @@ from phigen.cli.console import Console
 
 
 class Terminal(io.StringIO):
-    """A terminal that only this process writes to."""
+    """Text stream that claims to be a terminal, and to which only this process writes."""
 
     def isatty(self):
         return True
 
     def shows(self, text):
-        """Whether the text is drawn, on a busy machine too."""
+        """Whether the text is drawn within 30 s, long enough for a busy machine."""
         end = time.monotonic() + 30
         while text not in self.getvalue() and time.monotonic() < end:
             time.sleep(0.001)
@@ -34,7 +34,7 @@ def impatient(monkeypatch):
 
 
 def shown(console, stream, name="top"):
-    """What is written while a stage lasts for a while."""
+    """Return the text that the console writes to the stream during a stage of 0.05 s."""
     with redirect_stderr(stream), console.watching(), progress.stage(name):
         time.sleep(0.05)
     return stream.getvalue()

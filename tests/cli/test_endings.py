@@ -1,4 +1,6 @@
-"""``phigen run``: ends in time and where an expression vanishes, states at given times, runs that go on from files."""
+"""``phigen run``: runs that end at a given time or where an expression vanishes, states at given times, and runs that
+continue from files.
+"""
 
 import json
 from pathlib import Path
@@ -28,7 +30,8 @@ runs:
   falling: {initial: [1, 0], step: 0.1, steps: 140, section: p, direction: falling}
   both: {initial: [1, 0], step: 0.1, steps: 140, section: q, direction: both}
 """
-#: A body that turns by τ, with its time in a closed form nowhere.
+#: A rigid body with a monitor: its steps are equal in the fictitious time τ, and its physical time t has no closed
+#: form.
 BODY = """phigen: 1
 name: slowed
 coordinates: [x1, x2, x3]
@@ -74,7 +77,7 @@ def test_a_run_ends_where_an_expression_vanishes_first_to_roundoff(phigen, swing
     rows = table("a.csv")
     assert rows[:, 0] == pytest.approx([0, 0.3, 0.6, 0.9, np.pi / 3], abs=1e-11)
     assert rows[-1, 1] == pytest.approx(0.5, abs=2e-16)
-    ran(phigen, swing, "--run", "back", "-o", "b.csv")  # which begins where it vanishes
+    ran(phigen, swing, "--run", "back", "-o", "b.csv")  # the expression of stop vanishes at the start, too
     assert table("b.csv")[-1, 0] == pytest.approx(-np.pi, abs=1e-11)
     never = phigen("run", swing, "--run", "never", "-t", "numpy", "-o", "c.csv")
     assert "the expression of stop: has no zero on the run" in never.stderr
@@ -116,7 +119,9 @@ def test_states_at_given_times(phigen, swing):
     ids=["csv", "npz", "monitor", "attitude"],
 )  # fmt: skip
 def test_a_finished_run_is_extended_as_if_it_had_not_ended(phigen, write, text, suffix):
-    """With the gauge, or the e, of its start; and the errors of the whole are told."""
+    """An extended run keeps the gauge and the energy level e = −H(x₀) of its start, and its errors are those of the
+    whole run.
+    """
     spec = write("spec.yaml", text)
     whole = ran(phigen, spec, "--until", 3, "-o", f"a.{suffix}", "--json")
     ran(phigen, spec, "--until", 2, "-o", f"b.{suffix}")
@@ -128,8 +133,10 @@ def test_a_finished_run_is_extended_as_if_it_had_not_ended(phigen, write, text, 
         with np.load("a.npz") as one, np.load("b.npz") as other:
             a, b = (np.column_stack([columns["t"], columns["x"]]) for columns in (one, other))
             assert "monitor" not in text or one["tau"].shape == one["t"].shape
-    apart = np.abs(b[:, None, :] - a[None]).max(axis=2).min(axis=0)  # rows of b beside each of a
-    assert np.sum(apart < 1e-12) >= 0.4 * len(a)  # with a monitor the part of a step shifts all after it
+    # For each row of a, the distance to the nearest row of b.
+    apart = np.abs(b[:, None, :] - a[None]).max(axis=2).min(axis=0)
+    # With a monitor, the shorter last step of the first part shifts all later rows.
+    assert np.sum(apart < 1e-12) >= 0.4 * len(a)
     assert text == BODY or (apart < 1e-12).all()
     assert b[-1] == pytest.approx(a[-1], abs=1e-4 if text == BODY else 1e-12)
     errors = [json.loads(process.stdout)["methods"][0]["energy"]["error"] for process in (whole, result)]
@@ -137,7 +144,9 @@ def test_a_finished_run_is_extended_as_if_it_had_not_ended(phigen, write, text, 
 
 
 def test_an_extension_holds_the_e_of_the_start(phigen, write):
-    """That of its own first state would be off by the error of the energy."""
+    """An extension uses the energy level e = −H(x₀) of the first state x₀ of the whole run. The energy of the state
+    where the extension begins differs by the energy error.
+    """
     spec = write("spec.yaml", BODY)
     ran(phigen, spec, "--steps", 80, "-o", "a.csv")
     ran(phigen, spec, "--steps", 40, "-o", "b.csv")
@@ -147,7 +156,8 @@ def test_an_extension_holds_the_e_of_the_start(phigen, write):
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("how", ["--extend", "--from"])
-@pytest.mark.parametrize("level", ["0.46", "0.1", "0.02", "0.5"])  # the first three with a rounding before the zero
+# At the first three levels, rounding puts the stored end just before the zero.
+@pytest.mark.parametrize("level", ["0.46", "0.1", "0.02", "0.5"])
 def test_a_run_that_goes_on_from_a_stop_ends_at_the_next_one(phigen, write, how, level):
     spec = write("spec.yaml", SWING.replace("stop: q - 1/2, every: 0.3", f"stop: q - {level}"))
     ran(phigen, spec, "--run", "stopped", "-o", "a.csv")
@@ -180,7 +190,7 @@ def test_times_beyond_a_stop_are_left_out_and_a_long_time_between_rows_leaves_bo
 
 @pytest.mark.parametrize("rows", [(), ("--every", 0.37), ("--at", "4.72")])
 def test_crossings_do_not_depend_on_which_rows_are_stored_and_parts_of_steps_have_them_too(phigen, swing, rows):
-    ran(phigen, swing, "--run", "both", "--until", 4.72, *rows, "--section", "s.csv")  # steps end at 4.7
+    ran(phigen, swing, "--run", "both", "--until", 4.72, *rows, "--section", "s.csv")  # the last whole step ends at 4.7
     assert table("s.csv")[:, 0] == pytest.approx([np.pi / 2, 3 * np.pi / 2], abs=1e-9)
 
 
@@ -199,7 +209,7 @@ def test_exponents_do_not_depend_on_which_rows_are_stored(phigen, swing):
     )
     assert every == whole
     short = json.loads(ran(phigen, swing, "--until", 0.05, "--lyapunov", "--json").stdout)
-    assert "lyapunov" not in short  # which has no whole step
+    assert "lyapunov" not in short  # a run without a whole step has no exponents
 
 
 @pytest.mark.thin(2)
@@ -222,7 +232,9 @@ NOISY = SWING.replace("order: 8", "order: 2\nnoise: {kick: {hamiltonian: q, ampl
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("scheme", ["series", "splitting"])
 def test_means_are_of_members_that_made_the_steps_of_the_run(phigen, write, scheme):
-    """Of two members the run is the first: it is as far from the mean as the error says."""
+    """The first of two members is the run itself. The standard error of two values is their distance from the mean, so
+    the final state lies at this distance.
+    """
     spec = write("spec.yaml", NOISY.replace("steps: 60}", "steps: 60, seed: 5, members: 2}") + f"scheme: {scheme}\n")
 
     def told(*args):
@@ -265,7 +277,9 @@ def test_an_extension_with_the_same_seed_goes_on_along_its_path(phigen, write):
 
 
 def test_noise_after_a_part_of_a_step_is_new(phigen, write):
-    """The part has used up the numbers of its step, whatever its size."""
+    """A step that is shortened to end at a given time uses up the random numbers of its step, so the next step draws
+    new ones.
+    """
     still = NOISY.replace("(p**2 + q**2)/2", "p - p").replace("hamiltonian: p - p", "hamiltonian: 0")
     spec = write("spec.yaml", still)
     ran(phigen, spec, "--until", 0.22, "-o", "a.csv")
@@ -290,7 +304,9 @@ def test_an_interrupted_run_with_given_times_goes_on_to_the_same_bytes(phigen, w
 
 
 def test_a_duration_stays_with_another_step_and_steps_do_too(phigen, write):
-    """By a part of a step where it does not divide the duration; with a monitor that is in τ, and cannot be."""
+    """With another step size, a run keeps its ``duration``, by a shorter last step if necessary, or its ``steps``. With
+    a monitor the duration is in τ, where a shorter step is refused.
+    """
     spec = write("spec.yaml", SWING.replace("steps: 60}", "duration: 6, stride: 30}"))
     cases = ((0.05, 120, 6), (0.07, 85, 6), (-0.1, 60, -6), (3, 2, 6))
     for step, steps, end in cases:
@@ -325,7 +341,9 @@ def test_verify_makes_one_step_of_a_run_that_is_shorter(phigen, write):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """What a command asks of the function that measures, in place of which it stops."""
+    """Return a function that runs a command up to its call of the function at ``place``, and returns the arguments of
+    this call.
+    """
 
     def asked_of(phigen, place, *args):
         call_arguments = []
@@ -343,7 +361,7 @@ def asked(monkeypatch):
 
 @pytest.mark.slow
 def test_verify_makes_steps_in_tau_up_to_a_physical_time(phigen, write, asked):
-    """As many as the run: 5 of t are 6.63 of τ."""
+    """The time t = 5 of this run corresponds to τ = 6.63, so verify makes 132 steps of 0.05, as the run does."""
     spec = write("spec.yaml", BODY)
     assert json.loads(ran(phigen, spec, "--json").stdout)["steps"] == 132
     arguments = asked(phigen, "phigen.study.verification.verify", "verify", spec)
@@ -369,7 +387,7 @@ def test_tune_measures_up_to_the_end_of_the_run(phigen, write, asked, text, name
 
 @pytest.mark.slow
 def test_tune_finds_an_orbit_in_tau_and_tells_lines_for_the_run(phigen, write):
-    """All methods make their steps in τ, so that an orbit can be compared."""
+    """All methods make their steps in τ, so that their orbits can be compared at equal τ."""
     spec = write("spec.yaml", BODY.replace("stride: 5", "stop: x1 + 10"))
     result = phigen("tune", spec, "--accuracy", 0.001, "--budget", 8, "--measure", "orbit", "--json")
     assert result.exit_code == 0, result.stderr
@@ -403,7 +421,7 @@ def test_report_shows_the_run_up_to_its_end(phigen, write, monkeypatch, text, na
 
 @pytest.mark.slow
 def test_states_are_stored_at_equal_times_of_a_run_of_so_many_steps_in_tau(phigen, write):
-    """Its end is known when all steps are made."""
+    """The run has 100 steps in τ, so its final physical time is only known after the last step."""
     spec = write("spec.yaml", BODY.replace("until: 5, stride: 5}", "steps: 100, every: 0.5}"))
     ran(phigen, spec, "-o", "a.csv")
     rows = table("a.csv")
@@ -416,7 +434,9 @@ def test_states_are_stored_at_equal_times_of_a_run_of_so_many_steps_in_tau(phige
 
 
 def test_a_run_in_tau_that_fails_stores_the_times_before(phigen, write):
-    """A motion that becomes infinite, in a finite τ as well."""
+    """The motion becomes infinite at a finite time t, and also at a finite τ. The states before this time are
+    stored.
+    """
     falling = SWING.split("runs:")[0].replace("(p**2 + q**2)/2\norder: 8", "p**2/2 - q**4\norder: 2")
     falling += "monitor: 1/(1 + p**2)**(1/8)\nruns: {far: {initial: [1, 0], step: 0.1, steps: 400, every: 0.1}}\n"
     result = phigen("run", write("spec.yaml", falling), "-t", "numpy", "-o", "a.csv")
@@ -462,7 +482,7 @@ def test_times_of_a_spec_are_those_of_the_command_line(phigen, swing):
     rows = table("a.csv")
     assert rows[:, 0] == pytest.approx([0, 0.25, 1.3, 2, 2.05], rel=1e-14)
     np.testing.assert_array_equal(rows, table("b.csv"))
-    ran(phigen, swing, "--run", "past", "-o", "c.csv")  # its stop at -pi/2 comes after both
+    ran(phigen, swing, "--run", "past", "-o", "c.csv")  # the stop at -pi/2 comes after the two times of the run
     assert table("c.csv")[:, 0] == pytest.approx([0, -0.5, -1.33, -np.pi / 2], abs=1e-11)
     solver = compiled(specs.load(str(swing)), target="numpy")
     assert solver.run("listed").t == pytest.approx([0, 0.25, 1.3, 2, 2.05], rel=1e-14)
@@ -500,7 +520,8 @@ runs: {r: {sizes: [4], initial: {q: 1, p: 0}, step: 0.1, steps: 100}}
 def test_a_stop_of_the_command_line_is_that_of_the_spec(phigen, write, text, run, name):
     command = ("run", write("a.yaml", text), "--run", run, "-t", "numpy")
     result = phigen(*command, "--steps", 100, "--stop", f"max({name}, -1) - 1/2", "--json")
-    assert json.loads(result.stdout)["time"] == pytest.approx(np.pi / 3, abs=1e-5)  # order 4 of the chain
+    # The chain is integrated with order 4.
+    assert json.loads(result.stdout)["time"] == pytest.approx(np.pi / 3, abs=1e-5)
     assert "the expression of stop: has no zero on the run" in phigen(*command, "--stop", f"{name} - 2").stderr
     for wrong, words in (("1/2", "depends neither"), (f"{name} -", "ends too early"), (f"{name}s", "did you mean")):
         refused = phigen(*command, "--stop", wrong)

@@ -1,4 +1,4 @@
-"""Runs whose energy error is too large to trust are warned about, with a step that mends it."""
+"""The warning of ``phigen run`` about an energy error that is too large, with a step size that would reduce it."""
 
 import json
 import re
@@ -68,7 +68,9 @@ def test_an_energy_error_that_rk4_does_not_make_at_equal_cost_is_a_warning(phige
 
 @pytest.mark.slow  # it compiles the solver and RK4
 def test_rk4_is_compared_in_double_precision_with_a_solver_in_single(phigen, write):
-    """RK4 makes an error of 6e-7 here at equal cost; in single precision it would be above 1e-6."""
+    """RK4 in double precision has an error of 6e-7 here at equal cost. In single precision its error would be above
+    1e-6.
+    """
     spec = (
         ORBIT.replace("order: 4\nscheme: splitting", "order: 2\nreal: float")
         .replace("0, 0.6", "0, 0.9")
@@ -100,7 +102,7 @@ def test_runs_that_cannot_be_warned_about_are_not_compared_with_rk4(error, steps
 
 @pytest.mark.slow
 def test_a_method_that_breaks_down_at_once_has_infinite_errors(phigen, write, monkeypatch):
-    """A field that is not a number where RK4 evaluates it leaves no row after the start."""
+    """RK4 is replaced by a method whose first step is not a number, so that it has no row after the start."""
     monkeypatch.setitem(classical.METHODS, "rk4", (lambda f, x, h: np.full_like(x, np.nan), 4))
     path = write("broken.yaml", ORBIT.replace("STEP", "0.01, compare: [rk4]"))
     ours, rk4 = json.loads(phigen("run", path, "-t", "numpy", "--json").stdout)["methods"]
@@ -111,7 +113,7 @@ def test_a_method_that_breaks_down_at_once_has_infinite_errors(phigen, write, mo
 
 
 def test_rk4_without_a_finite_energy_has_an_infinite_error(monkeypatch):
-    """Its states may be finite numbers outside of the domain of H."""
+    """The states of RK4 may be finite numbers outside of the domain of H, where the energy is not a number."""
     compilation = compilation_of("kepler", order=2)
     system = SystemProblem(np.array([1.0, 0, 0, 0.9]), {"mu": 1.0}, 0.1, 1.0, system=compilation.system)
     monkeypatch.setattr(SystemProblem, "energies", lambda self, states: np.where(np.arange(len(states)), np.nan, 1.0))

@@ -42,7 +42,9 @@ finally:
 @pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize("name", ["pendulum", "toda3", "fput"])
 def test_build_imports_no_numerical_library(name, tmp_path):
-    """NumPy takes as long to import as a small system takes to compile."""
+    """``phigen build`` works without NumPy, because the import of NumPy takes as long as the compilation of a small
+    system.
+    """
     code = "import sys; from phigen.cli import main; main()"
     command = [sys.executable, "-X", "importtime", "-c", code, "build", name, "-t", "c", "-q", "-o", str(tmp_path)]
     process = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -110,7 +112,7 @@ def test_exceeded_limit_is_3(phigen, write):
 
 @pytest.mark.parametrize("kind", [IndexError, EOFError])
 def test_internal_error_is_4_and_asks_for_a_report(phigen, write, monkeypatch, kind):
-    """Also one that click takes for ^D at a prompt."""
+    """An EOFError is an internal error, too, although click treats it as ^D at a prompt."""
 
     def broken(*args, **kwargs):
         raise kind("nobody expected this")
@@ -253,7 +255,8 @@ def test_interrupt_is_130(write):
     assert "Traceback" not in message
 
 
-#: Interrupts itself when a condition on the function called, and on its module if it is an import, first holds.
+#: A program that runs ``phigen check a.yaml`` and sends itself SIGINT at the first call for which ``condition`` holds:
+#: ``function`` is the name of the called function and ``module`` that of a module which it imports.
 INTERRUPTED_ONCE = """
 import atexit, os, runpy, signal, sys
 
@@ -274,10 +277,12 @@ runpy.run_module("phigen", run_name="__main__")
     "moment",
     [
         pytest.param("function == '_find_and_load' and module == 'phigen.cli'", marks=pytest.mark.slow),
-        "function == '_find_and_load' and module == 'zlib'",  # by flint, which makes an ImportError of it
+        # flint imports zlib, and turns the interrupt into an ImportError.
+        "function == '_find_and_load' and module == 'zlib'",
         pytest.param("function == 'system_from_spec'", marks=pytest.mark.slow),
-        "function == '_forget' and 'dead' in frame.f_locals",  # a callback, whose exceptions are ignored
-        "function == '_shutdown'",  # when all is done
+        # The callback of a weak reference: Python ignores exceptions that it raises.
+        "function == '_forget' and 'dead' in frame.f_locals",
+        "function == '_shutdown'",  # threading._shutdown, when Python exits
     ],
 )
 def test_interrupt_at_any_moment_is_130_and_one_word(write, moment):

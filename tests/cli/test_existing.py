@@ -1,4 +1,4 @@
-"""Files that exist where a command writes."""
+"""Existing files at the place of an output: without --force, a command replaces only its own earlier results."""
 
 import zipfile
 
@@ -49,7 +49,7 @@ def test_a_file_of_others_is_replaced_by_force_only(phigen, in_tmp, spec, option
     assert path.read_bytes() == MINE
     assert f"replaced {file}" in phigen("run", spec, option, file, "--force").stderr
     assert path.read_bytes() != MINE
-    assert f"replaced {file}" in phigen("run", spec, option, file).stderr  # now it is phigen's
+    assert f"replaced {file}" in phigen("run", spec, option, file).stderr  # the file is now a result of the same run
 
 
 def test_an_archive_of_others_is_no_table(phigen, in_tmp):
@@ -113,7 +113,8 @@ def test_a_table_without_its_companion_or_of_other_columns_is_not_known(phigen, 
     spec = write("spec.yaml", OSCILLATOR)
     phigen("run", spec, "-o", "a.csv")
     table = (in_tmp / "a.csv").read_text()
-    assert table.startswith("t,q,p,energy\n")  # readers find the columns in the first line
+    # Programs that read the table expect the names of the columns in its first line.
+    assert table.startswith("t,q,p,energy\n")
     (in_tmp / "a.csv").write_text("t,temperature\n0,21.5\n")
     assert phigen("run", spec, "-o", "a.csv").exit_code == 2
     (in_tmp / "a.csv").write_text(table)

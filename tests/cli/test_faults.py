@@ -1,4 +1,6 @@
-"""A full disk, a stdout that takes nothing or not every letter, a working directory that has gone."""
+"""Faults of the environment: a full disk, a stdout that accepts no output or not every character, and a working
+directory that was deleted.
+"""
 
 import json
 import os
@@ -48,7 +50,8 @@ def test_nothing_is_left_of_a_file_that_does_not_fit(phigen, write, command):
     text = write("a.yaml").read_text()
     write("without_runs.yaml", text.split("runs:")[0])
     Path("out").mkdir()
-    assert phigen("run", "a.yaml").exit_code == 0  # which compiles it
+    # This run fills the cache of compiled solvers before the size of files is limited.
+    assert phigen("run", "a.yaml").exit_code == 0
     with largest_file(400):
         result = phigen(*command)
     assert result.exit_code == 2
@@ -107,7 +110,7 @@ def test_messages_that_cannot_be_printed_do_not_change_the_exit_code(command, co
 
 
 def shell(line):
-    """A command line of phigen, with redirections."""
+    """Run phigen in a shell with a line of arguments and redirections, and return the completed process."""
     program = "import sys; from phigen.cli import main; main()"
     words = ["sh", "-c", f'"$0" -c "$1" {line}', sys.executable, program]
     buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}

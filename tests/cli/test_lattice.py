@@ -13,7 +13,7 @@ from phigen.spec import loads
 
 @pytest.fixture
 def lattice(tmp_path):
-    """Writes a lattice to a file."""
+    """Return a function that writes the lattice of a name to a file, and returns the path."""
 
     def write(name):
         path = tmp_path / f"{name}.yaml"
@@ -98,7 +98,9 @@ def test_sizes_that_do_not_fit_say_so(phigen, lattice, sizes, code, message):
 
 
 def test_the_lattice_of_a_system_written_out_has_what_runs_of_lattices_have(phigen, tmp_path):
-    """Which end with whole steps, and store states after these."""
+    """Runs of lattices end with a whole step and store states after whole steps. So the run up to t = 3.05 becomes a
+    run of 30 steps of 0.1.
+    """
     text = """phigen: 1
 name: ring
 coordinates: [q0, q1, q2, q3, p0, p1, p2, p3]

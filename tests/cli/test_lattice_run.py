@@ -41,7 +41,7 @@ def test_a_run_keeps_what_it_should(phigen, chain, tmp_path):
 
 
 def ring(offsets, size):
-    """A ring whose bracket couples sites so far apart."""
+    """Return the text of a spec: a ring of ``size`` sites whose bracket couples sites at the distances ``offsets``."""
     brackets = ", ".join(f'"a[i+{k}]": "a*a[i+{k}]"' for k in offsets)
     return (
         f"phigen: 1\nname: ring\nlattice: {{axes: [i]}}\ncoordinates: [a]\nhamiltonian: a\n"
@@ -54,7 +54,7 @@ def ring(offsets, size):
 def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
     spec = tmp_path / "ring.yaml"
     spec.write_text(ring([1, 2, 4], 5), encoding="utf-8")
-    # 3 is a multiple of 3 too, but smaller than the stencil
+    # The message does not propose 3 sites, a smaller multiple of 3, because the stencil reaches 4 sites.
     said = ": the series, since 5 along i is not a multiple of 3, as a splitting with 3 colours needs; 6 would do\n"
     assert f"Bi-realisation (constant in logarithms){said}" in phigen("check", spec).stdout
     assert f"order 4, profile fast, target numpy, 1 thread{said}" in phigen("run", spec, "-t", "numpy").stdout
@@ -236,7 +236,7 @@ def test_a_run_of_other_sizes_is_not_gone_on_with(phigen, chain, tmp_path):
 
 @pytest.fixture
 def killed(phigen, chain, tmp_path, monkeypatch):
-    """A run that was killed after its second checkpoint: its command, and the files that it left."""
+    """Return the command of a run that was killed after its second checkpoint, and the files that the run left."""
     from phigen.runtime.checkpoint import Checkpoint
 
     save, saved = Checkpoint.save, []
@@ -255,7 +255,7 @@ def killed(phigen, chain, tmp_path, monkeypatch):
 
 
 def files_beside(chain):
-    """The contents of the files in the folder of a spec."""
+    """Return the contents of the files in the folder of a spec, by name, without the spec."""
     return {path.name: path.read_bytes() for path in chain.parent.iterdir() if path != chain}
 
 
@@ -277,14 +277,14 @@ def test_a_killed_run_goes_on_to_the_same_frames(phigen, chain, killed, tmp_path
     assert list(resumed) == ["wave.npz"]
     with np.load(tmp_path / "wave.npz") as stored:
         frames = stored["x"]
-    assert phigen(*command).exit_code == 0  # a run that is complete can be made anew
+    assert phigen(*command).exit_code == 0  # a complete run may be repeated with the same output file
     with np.load(tmp_path / "wave.npz") as stored:
         assert stored["x"].tobytes() == frames.tobytes()
 
 
 def test_a_complete_run_is_not_gone_on_with(phigen, chain, tmp_path):
     command = ("run", chain, "-t", "numpy", "-o", tmp_path / "wave.npz", "--resume")
-    assert phigen(*command).exit_code == 0  # nothing there yet: from the start
+    assert phigen(*command).exit_code == 0  # without a checkpoint the run starts at its initial state
     before = files_beside(chain)
     result = phigen(*command)
     assert result.exit_code == 2

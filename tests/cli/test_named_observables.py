@@ -1,4 +1,6 @@
-"""Observables in `stop`, `section` and `average: {of: …}` of ordinary systems, and figures of what changes."""
+"""Observables in `stop`, `section` and `average: {of: …}` of ordinary systems, and the figure of an energy that
+changes.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""phigen runs the profile fast, whatever a spec says about code that is built; an option asks for another."""
+"""Runs and sweeps use the profile fast unless --profile names another one. The key ``profile`` of a spec only applies
+to ``phigen build``.
+"""
 
 import json
 
@@ -49,7 +51,9 @@ def test_sweeps_are_made_in_the_profile_that_is_asked_for(phigen, write, monkeyp
 
 
 def test_large_lattices_are_shared_between_threads():
-    """By the numbers of the runtime in C, which has others for pairs."""
+    """Lattices above a number of sites use several threads. The C runtime sets this number, a smaller one for lattices
+    with pairs.
+    """
     about = {"name": "t", "coordinates": ("q",), "order": 2, "parameters": {}, "positive": frozenset(), "casimirs": ()}
     chain = LatticeInterface(**about, axes=("i",))
     pairs = LatticeInterface(**about, axes=("i",), pairs=True)

@@ -1,4 +1,4 @@
-"""``phigen run``: files that grow while it runs, interruptions, going on, sections, exponents, figures."""
+"""``phigen run``: files that grow during the run, interruptions, --resume, sections, exponents, figures."""
 
 import json
 import os
@@ -18,13 +18,13 @@ from systems import slow_but
 from phigen import resources
 
 SPECS = resources.bundled_specs()
-#: A run with everything: a section, exponents, a gauge.
+#: A run with a section, Lyapunov exponents and a gauge.
 EVERYTHING = (SPECS / "rigid_body.yaml", "--run", "tumbling", "--lyapunov")
 
 
 @pytest.fixture(autouse=True)
 def no_comparison(monkeypatch):
-    """The classical methods are slow and not the subject here."""
+    """Omit the comparison with classical methods, which is slow and not tested in this file."""
     from phigen.cli import experiment
 
     prepared = experiment.prepared
@@ -67,7 +67,9 @@ def test_an_interrupted_run_goes_on_to_the_same_bytes(phigen, in_tmp, name, targ
 
 
 def test_a_run_interrupted_before_its_first_step_starts_once(phigen, in_tmp):
-    """The checkpoint of step 0 may have been written before the initial state was stored, or after."""
+    """The resumed run stores the initial state once, whether the checkpoint of step 0 was written before this state was
+    stored or after.
+    """
     run = ("run", SPECS / "rigid_body.yaml", "-t", "numpy", "--steps", 9, "-o", "a.csv")
     with interrupted(0, steps=7):
         assert "interrupted after 0 of 9 steps" in phigen(*run).stderr
@@ -75,7 +77,7 @@ def test_a_run_interrupted_before_its_first_step_starts_once(phigen, in_tmp):
     assert phigen(*run, "--resume").exit_code == 0
     times = [row.split(",")[0] for row in Path("a.csv").read_text().splitlines()]
     assert times[:3] == ["t", "0.0", "0.1"]
-    assert len(times) == len(set(times)) == 7  # every second state, and the last
+    assert len(times) == len(set(times)) == 7  # the header, every second state, and the last one
 
 
 @pytest.mark.slow
@@ -89,7 +91,7 @@ def test_sections_and_exponents_go_on_as_well(phigen, in_tmp):
         Path(name).unlink()
     with interrupted(15, steps=77):
         assert phigen(*run).exit_code == 130
-    with np.load("a.npz") as stored:  # what there is can be read
+    with np.load("a.npz") as stored:  # the file of an interrupted run can be read
         assert 10 < len(stored["t"]) < 140
     assert len(Path("s.csv").read_text().splitlines()) > 1
     result = phigen(*run, "--resume")
@@ -182,14 +184,17 @@ def test_a_changed_spec_is_not_resumed(phigen, write):
 def test_resume_without_an_interrupted_run(phigen, write):
     path = write("a.yaml")
     assert "by --output or --section" in phigen("run", path, "--resume").stderr
-    assert phigen("run", path, "-o", "a.csv", "--resume").exit_code == 0  # nothing there yet: from the start
+    # Without a checkpoint the run starts at its initial state.
+    assert phigen("run", path, "-o", "a.csv", "--resume").exit_code == 0
     assert "its run is complete" in phigen("run", path, "-o", "a.csv", "--resume").stderr
 
 
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_length_of_a_run(phigen, in_tmp, monkeypatch):
-    monkeypatch.setattr("phigen.runtime.march._MOST_ROWS", 32)  # pieces are as large as time allows
-    monkeypatch.setattr("phigen.cli.recording.POINTS", 500)  # of the figure: both runs have more rows
+    # Otherwise the size of a block depends on the speed of the machine.
+    monkeypatch.setattr("phigen.runtime.march._MOST_ROWS", 32)
+    # This is the number of points of the figure, smaller than the number of rows of both runs.
+    monkeypatch.setattr("phigen.cli.recording.POINTS", 500)
 
     def peak(steps):
         tracemalloc.start()
@@ -199,7 +204,7 @@ def test_memory_does_not_grow_with_the_length_of_a_run(phigen, in_tmp, monkeypat
         assert result.exit_code == 0
         return peak_memory
 
-    peak(1000)  # what is loaded once
+    peak(1000)  # the first run loads modules that stay in memory
     short, long = peak(4_000), peak(16_000)
     assert long < 1.2 * short
 
@@ -259,7 +264,7 @@ def test_figures_without_matplotlib_are_refused_before_the_work(phigen, write, m
 
 
 def test_with_noise_states_are_stored_after_whole_steps_only(phigen, tmp_path):
-    """A part of a step has other random numbers than the whole, so its end is not on the path."""
+    """A shorter step would draw other random numbers than the whole step, so its end would not lie on the path."""
 
     def made(name, *options):
         path = tmp_path / name
@@ -280,7 +285,7 @@ def test_states_too_far_apart_for_the_balance_of_energy_are_told(phigen, in_tmp)
     assert "too far apart for an accurate integral" in phigen(*duffing, "--every", 2).stdout
 
 
-#: Files that no run has written, and why: their rows, or their arrays.
+#: Files that ``phigen run`` cannot have written, given by their text or their arrays, and the error for each.
 STRANGE = {
     "twice.csv": ("t,q,p,q\n0,1,2,3\n", "two columns have the same name"),
     "short.csv": ("t,q,p,energy\n0,1,2\n", "rows of another length"),

@@ -38,7 +38,9 @@ def stated():
 @pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("flags", ["-O2", "-Os -fno-inline"])
 def test_header_states_the_stack_of_the_chain_of_calls(phigen, flags):
-    """Each function of the chain has the size that gcc prints for it; without inlining the chain has several."""
+    """The stated stack is the sum of the frame sizes along the longest chain of calls. gcc prints the size of each
+    frame, and without inlining a chain has several frames.
+    """
     done = phigen(*WORDS, f"--stack={flags}")
     assert done.exit_code == 0, done.output
     stack = stated()
@@ -59,7 +61,9 @@ def test_header_states_the_stack_of_the_chain_of_calls(phigen, flags):
 
 @pytest.mark.slow
 def test_stack_used_by_a_running_step_is_within_the_bound(phigen, write):
-    """A program paints the memory below its frame, makes a step, and looks how far the paint is gone."""
+    """A program fills the memory below its frame with a pattern, makes a step, and counts the bytes that have
+    changed.
+    """
     assert phigen(*WORDS, "--stack=-O2").exit_code == 0
     main = """#include <stdio.h>
 #include <string.h>
@@ -87,7 +91,8 @@ int main(void)
     command = [tool("gcc"), "-std=c99", "-O2", "-w", "main.c", "body.c", "-lm", "-o", "main"]
     subprocess.run(command, cwd="generated/body", check=True)
     used = int(subprocess.run(["generated/body/main"], capture_output=True, text=True, check=True).stdout)
-    assert stated()["STACK_OF_STEP"] / 2 < used < stated()["STACK_OF_STEP"] + 512  # the frames of main and of libm
+    # 512 bytes for the frames of main and of libm.
+    assert stated()["STACK_OF_STEP"] / 2 < used < stated()["STACK_OF_STEP"] + 512
 
 
 def test_stacks_without_a_bound_and_other_compilers_are_refused(phigen, monkeypatch):
@@ -111,7 +116,9 @@ def test_stacks_without_a_bound_and_other_compilers_are_refused(phigen, monkeypa
 
 
 def test_functions_that_are_called_by_others_belong_to_the_chain(monkeypatch):
-    """Each chain begins at its own function, and the longest one may begin elsewhere."""
+    """The bounds of init and of step are those of the chains that begin with these functions. The longest chain may
+    begin with another function.
+    """
     frames = {"init": 100, "step": 300, "run": 50}
     text = "void use(char *);\n" + "".join(
         f"void a_{name}(void) {{ char b[{size}]; use(b); {'a_step(); use(b);' * (name == 'run')} }}\n"
@@ -134,7 +141,9 @@ def test_functions_that_are_called_by_others_belong_to_the_chain(monkeypatch):
     ],
 )  # fmt: skip
 def test_solvers_of_all_kinds_have_a_bound(name, options):
-    """Vectors make gcc align frames at run time; then its number of bytes is an upper bound."""
+    """Functions with vectors align their frames at run time. gcc then prints an upper bound of the size of the frame,
+    which counts as a bound.
+    """
     program = compile_spec(load(bundled()[name]), **options).program
     bound = stack_bound(emit(program, "c", ""), name, "-O2")
     assert 0 < bound.step <= bound.longest

@@ -1,4 +1,4 @@
-"""``phigen tune`` as a user meets it: its lines, pasted into the spec, give what it promised."""
+"""``phigen tune`` from end to end: its proposed lines, pasted into the spec, give the accuracy that it printed."""
 
 import json
 import re
@@ -13,7 +13,7 @@ SPECS = resources.bundled_specs()
 
 
 def paste(source, proposal):
-    """The spec with the proposed lines."""
+    """Return the text ``source`` of a spec, with the proposed lines in place of its lines with the same keys."""
     keys = "|".join(["terms", *(line.split(":")[0] for line in proposal["lines"])])
     head = re.sub(rf"(?m)^({keys}):.*\n(?:[ \t]+.*\n)*", "", source)
     for line in proposal["run_lines"]:
@@ -41,7 +41,8 @@ def test_pasted_lines_reach_the_accuracy_at_the_proposed_step(phigen, in_tmp):
     assert run["step"] * run["steps"] == pytest.approx(500, abs=best["step"])
     assert (run["step"], run["order"]) == (best["step"], best["order"])
     of_phigen = run["methods"][0]
-    assert of_phigen["energy"]["error"] == pytest.approx(best["measured_error"], rel=0.25)  # it stores fewer states
+    # The run stores fewer states than tune measures.
+    assert of_phigen["energy"]["error"] == pytest.approx(best["measured_error"], rel=0.25)
     assert "up to t = 500" in Path("w.svg").read_text(encoding="utf-8")
 
 
@@ -116,7 +117,7 @@ runs:
 """
 
 
-@pytest.mark.slow  # its pieces are in tests/tuning/test_lattice_problem.py
+@pytest.mark.slow  # the parts of the search have faster tests in tests/tuning/test_lattice_problem.py
 def test_lattices_are_tuned_by_the_same_search(phigen, in_tmp):
     Path("chain.yaml").write_text(CHAIN, encoding="utf-8")
     asked = ["--accuracy", "1e-6", "--horizon", "40", "--budget", "1", "--json"]

@@ -30,7 +30,9 @@ def edit(file, before, after):
 
 @pytest.fixture
 def vendored(phigen, write):
-    """Two solvers in one folder, of specs beside it; gives the function that checks the folder."""
+    """Vendor the solvers of two specs into one folder, and return a function that runs ``phigen vendor --check`` on the
+    folder.
+    """
     assert phigen("vendor", write("models/a.yaml"), write("models/b.yaml"), EXT, "-t", "c").exit_code == 0
 
     def check(*specs):

@@ -33,7 +33,7 @@ def cache_directory(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def solvers(oscillator_files, tmp_path_factory):
-    """The same system on every back end."""
+    """Return the solvers of the oscillator by target: in C and in NumPy."""
     source = (HERE / "oscillator_module.py").read_text(encoding="utf-8")
     by_target = {"numpy": Solver(NumpySolver(source, OSCILLATOR), OSCILLATOR)}
     with pytest.MonkeyPatch.context() as patch:

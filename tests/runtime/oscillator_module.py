@@ -1,4 +1,4 @@
-"""The twin of oscillator.c: a module of the generated NumPy API, written by hand."""
+"""Oscillator of oscillator.c as a module with the API of generated NumPy solvers, written by hand."""
 
 import numpy as np
 

@@ -75,7 +75,7 @@ def test_unwritable_directory_falls_back_with_a_warning(tmp_path, monkeypatch):
     with pytest.warns(RuntimeWarning, match="PHIGEN_CACHE_DIR"):
         assert cache.load(text).one() == 11
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # said once is enough
+        warnings.simplefilter("error")  # the second load repeats no warning
         assert cache.load(text).one() == 11
 
 

@@ -1,4 +1,4 @@
-"""Checkpoints: what comes back is what was stored, and anything else is refused."""
+"""Checkpoints: `load` returns the arrays that were stored, and refuses damaged files and those of another run."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ IDENTITY = {"spec": "abc", "steps": 10, "initial": (1.0, 2.0)}
 
 @pytest.fixture
 def path(tmp_path):
-    """A stored checkpoint."""
+    """Return the path of a stored checkpoint."""
     Checkpoint(IDENTITY, {"x": np.arange(3.0)}).save(tmp_path / "run.checkpoint")
     return tmp_path / "run.checkpoint"
 

@@ -1,4 +1,4 @@
-"""Poincaré sections, against closed forms."""
+"""Poincaré sections: crossings compared with closed forms, and properties of crossings for every kind of step."""
 
 from itertools import product
 
@@ -53,7 +53,9 @@ SECTIONS.append(("nambu_pendulum", "c"))
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "target"), slow_but(SECTIONS, [*SECTIONS, *product(["guiding_centre"], TARGETS)]))
 def test_crossings_lie_on_the_section_and_on_the_leaf(name, target):
-    """g is an inclined plane through the mean of the first steps: nothing about it is special."""
+    """The section is an oblique plane through the middle of the orbit, the set where g vanishes, so that no symmetry of
+    the system helps.
+    """
     it, at = solver(compiled(name), target), setting(compiled(name))
     steps = {"guiding_centre": 60, "rigid_body": 400}.get(name, 1000)
     rows = it.integrate(at.x, at.h, steps, parameters=at.parameters)
@@ -79,7 +81,7 @@ hamiltonian: (u**2 + v**2)/2 - 1/sqrt(x**2 + y**2)
 runs: {r: {initial: [0.5, 0, 0, 1.7], step: 0.1, steps: 1}}
 """
 TORQUE = "forces: {vector: {x3: 0.1 - x3/20}}\n"
-#: The other kinds of step, with where they start and the coordinate that passes through 0.3.
+#: Other kinds of steps, each with the text of a system, the start, and the index of the coordinate that crosses 0.3.
 KINDS = {
     "composed": (f"{BODY}order: 4\ncomposition: triple-jump\n", [2, 4, 0.8], 1),
     "kicks": (f"{PENDULUM}order: 4\nscheme: splitting\ncomposition: force-gradient\n", [1, 0], 0),
@@ -97,8 +99,9 @@ KINDS = {
 @pytest.mark.thin(3)
 @pytest.mark.parametrize(("kind", "target"), slow_but(product(KINDS, ["numpy"]), product(KINDS, TARGETS)))
 def test_every_kind_of_step_is_cut_and_ends_where_a_function_vanishes(kind, target):
-    """Within the step in which its sign changes, to round-off; and a terminal event is the first of the section, as the
-    end of a run by ``stop`` is, with the attitude there."""
+    """Each crossing lies within the step in which g changes its sign, and g vanishes there to round-off. A terminal
+    event of `solve_ivp` and an end of a run by ``stop`` are the first crossing, with the attitude at this time.
+    """
     text, start, i = KINDS[kind]
     drift = 0.01 * kind.startswith("time")
 
@@ -141,7 +144,7 @@ def test_a_step_in_a_block_of_its_own_changes_nothing():
 
 
 def test_crossings_closer_than_a_step_are_found():
-    # cos t stays above 1 − 1e-7 for 9e-4, a small part of a step.
+    # In each period, cos t exceeds 1 − 1e-7 only for a time of 9e-4, much shorter than the step of 0.1.
     level, half = 1 - 1e-7, np.arccos(1 - 1e-7)
     above = oscillator("c").section([1, 0], 0.1, 1900, lambda x: x[:, 0] - level)
     assert np.allclose(above.t, 2 * np.pi * np.arange(1, 31) - half, atol=1e-9)
@@ -171,7 +174,9 @@ def test_no_crossings_at_rest_or_away_from_the_section():
 
 
 def test_steps_too_large_to_be_made_from_scratch_are_divided(monkeypatch):
-    """A solver in the middle of a run knows where to look; one that starts anew may not converge."""
+    """A step to a crossing begins without the predictor of the running session, so the iteration may not converge for a
+    large step, which is then divided. Here all other steps above 0.03 are made to fail.
+    """
     from phigen.runtime.c_session import CSession
     from phigen.runtime.interface import BackendError
 

@@ -1,4 +1,4 @@
-"""Runs of solvers as functions of JAX: values, derivatives both ways, under jit and vmap."""
+"""Runs of solvers as functions of JAX: values, derivatives in forward and reverse mode, jit and vmap."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def close(actual, expected):
 
 
 def cubes(f):
-    """A number from a run, of a state and I2."""
+    """Return the function (x, I2) ↦ Σ f(x, I2)³, a number that depends on the result of a run ``f``."""
     return lambda x, i2: jnp.sum(f(x, {"I2": i2}) ** 3)
 
 
@@ -83,7 +83,9 @@ def test_vmap_is_a_loop(solver, axes):
 
 @pytest.mark.slow
 def test_members_share_a_parameter_in_any_way(solver):
-    """As leading axes, by vmap inside the derivative, by vmap outside, and with an axis of vmap before their own."""
+    """The derivative by the shared parameter I2 is the sum over the members: with members as leading axis of x, with
+    vmap over x inside the derivative, and with vmap over I2 outside.
+    """
     propagate = propagator(solver)
     expected = sum(jax.grad(cubes(propagate), argnums=1)(x, 2.2) for x in X)
     assert close(jax.grad(cubes(propagate), argnums=1)(X, 2.2), expected)
@@ -197,7 +199,7 @@ def test_members_may_be_none_and_states_lists(solver):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("stride", [None, 3])
 def test_lattices_have_gradients_along_disorder(stride):
-    """Members by `vmap`, each with fields of its own at the sites; J is shared."""
+    """`vmap` runs over members, each with its own field B at the sites. The parameter J is shared."""
     chain, rng = phigen.compile("xxz_disorder", target="numpy", adjoint=True), np.random.default_rng(1)
     many, fields = rng.normal(size=(2, 3, 5)), rng.normal(size=(2, 5))
     propagate = propagator(chain, stride=stride)

@@ -1,4 +1,6 @@
-"""Flows of brackets with functions of JAX as H: Poisson maps of the order asked for, with derivatives."""
+"""Flows of a Poisson bracket with a JAX function as H: the steps are Poisson maps, have the requested order, and can be
+differentiated.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +13,8 @@ jax = pytest.importorskip("jax")
 jnp = jax.numpy
 
 BODY = "poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}"
-#: so(3), so(4), se(3), a solvable Toda chain, constant brackets, and affine ones beside them.
+#: Brackets with their dimensions: so(3), so(4), se(3), a Toda chain on a solvable algebra, constant brackets, and
+#: linear brackets with constant terms.
 BRACKETS = {
     "so3": (3, BODY),
     "so4": (6, "poisson: {lie_algebra: {name: so(4), sign: minus}}"),
@@ -42,7 +45,7 @@ def flow(name, h, steps, **options):
 
 
 def network(x, weights):
-    """A number from a layer of seven units."""
+    """Return the output, one number, of a neural network with one layer of seven units. This network is H."""
     return jnp.tanh(x @ weights["rows"] + weights["shift"]) @ weights["last"]
 
 
@@ -57,7 +60,7 @@ def start_of(size):
 
 
 def bracket_of(name):
-    """π as a function of x."""
+    """Return the function x ↦ π(x) of a bracket by name."""
     import sympy
 
     system = phigen.geometry.system.system_from_spec(spec_of(name)).to_sympy()
@@ -66,7 +69,9 @@ def bracket_of(name):
 
 
 def defect(name, run, x):
-    """|DΦ π DΦᵀ − π∘Φ| relative to the largest entry."""
+    """Return the largest entry of |DΦ(x) π(x) DΦ(x)ᵀ − π(Φ(x))| for the map Φ = ``run``, relative to that of
+    |π(Φ(x))|.
+    """
     tangent, following = jax.jit(jax.jacfwd(lambda x: (run(x),) * 2, has_aux=True))(x)
     pi, tangent = bracket_of(name), np.asarray(tangent, float)
     after = pi(following)
@@ -75,7 +80,9 @@ def defect(name, run, x):
 
 @pytest.mark.parametrize("name", slow_but(("so3",), BRACKETS))
 def test_steps_with_a_network_are_poisson_maps(name):
-    """Those of order 2, with steps that are not small."""
+    """The method has order 2 and steps of 0.3, so that its truncation errors are large, but its Poisson defect is
+    round-off.
+    """
     size, _ = BRACKETS[name]
     x, weights = start_of(size), weights_of(size)
     run = flow(name, 0.3, 3, order=2)
@@ -91,7 +98,9 @@ def test_steps_to_truncation_are_none():
 
 @pytest.mark.slow
 def test_order_is_that_of_the_method():
-    """The rows of order 6 are those of the solver, below."""
+    """Half the step divides the error of order 4 by 2⁴. Order 6 is compared with a solver by
+    `test_rows_are_those_of_the_solver`.
+    """
     x, weights = start_of(3), weights_of(3)
     exact = flow("so3", 0.02, 120, order=12)(x, weights)
     errors = [np.abs(flow("so3", 2.4 / n, n, order=4)(x, weights) - exact).max() for n in (64, 128)]
@@ -101,7 +110,7 @@ def test_order_is_that_of_the_method():
 
 @pytest.mark.slow
 def test_derivatives_are_those_of_differences():
-    """By the weights, the start, and a parameter of the bracket, forwards and backwards."""
+    """Derivatives by the weights, the start, and a parameter of the bracket, in reverse and in forward mode."""
     x, weights, factors = start_of(5), weights_of(5), np.array([1.0, -2.0, 0.5, 1.5, -0.7])
     run = flow("affine", 0.2, 10, order=4)
     loss = jax.jit(lambda x, weights, a: jnp.sum(factors * run(x, weights, a=a) ** 3))
@@ -129,7 +138,9 @@ def test_second_derivatives_are_those_of_differences():
 
 @pytest.mark.slow
 def test_vmap_is_a_loop():
-    """Over starts and weights, and with leading axes of x0; members converge in different numbers of sweeps."""
+    """vmap over starts and weights, or leading axes of x0, give the values of a loop, although the members need
+    different numbers of iterations.
+    """
     run, weights = flow("so3", 0.3, 5, order=4), weights_of(3)
     halved = jax.tree.map(lambda w: 0.5 * w, weights)
     starts = np.stack([start_of(3), 0.01 * start_of(3)[::-1]])
@@ -141,18 +152,21 @@ def test_vmap_is_a_loop():
 
 @pytest.mark.slow
 def test_single_precision_is_that_of_the_start():
-    """The Casimir, the square of the norm, is constant to rounding."""
+    """A start in single precision gives a run in single precision. Its Casimir, the square of the norm of x, is
+    constant to round-off.
+    """
     x, weights, single = start_of(3), weights_of(3), weights_of(3, np.float32)
     run = flow("so3", 0.3, 2000, order=4, stride=20)
     rows = run(x.astype(np.float32), single)
     assert rows.dtype == np.float32
     assert np.abs(rows[1] - run(x, weights)[1]).max() < 1e-6
-    assert np.ptp(np.sum(np.asarray(rows, float) ** 2, axis=1)) < 1e-7 * np.sqrt(2000)  # a random walk of rounding
+    # The rounding errors of 2000 steps add up like a random walk.
+    assert np.ptp(np.sum(np.asarray(rows, float) ** 2, axis=1)) < 1e-7 * np.sqrt(2000)
 
 
 @pytest.mark.slow
 def test_rows_are_those_of_the_solver():
-    """With the H of a spec the steps are those of scheme: gauss, and casimirs do not drift."""
+    """With the H of a spec, the steps equal those of a solver with scheme: gauss, and the Casimir does not drift."""
     spec = phigen.spec.loads(f"phigen: 1\nname: t\ncoordinates: [x1, x2, x3]\n{BODY}\n"
                              "hamiltonian: x1**2/2 + x2**2/4 + x3**2/6 + x1*x2*x3/5\n"
                              "casimirs: {C: x1**2 + x2**2 + x3**2}\n")  # fmt: skip

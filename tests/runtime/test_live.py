@@ -1,4 +1,4 @@
-"""Sessions in the hands of their users: steps, kicks, states that are set."""
+"""Caller-driven stepping by sessions: steps, kicks, and states that the caller sets."""
 
 import pickle
 
@@ -9,7 +9,8 @@ from support import compiled, setting, solver
 from phigen.errors import StepError
 
 TARGETS = ["c", "numpy"]
-#: A gauge that is found; with an attitude; a time; a splitting with a monitor; paths, relative sizes.
+#: Systems with a gauge; with an attitude; with a time; with a splitting and a monitor; and with a bi-realisation by
+#: paths.
 SYSTEMS = ["rigid_body", "dzhanibekov", "duffing", "kepler_eccentric", "sir_epidemic"]
 
 
@@ -51,7 +52,9 @@ def test_a_kick_moves_to_another_leaf_and_energy_which_are_kept_from_then_on(nam
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_orbits_of_a_monitor_are_those_of_the_energy_after_the_kick(target):
-    """Were e that of before, K would not vanish, and the orbit be another, with another excentricity."""
+    """A kick changes the energy H, and the session takes the new energy level e = −H. With the old level, K = g(H + e),
+    the Hamiltonian of a step with the monitor g, would not vanish, and the orbit would have another eccentricity.
+    """
     at = setting(compiled("kepler_eccentric"))
     session = solver(compiled("kepler_eccentric"), target).session(at.x, oblateness=0)
     session.step(at.h, 7)
@@ -68,7 +71,9 @@ def test_orbits_of_a_monitor_are_those_of_the_energy_after_the_kick(target):
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_the_momentum_in_space_is_constant_after_an_impulse_too(target):
-    """What the Casimirs of a gauge turn the body by is another rate on another leaf."""
+    """A gauge adds multiples of Casimirs to H, which rotates the body at a rate that depends on the leaf. After an
+    impulse, the attitude is corrected by the rate of the new leaf.
+    """
     session, at = session_of("dzhanibekov", target)
     session.step(at.h, 40)
     attitude = session.attitude
@@ -77,13 +82,13 @@ def test_the_momentum_in_space_is_constant_after_an_impulse_too(target):
     spatial = turned(session.attitude, session.x)
     session.step(at.h, 200)
     assert turned(session.attitude, session.x) == pytest.approx(spatial, abs=1e-12)
-    for _ in range(300):  # the length of a quaternion does not walk away
+    for _ in range(300):  # the norm of the quaternion stays 1 after many kicks
         session.kick([1e-3, 0, 0])
     assert session.attitude @ session.attitude == pytest.approx(1, abs=1e-15)
 
 
 def turned(q, v):
-    """A vector of the body in space."""
+    """Return the vector v of the body frame in the space frame, by the attitude quaternion q."""
     t = 2 * np.cross(q[1:], v)
     return v + q[0] * t + np.cross(q[1:], t)
 
@@ -129,7 +134,9 @@ def test_what_is_not_allowed_leaves_all_as_it_was(target):
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_after_a_change_of_parameters_a_session_goes_on_as_one_that_starts_there(name, target):
-    """The gauge is the old one, by which steps differ within their error."""
+    """The session keeps its gauge, and a session that starts at the same state determines its own one. So the states
+    differ by less than the error of the steps.
+    """
     session, at = session_of(name, target)
     unknown = {"unknown": 1.0}
     before = session.step(at.h, 20).parameters

@@ -12,7 +12,7 @@ from phigen.errors import LimitError
 from phigen.study.lyapunov import lattice_spectrum
 from phigen.sweeping import cluster
 
-#: The arrays of a state of 12 sites, (q, p).
+#: Bytes of a state (q, p) of 12 sites.
 STATE = 8 * 2 * 12
 CHAIN = """phigen: 1
 name: chain
@@ -83,7 +83,8 @@ def alike(solver, x):
     solver.ensemble(np.tile(x, (9, 1, 1)), 0.05, 1)
 
 
-#: What is made beside a solver; for how many states of the chain there is room where it is refused, and where not.
+#: Calls that allocate arrays: words of the error, the target, the free memory in states of the chain with which the
+#: call is refused and with which it succeeds, and the call.
 TAKING = [
     ("tangent vectors", "numpy", 499, 500, carry),
     ("the arrays of 500 tangent vectors", "c", 1338, 1340, carry),

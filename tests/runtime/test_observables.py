@@ -49,7 +49,7 @@ runs: {spin: {initial: [0.1, 1, 0.2], step: 0.1, steps: 50}}
 
 
 def by_numpy(x, t, A=0.5):
-    """The observables of `DRIVEN`, written a second time."""
+    """Return the observables of `DRIVEN` by name, computed by NumPy formulas that were written independently."""
     q, p = x.T
     return {
         "kinetic": p**2 / 2,

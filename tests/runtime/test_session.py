@@ -1,4 +1,4 @@
-"""A trajectory is the same to the last bit, in however many pieces it is made."""
+"""Sessions: a trajectory has the same bits, however its steps are divided into calls."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,8 @@ from phigen.errors import StepError
 from phigen.runtime.interface import BackendError
 
 STEPS = 24
-#: One system for each driver: newton, explicit and path.
+#: One system for each driver, the loop over steps in the C runtime: Newton's method, explicit steps, and the path
+#: realisation.
 DRIVERS = ("rigid_body", "pendulum_euler", "sir_epidemic")
 
 
@@ -34,7 +35,7 @@ def test_pieces_copies_and_stored_bytes_give_the_same_trajectory(name, target):
     session, _ = session_of(name, target)
     session.advance(at.h, 5)
     copy = session.branch()
-    session.advance(-0.3 * at.h, 1)  # what becomes of the original is no affair of the copy
+    session.advance(-0.3 * at.h, 1)  # a step of the original must not change the copy
     backend = solver(compiled(name), target).backend
     back = backend.restored(copy.saved(), at.parameters)
     for other in (copy, back):
@@ -58,7 +59,9 @@ def test_a_failing_step_leaves_the_state_before_it(name, target):
 
 
 def test_progress_does_not_change_a_trajectory():
-    """A gauge is chosen once, at the start; and rounding errors are carried along."""
+    """With ``progress``, the run is made in several blocks. The gauge is still determined once, at the start, and each
+    block continues with the compensation terms of the block before.
+    """
     from phigen import api, resources
 
     numpy = api.compile(resources.bundled_specs() / "rigid_body.yaml", target="numpy")

@@ -100,7 +100,7 @@ def test_back_ends_agree(solvers):
 @pytest.mark.parametrize("progress", [None, lambda done: None])
 @pytest.mark.parametrize("stride", [1, 4, 5, 1000])
 def test_failed_step_keeps_the_trajectory_so_far(solver, stride, progress):
-    # q = cos(t - φ)·A passes 1.11 between t = 0.2 and t = 0.3: after two good steps of 0.1.
+    # q = A cos(t − φ) with A² = 1.25 and tan φ = 1/2 passes 1.11 at t = 0.344, after 34 good steps of 0.01.
     with pytest.raises(StepError) as caught:
         solver.integrate(START, h=0.01, steps=1000, stride=stride, limit=1.11, progress=progress)
     error = caught.value
@@ -164,7 +164,7 @@ def test_wrong_arguments_are_named(solver, arguments, error, message):
 
 
 def test_solvers_can_be_copied_and_pickled(solver):
-    """Also with a fixed gauge; a copy makes the same steps."""
+    """A copy of a solver makes the same steps, and a solver with a fixed gauge can be pickled, too."""
     expected = solver.integrate(START, 0.1, 5, omega=2).x.tolist()
     for twin in (copy.copy(solver), copy.deepcopy(solver), pickle.loads(pickle.dumps(solver))):
         assert twin is not solver
@@ -175,7 +175,7 @@ def test_solvers_can_be_copied_and_pickled(solver):
 
 
 def test_errors_can_be_pickled(solver):
-    """As pools of processes do."""
+    """Pools of processes pickle the errors of their workers."""
     with pytest.raises(StepError) as caught:
         solver.integrate(START, 0.1, 100, limit=1.05)
     error, twin = caught.value, pickle.loads(pickle.dumps(caught.value))

@@ -105,7 +105,7 @@ def test_a_spectrum_goes_to_zarr_and_pictures(tmp_path):
     computed.plot("chain").savefig(tmp_path / "s.png")
 
 
-#: The same chain, whose run asks for both; waves along a plane.
+#: The ferromagnetic chain with a run that asks for a spectrum and a correlation; it starts with a plane spin wave.
 ASKING = (
     FERROMAGNET.replace("steps: 10", "steps: 640, stride: 5, spectrum: {of: [x, y], after: 2.5}")
     .replace("x: 0, y: 0, z: 1}", "x: 0.001*cos(2*pi*3*i/N_i), y: -0.001*sin(2*pi*3*i/N_i), z: 1}")
@@ -125,7 +125,8 @@ def test_a_run_puts_what_it_asks_for_into_its_files(tmp_path, monkeypatch):
     assert abs(spectrum.omega[n]) == pytest.approx(0.1 + 2 * (1 - np.cos(2 * np.pi * 3 / 32)), abs=np.pi / 60)
     np.testing.assert_array_equal(run.structure_factor.values, spectrum.values)
     np.testing.assert_array_equal(run.correlated.values, correlation)
-    for name, plot in (("a.npz", ["--plot", "a.svg"]), ("a.zarr", []), ("a.zarr", [])):  # a store is replaced
+    # The third run replaces the store of the second.
+    for name, plot in (("a.npz", ["--plot", "a.svg"]), ("a.zarr", []), ("a.zarr", [])):
         result = CliRunner().invoke(group, ["run", "waves.yaml", "-t", "numpy", "-o", name, *plot])
         assert result.exit_code == 0, result.output
     with np.load("a.npz") as arrays, xarray.open_zarr("a.zarr", consolidated=False) as stored:

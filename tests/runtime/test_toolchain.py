@@ -12,7 +12,7 @@ REAL = toolchain.find()
 
 OUTPUT = 'while [ "$1" != -o ]; do shift; done\n'
 
-#: What a compiler does when it is to make a library, and the end of the sentence about it.
+#: Broken compilers: the shell commands by which each answers a request for a library, and the end of the error message.
 BROKEN = {
     "writes nothing": ("exit 0", "reported success, but wrote no library"),
     "writes an empty file": (f'{OUTPUT}: > "$2"', "reported success, but wrote an empty file"),
@@ -32,7 +32,9 @@ BROKEN = {
 
 @pytest.fixture
 def compiler(tmp_path, monkeypatch):
-    """Makes a program that answers --version and then does as it is told."""
+    """Return a function that writes a fake compiler: a shell script that answers --version and otherwise executes
+    ``body``.
+    """
     monkeypatch.setattr(toolchain, "_GRACE", 0.1)
 
     def make(body, version="echo fake 1.0", name="compiler"):
@@ -45,7 +47,7 @@ def compiler(tmp_path, monkeypatch):
 
 
 def hasty(monkeypatch):
-    """A compiler that hangs is waited for a moment."""
+    """Reduce the time that phigen waits for an answer of a compiler to 0.4 s."""
     monkeypatch.setattr(toolchain, "_TRIAL_TIMEOUT", 0.4)
 
 
@@ -62,7 +64,7 @@ def test_a_compiler_that_is_named_and_does_not_work_is_refused_with_the_reason(k
     assert f"named in CC, {os.environ['CC']}, {reason}" in str(raised.value)
     assert "\n  hint: " in str(raised.value)
     assert raised.value.exit_code == 6
-    assert time.monotonic() - began < 30  # what it left behind has ended with it
+    assert time.monotonic() - began < 30  # phigen does not wait 60 s for a process that the compiler left behind
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def test_values_and_gradients_are_those_of_the_solver(solver, stride):
 
 @pytest.mark.parametrize("stride", [None, 3])
 def test_lattices_have_gradients_along_disorder(stride):
-    """Members with fields of their own at the sites; J is shared."""
+    """Each member has its own field B at the sites. The parameter J is shared."""
     from phigen.torch import propagator
 
     chain, random = phigen.compile("xxz_disorder", target="numpy", adjoint=True), np.random.default_rng(1)
