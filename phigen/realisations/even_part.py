@@ -40,9 +40,10 @@ Vector = list[Expression]
 
 @dataclass(frozen=True)
 class EvenPart:
-    """The even part of b(M_p)x in closed form: ``values`` are the components of Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x.
+    """The even part of b(M_p)x, with b(z) = z/(1 − e^{−z}) and M_p x = π(x)p, in closed form.
 
-    ``forms`` describes, for the user, the closed form in each ideal of the algebra.
+    ``values`` are the components of Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x, with Bernoulli numbers B. ``forms`` describes, for
+    the user, the closed form in each ideal of the algebra.
     """
 
     values: tuple[Expression, ...]
@@ -50,10 +51,12 @@ class EvenPart:
 
 
 def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expression]) -> EvenPart | None:
-    """Return the even part of b(M_p)x in closed form; None if no formula of this module applies.
+    """Return the even part of b(M_p)x with b(z) = z/(1 − e^{−z}) in closed form; None if no formula of this module
+    applies.
 
-    x is in the dual of the algebra and p in the algebra. Both may have any expressions as components; for instance,
-    constants for a central extension. Each summand of a direct sum of algebras has its own closed form.
+    x is in the dual of the algebra, p in the algebra, and M_p x = π(x)p. Both x and p may have any expressions as
+    components; for instance, constants for a central extension. Each summand of a direct sum of algebras has its own
+    closed form.
     """
     values: Vector = [ZERO] * algebra.dimension
     forms: list[str] = []

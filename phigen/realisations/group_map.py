@@ -168,8 +168,8 @@ class _Trivialised:
     def _eliminated(self, rows: list[list[Scalar]], n: int) -> list[list[Scalar]]:
         """Return the rows of the equations with the first n columns reduced to the identity.
 
-        Raises `SpecError` if dτ is singular, or if the equations have no solution since the derivative of τ leaves the
-        algebra.
+        Raises `SpecError` if the derivative of the map τ is singular, or if the equations have no solution because it
+        leaves the algebra.
         """
         reduced: list[list[Scalar]] = []
         for k in range(n):

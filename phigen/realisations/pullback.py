@@ -28,11 +28,11 @@ KIND = "pullback"
 
 
 def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> BiRealisation:
-    """Return the bi-realisation that ``build_inner`` makes in the other coordinates of a pull-back, in the coordinates
-    of the spec.
+    """Return the bi-realisation of a π that the spec states in other coordinates y, as maps in the coordinates x of the
+    spec.
 
-    Raises `SpecError` unless the spec states π as a pull-back, and if the solver would have to follow paths in the
-    other coordinates.
+    ``build_inner`` makes the bi-realisation in the coordinates y. Raises `SpecError` unless the spec states π as a
+    pull-back, and if the solver would have to follow paths in the coordinates y.
     """
     form = system.form
     if not isinstance(form, PullbackForm):

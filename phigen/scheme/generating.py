@@ -30,8 +30,8 @@ class GeneratingFunction:
 
     ``form`` names the form in which they are written, and ``terms`` is the number of terms of a polynomial.
     ``coefficients`` is the table of the symbols ``c:k`` in the expressions, including coefficients that are computed
-    anew in every step. For a monitored system ``elapsed`` is ∂S_h/∂e, the time that a step takes. With forces,
-    ``slope`` includes hζ, and ``free`` is the same covector without the forces.
+    anew in every step. For a monitored system ``elapsed`` is the time that a step takes, ∂S_h/∂e with the energy level
+    e. With a covector force ζ, ``slope`` includes hζ, and ``free`` is the same covector without the forces.
     """
 
     slope: tuple[Expression, ...]

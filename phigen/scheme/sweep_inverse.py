@@ -74,10 +74,11 @@ def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
 
 
 def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
-    """Return a transposed kernel without the factors 0 or 1 of open ends in the values that are stored for neighbours.
+    """Return a transposed kernel without those factors that are 0 if a term of H extends beyond an open end, else 1.
 
-    Without these factors, a value is often the same for many neighbours. A factor can be omitted if it is 1 at every
-    site whose neighbour reads the value; it stays if the term of H extends beyond this neighbour.
+    They are omitted in values that are stored for neighbours, which are then often the same for many neighbours. A
+    factor can be omitted if it is 1 at every site whose neighbour reads the value; it stays if the term extends beyond
+    this neighbour.
     """
 
     def without_weights(name: str, value: Expression) -> Expression:

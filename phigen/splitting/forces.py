@@ -65,8 +65,11 @@ def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
 
 
 def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow, ...]:
-    """Return the flows of πζ: one flow; else a flow for each component of ζ; else flows of the damping and of all other
-    components."""
+    """Return the flows of πζ, where ζ is the covector force including damping.
+
+    There is one flow for the whole field; if that fails, a flow for each component of ζ; if that fails too, flows of
+    the damping and of all other components.
+    """
     try:
         covectors = list(_covectors(system, forces.covector))
         return tuple(_summand_flows(system, tangent, covectors, ("forces", "covector"), ("damping",)))
