@@ -39,7 +39,7 @@ SAMPLES = 4
 _DIFFERENCE = 1e-5
 #: Largest number of iterations of Newton's method for a zero; two to four are usual.
 _MOST_NEWTON = 8
-#: A point inside a step is reached by this number of equal smaller steps. The numbers are tried in this order, since a
+#: A point inside a step is reached by 1, 2, 4 or 8 equal smaller steps, the first number with which no step fails: a
 #: single step without a predictor may not converge.
 SUBSTEPS = (1, 2, 4, 8)
 #: Absolute tolerance for the fraction of a step at which a zero lies: a smaller difference does not change the state.

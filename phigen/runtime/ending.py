@@ -15,7 +15,8 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.session import Followed
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: Function of a session after the last whole step: it returns a session at the end and its number of steps.
+#: Function that makes the end of a run: it receives the session after the last whole step, and returns the session at
+#: the end and its number of steps since the start.
 Finish = Callable[[Any], tuple[Any, float]]
 
 
