@@ -1,4 +1,6 @@
-"""Chromium without a window, driven through its debugging pipe: enough to load a page, act on it and look at it."""
+"""Control of a headless Chromium through its debugging pipe: load a page, press keys, use the mouse, and read
+values.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +16,20 @@ from typing import Any
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
          "--disable-background-networking", "--disable-component-update", "--remote-debugging-pipe"]  # fmt: skip
 _SECONDS = 60.0
-#: Numbers of keys that do something by themselves.
+#: Virtual key codes of the keys that produce no character; the DevTools protocol needs them.
 _KEYS = {"ArrowRight": 39, "Tab": 9}
 
 
 class Browser:
-    """A browser with one page; ``messages`` holds what the page and the browser complained about, as text."""
+    """A browser with one page. ``messages`` holds the errors and warnings of the page and of the browser, as text."""
 
     def __init__(self, program: str, profile: Path) -> None:
         read_theirs, self._write = os.pipe()
         self._read, write_theirs = os.pipe()
 
         def connect() -> None:
-            # Chromium reads from file 3 and writes to file 4; the copies may overlap with these numbers.
+            # Chromium reads commands from file descriptor 3 and writes to descriptor 4. The ends of the pipes may have
+            # these numbers already, so they are duplicated to higher numbers first.
             source, sink = os.dup(read_theirs), os.dup(write_theirs)
             os.dup2(source, 3)
             os.dup2(sink, 4)
@@ -58,7 +61,7 @@ class Browser:
         os.close(self._read)
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """The result of a command of the DevTools protocol."""
+        """Send a command of the DevTools protocol and return its result."""
         number = self._send(method, parameters)
         while True:
             message = self._receive()
@@ -68,37 +71,37 @@ class Browser:
                 return dict(message["result"])
 
     def load(self, page: Path, fragment: str = "") -> None:
-        """Show a file, at a place of it, and wait until it is there."""
-        for url in ("about:blank", page.as_uri() + fragment):  # another fragment of the same page would load nothing
+        """Load a file, scroll to ``fragment``, and wait until the page is loaded."""
+        for url in ("about:blank", page.as_uri() + fragment):  # a new fragment alone would not reload the page
             self._events.clear()
             self.call("Page.navigate", url=url)
             while not any(e["method"] == "Page.loadEventFired" for e in self._events):
                 self._receive()
 
     def value(self, script: str) -> Any:
-        """The value of an expression of JavaScript in the page."""
+        """Evaluate a JavaScript expression in the page and return its value."""
         reply = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in reply:
             raise RuntimeError(reply["exceptionDetails"])
         return reply["result"].get("value")
 
     def media(self, kind: str = "", **features: str) -> None:
-        """Pretend to be a screen or a printer, with features such as prefers_color_scheme="dark"."""
+        """Emulate a media type, such as "print", and media features, such as prefers_color_scheme="dark"."""
         listed = [{"name": name.replace("_", "-"), "value": value} for name, value in features.items()]
         self.call("Emulation.setEmulatedMedia", media=kind, features=listed)
 
     def size(self, width: int, height: int) -> None:
-        """The size of the window."""
+        """Set the size of the window, in pixels."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
 
     def key(self, name: str) -> None:
-        """Press a key."""
+        """Press and release a key."""
         codes = {"windowsVirtualKeyCode": _KEYS[name]} if name in _KEYS else {}
         for kind in ("rawKeyDown", "keyUp"):
             self.call("Input.dispatchKeyEvent", type=kind, key=name, code=name, **codes)
 
     def drag(self, x: float, y: float, dx: float, dy: float) -> None:
-        """Press the mouse button at a point, move, and let go."""
+        """Press the mouse button at (x, y), move by (dx, dy), and release the button."""
         self.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, button="left", buttons=1, clickCount=1)
         for part in (0.5, 1.0):
             at = {"x": x + part * dx, "y": y + part * dy}
@@ -106,17 +109,19 @@ class Browser:
         self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x + dx, y=y + dy, button="left", clickCount=1)
 
     def pdf(self) -> bytes:
-        """The page as it would be printed."""
+        """Return the page as it would be printed, as PDF."""
         return base64.b64decode(self.call("Page.printToPDF")["data"])
 
     def picture(self, path: Path) -> None:
-        """The whole page as a PNG file."""
+        """Write a picture of the whole page to ``path``, as PNG."""
         data = self.call("Page.captureScreenshot", captureBeyondViewport=True)["data"]
         path.write_bytes(base64.b64decode(data))
 
     @property
     def complaints(self) -> list[str]:
-        """Errors and warnings of the console, uncaught exceptions, violations of the policy, failed requests."""
+        """Return what went wrong in the page: errors and warnings of the console, uncaught exceptions, violations of
+        the content security policy, failed requests.
+        """
         complaints = []
         for event in self._events:
             details = event["params"]
@@ -130,7 +135,7 @@ class Browser:
 
     @property
     def requests(self) -> list[str]:
-        """The addresses of everything that was asked for since the page was loaded."""
+        """Return the addresses that the page has requested since it was loaded."""
         asked = (e["params"]["request"]["url"] for e in self._events if e["method"] == "Network.requestWillBeSent")
         return [url for url in asked if not url.startswith("data:")]
 

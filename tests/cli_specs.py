@@ -17,7 +17,7 @@ runs:
     exact: {{q: cos(t), p: -sin(t)}}
 """
 
-#: The Jacobi identity fails.
+#: A spec whose brackets violate the Jacobi identity.
 NOT_POISSON = """\
 phigen: 1
 name: wrong

@@ -1,4 +1,6 @@
-"""Limits on processor time that a slow or busy machine does not exceed: seconds of the machine that chose them."""
+"""Limits on processor time that do not depend on the speed or load of the machine: seconds are those of a reference
+machine, and measured times are scaled by the time that a fixed task takes here.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +8,20 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-#: Processor seconds that `reference_work` took on that machine with nothing else running (AVX2, 2.5 GHz, Python 3.11).
+#: Processor seconds that `reference_work` takes on the idle reference machine (AVX2, 2.5 GHz, Python 3.11).
 REFERENCE_SECONDS = 0.050
 
 
 def reference_work() -> int:
-    """Sort, hash and add: some work of the kind that Python does in compilers."""
+    """Sort, hash and add: a fixed task that resembles the work of the phigen compiler."""
     table = {str(i * 7919 % 65537): i for i in range(65_000)}
     return sum(table[name] for name in sorted(table))
 
 
 def slowness() -> float:
-    """How many times as long as on that machine processor work takes now; at least 1."""
+    """Return the ratio of the processor time that `reference_work` takes now to that on the reference machine; at least
+    1.
+    """
     begin = time.process_time()
     reference_work()
     return max(1.0, (time.process_time() - begin) / REFERENCE_SECONDS)
@@ -25,7 +29,7 @@ def slowness() -> float:
 
 @contextmanager
 def processor_seconds_below(limit: float) -> Iterator[None]:
-    """Fail if the body takes more processor time than `limit`, in seconds of that machine."""
+    """Fail if the body of the ``with`` takes more processor time than `limit`, in seconds of the reference machine."""
     begin = time.process_time()
     yield
     spent = time.process_time() - begin

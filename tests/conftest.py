@@ -13,11 +13,12 @@ from tools import WARNINGS, not_tested
 
 from phigen.runtime import toolchain
 
-#: Rooms whose files share what takes long to make.
+#: Folders whose tests all run on one worker of pytest-xdist, because they share pages that take long to make.
 WHOLE = ("tests/report/",)
-#: Of the cases of tests with the mark `thin` --all makes one in so many; --corpus makes all.
+#: With --all, a test with the mark `thin` runs one in ONE_IN of its cases, unless the mark says otherwise. With
+#: --corpus it runs all cases.
 ONE_IN = 2
-#: Files whose tests share nothing.
+#: Files whose tests share no compiled system, so that pytest-xdist may give each test to another worker.
 APART = ("tests/random/test_differential.py",)
 
 
@@ -33,13 +34,15 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     settings.register_profile("phigen", max_examples=250 if config.option.all else 130, deadline=None)
     settings.load_profile("phigen")
-    # What is compiled is kept for the tests that follow: there is much to go through, and little of it is garbage.
+    # Compiled systems stay in memory for later tests. So the garbage collector has millions of objects to visit, few of
+    # them garbage, and it should run rarely.
     gc.set_threshold(200_000, 20, 100)
     if hasattr(config, "workerinput"):
-        # A worker's last act, after what else is to be done at its end: to let go of millions of nodes and frames one
+        # This function is called last when a worker ends. It ends the process at once: freeing millions of objects one
         # by one would take seconds.
         atexit.register(os._exit, 0)
-    # In the background of a shell interrupts are ignored, and children would ignore them as well.
+    # A shell starts background processes with SIGINT ignored, and child processes inherit that; tests of interrupts
+    # need the default handler.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if not toolchain.available():
@@ -72,7 +75,9 @@ def pytest_collection_modifyitems(config, items):
 
 
 def _thinned(items, one_in):
-    """The items without most cases of tests with the mark `thin`; by chance, so that all of two parameters are seen."""
+    """Return the set of the items without most cases of the tests with the mark `thin`. One in ``one_in(mark)`` cases
+    remains, chosen by a hash of the name, so that with two parameters all values of each occur.
+    """
     cases = defaultdict(list)
     for item in items:
         if item.get_closest_marker("thin"):
@@ -91,7 +96,7 @@ def _is_alike(item):
 
 
 def _texts(item):
-    """The parameters of a test that are texts."""
+    """Return the parameters of a test that are strings."""
     return {v for v in item.callspec.params.values() if isinstance(v, str)} if hasattr(item, "callspec") else set()
 
 
@@ -107,13 +112,15 @@ def _is_slow(item):
 
 
 def pytest_sessionfinish():
-    gc.freeze()  # pytest goes through all there is five times, to find what was not closed
+    # pytest runs the garbage collector five times to find unclosed resources; it does not visit frozen objects.
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    """One worker does all tests of one system of the corpus, or all others of a file: what it has made for one of them
-    is of use to the next."""
+    """Give all tests of one system of the corpus to one worker, and all other tests of a file to one worker, so that
+    the tests can share compiled systems.
+    """
     from xdist.scheduler import LoadScopeScheduling
 
     class BySystem(LoadScopeScheduling):
@@ -132,11 +139,11 @@ def pytest_xdist_make_scheduler(config, log):
 
 @pytest.fixture(scope="session", autouse=True)
 def compiled_solvers(tmp_path_factory):
-    """Compiled C is shared by all tests and workers of one session, and not left in the cache of the user.
+    """Let all tests and workers of one session share compiled C, in a folder other than the cache of the user.
 
-    Every solver that a test compiles must compile without a warning. Compilers take a sixth of the time with -O0 that
-    they take with -O3, which warns of more; tests of what -O3 makes of loops ask for it themselves, those of the corpus
-    by `as_users_compile`.
+    Every solver that a test compiles must compile without a warning. Compilers need a sixth of the time with -O0, which
+    gives fewer warnings than -O3. Tests that need -O3 set the flag themselves, and tests of the corpus use
+    `as_users_compile`.
     """
     base = tmp_path_factory.getbasetemp()
     shared = (base.parent if base.name.startswith("popen-") else base) / "solvers"
@@ -148,7 +155,9 @@ def compiled_solvers(tmp_path_factory):
 
 @pytest.fixture
 def as_users_compile(request, compiled_solvers, monkeypatch):
-    """With --all, C is compiled with the flags users get, of the corpus that of one system for each kind of step."""
+    """With --all, compile C with -O3, as users do, if the test names no system of the corpus except those in
+    `QUICK`.
+    """
     values = request.node.callspec.params.values() if hasattr(request.node, "callspec") else ()
     if request.config.option.all and {*map(str, values)}.isdisjoint({*NAMES} - {*QUICK}):
         monkeypatch.setattr(toolchain, "BASE_FLAGS", _optimised("-O3"))
@@ -160,7 +169,7 @@ def _optimised(how):
 
 @pytest.fixture
 def without_compiler(monkeypatch, tmp_path_factory):
-    """As on a machine that has none."""
+    """Hide all C compilers: PATH, CC and the compilers in Python packages."""
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("empty")))
     monkeypatch.setattr(toolchain, "find_spec", lambda name: None)

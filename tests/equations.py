@@ -1,4 +1,4 @@
-"""Equations of motion written out by hand, and a solver for them in many digits: nothing of phigen is used here."""
+"""Equations of motion written by hand, and a solver for them in many digits. This module imports nothing of phigen."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Field = Callable[[Sequence[Any]], list[Any]]
 
 
 def charged_particle(s: Sequence[Any]) -> list[Any]:
-    """The Lorentz force v × B + E in B = (0, 0, 1 + x² + y²)."""
+    """Return the right-hand side for a charged particle: the Lorentz force v × B + E in B = (0, 0, 1 + x² + y²)."""
     x, y, z, u, v, w = s
     B = 1 + x * x + y * y
     return [u, v, w, v * B - x / 5, -u * B - y / 5, -2 * z / 5]
@@ -86,7 +86,7 @@ def toda3(s: Sequence[Any]) -> list[Any]:
     return [a1 * (b2 - b1), a2 * (b3 - b2), 2 * a1 * a1, 2 * (a2 * a2 - a1 * a1), -2 * a2 * a2]
 
 
-#: The systems of the corpus whose equations are written out above.
+#: The right-hand sides above, by the names of the systems of the corpus.
 FIELDS: Mapping[str, Field] = {
     "ablowitz_ladik3": ablowitz_ladik3,
     "charged_particle": charged_particle,
@@ -103,9 +103,11 @@ FIELDS: Mapping[str, Field] = {
 
 
 def extrapolated(field: Field, x: Sequence[Any], time: Any, pieces: int, rows: int) -> list[Any]:
-    """The flow by the explicit midpoint rule, extrapolated in h² (Gragg, Bulirsch, Stoer): order 2·rows.
+    """Return the state at ``time``, by the explicit midpoint rule with extrapolation in h² (Gragg, Bulirsch, Stoer),
+    which has order 2·``rows``.
 
-    ``pieces`` equal steps, each extrapolated from 2, 4, … 2·rows substeps, in the current precision of mpmath.
+    The time is divided into ``pieces`` equal intervals. In each interval the results with 2, 4, … 2·``rows`` substeps
+    are extrapolated. The precision is the current one of mpmath.
     """
     big = mpmath.mpf(time) / pieces
     state = [mpmath.mpf(v) for v in x]

@@ -1,4 +1,4 @@
-"""A disk that is full, for whoever has no disk to fill."""
+"""Imitation of a full disk: the operating system limits the sizes of files."""
 
 import resource
 import sys
@@ -7,15 +7,15 @@ from contextlib import contextmanager
 
 import pytest
 
-#: What is said of it, in place of "No space left on device".
+#: Message of the operating system if a file reaches this limit. A full disk gives "No space left on device".
 FULL = "File too large"
 
 
 @contextmanager
 def largest_file(size: int) -> Iterator[None]:
-    """Files of this process and those it starts cannot grow beyond so many bytes.
+    """Let no file that this process or its children write grow beyond ``size`` bytes.
 
-    Python 3.11 keeps what it could write of a compiled module, and fails to load that ever after: it may write none.
+    Python writes no compiled modules meanwhile: Python 3.11 would leave truncated ones, and later fail to load them.
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     with pytest.MonkeyPatch.context() as patch:

@@ -1,12 +1,12 @@
-"""Golden files: what is generated of the corpus, whole for a few systems, and of the others what these do not have.
+"""Golden files: the generated solvers of a few systems of the corpus and, for each other system, the paragraphs of its
+generated files that those few solvers lack.
 
-The systems that generated/left_out.txt does not list are in generated/ as users get them; `phigen build specs` writes
-these. Of each system that it lists tests/golden/NAME.txt has its own part: the paragraphs that no whole solver has,
-mostly the functions printed for the model. So a change of the runtime is a change of few files. Which solvers call
-which functions is in tests/golden/calls.txt.
+generated/ holds the solvers of all systems that generated/left_out.txt does not list, as `phigen build specs` writes
+them. For each system in that list, tests/golden/NAME.txt holds the paragraphs that no solver in generated/ has, mostly
+the functions printed for the model. So a change of the runtime changes few golden files. tests/golden/calls.txt lists
+the functions, each with the systems whose solvers call it.
 
-    python tests/golden.py           writes all of them
-    python tests/golden.py --check   says which are out of date
+`python tests/golden.py` writes all golden files, and `python tests/golden.py --check` lists those that are out of date.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ GENERATED = ROOT / "generated"
 PARTS = ROOT / "tests" / "golden"
 CALLS = PARTS / "calls.txt"
 
-#: The systems of the corpus of which there is the part of their own.
+#: Systems of the corpus with a file in tests/golden instead of a whole solver.
 PARTIAL = sorted(names_left_out(GENERATED))
-#: Those whose solvers are there as a whole.
+#: Systems of the corpus whose whole solver is in generated/.
 WHOLE = sorted({*resources.bundled()} - {*PARTIAL})
 
 OMITTED = "..."
@@ -41,38 +41,42 @@ NOBODY = "NAME"
 
 @cache
 def solver_files(name: str) -> Mapping[str, str]:
-    """The files of a system of the corpus, as `phigen build` writes them."""
+    """Return the texts of the files that `phigen build` writes for a system of the corpus, by file name."""
     compilation = as_given(name)
     return {file: text for target in compilation.spec.targets for file, text in files(compilation, target).items()}
 
 
 def paragraphs(text: str) -> list[str]:
-    """What blank lines separate."""
+    """Return the paragraphs of a text, which blank lines separate."""
     return re.split(r"\n{2,}", text.strip("\n"))
 
 
 def key(name: str, paragraph: str) -> str:
-    """The paragraph as it would be in a system without a name: neither prefixes nor the breaks of lines count."""
+    """Return the key by which paragraphs of different systems are compared: the paragraph without the name of the
+    system and without blanks and line breaks.
+    """
     anonymous = re.sub(rf"\b{name}(?=_|\b)", NOBODY, paragraph)
     anonymous = re.sub(rf"\b{name.upper()}(?=_|\b)", NOBODY, anonymous)
     return re.sub(r"\s+", "", re.sub(r"\n \* ", " ", anonymous))
 
 
 def keys(name: str, texts: Iterable[str]) -> set[str]:
-    """The keys of all paragraphs of files."""
+    """Return the keys of all paragraphs of the texts."""
     return {key(name, paragraph) for text in texts for paragraph in paragraphs(text)}
 
 
 @cache
 def of_whole_solvers() -> set[str]:
-    """The keys of all paragraphs that are in generated/."""
+    """Return the keys of all paragraphs of the files in generated/."""
     return set[str]().union(
         *(keys(name, (path.read_text(encoding="utf-8") for path in (GENERATED / name).iterdir())) for name in WHOLE)
     )
 
 
 def part(name: str, texts: Mapping[str, str], shared: Collection[str]) -> str:
-    """The part of a system's own, all files in one: without the paragraphs whose keys are shared."""
+    """Return the content of tests/golden/NAME.txt: all files of a system, with ``...`` in place of paragraphs whose
+    keys are in ``shared``.
+    """
     return "".join(f"==== {file} ====\n{_of_file(name, texts[file], shared)}\n" for file in sorted(texts))
 
 
@@ -87,27 +91,27 @@ def _of_file(name: str, text: str, shared: Collection[str]) -> str:
 
 
 def called(name: str) -> set[str]:
-    """The functions that the C of a system defines or calls, without the name of the system."""
+    """Return the names of the functions that the C of a system defines or calls, without the name of the system."""
     words = re.findall(r"\b(\w+)\(", solver_files(name).get(f"{name}.c", ""))
     return {re.sub(r"(_part)?\d*$", "", word.removeprefix(f"{name}_")) for word in words}
 
 
 @cache
 def calls() -> Mapping[str, set[str]]:
-    """What `called` gives of each system, as tests/golden/calls.txt has it."""
+    """Return the functions that each system defines or calls, as tests/golden/calls.txt states them."""
     lines = [line.split(": ") for line in CALLS.read_text(encoding="utf-8").replace("\n    ", " ").splitlines()]
     return {name: {function for function, names in lines if name in names.split()} for name in resources.bundled()}
 
 
 def table_of_calls() -> str:
-    """Each function with the systems whose C defines or calls it."""
+    """Return the content of tests/golden/calls.txt: each function with the systems whose C defines or calls it."""
     of = {name: called(name) for name in sorted(resources.bundled())}
     lines = [f"{f}: {' '.join(n for n in of if f in of[n])}" for f in sorted(set[str]().union(*of.values()))]
     return "".join(textwrap.fill(line, 118, subsequent_indent="    ", break_on_hyphens=False) + "\n" for line in lines)
 
 
 def contents() -> dict[Path, str]:
-    """All golden files."""
+    """Return the contents of all golden files as phigen generates them now, by path."""
     whole = {GENERATED / name / file: text for name in WHOLE for file, text in solver_files(name).items()}
     shared = set[str]().union(*(keys(name, solver_files(name).values()) for name in WHOLE))
     partial = {PARTS / f"{name}.txt": part(name, solver_files(name), shared) for name in PARTIAL}
@@ -115,7 +119,7 @@ def contents() -> dict[Path, str]:
 
 
 def existing() -> set[Path]:
-    """The golden files that are there."""
+    """Return the paths of the golden files on disk."""
     return {*PARTS.iterdir(), *GENERATED.glob("*/*")}
 
 

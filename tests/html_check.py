@@ -1,4 +1,6 @@
-"""What every page must be: well nested, with landmarks and names for everything, and loading nothing."""
+"""Check of HTML pages: elements are well nested, there are landmarks, controls and images have names, and nothing is
+loaded from other addresses.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +56,7 @@ class Page(HTMLParser):
             self.texts.setdefault(self._open[-1], []).append(data)
 
     def all(self, tag: str) -> list[dict[str, str]]:
-        """The attributes of all elements of a kind."""
+        """Return the attributes of all elements with a tag."""
         return [attributes for name, attributes in self.elements if name == tag]
 
     def _expect_harmless(self, tag: str, attributes: dict[str, str]) -> None:

@@ -1,4 +1,4 @@
-"""Runs that are interrupted when a test says so."""
+"""Interruption of runs at a point that the test chooses."""
 
 import itertools
 from contextlib import contextmanager, nullcontext
@@ -10,7 +10,7 @@ from phigen.cli.interruption import Stop
 
 @contextmanager
 def interrupted(pieces, steps=16):
-    """Runs are interrupted after so many pieces of work, of so many steps at most."""
+    """Interrupt each run of the command line after ``pieces`` blocks of at most ``steps`` steps."""
     asked = itertools.count()
 
     class Later(Stop):

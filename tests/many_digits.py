@@ -1,4 +1,4 @@
-"""The scheme in many digits, without anything of phigen.scheme and phigen.targets: an independent one-step map."""
+"""A one-step map of the scheme in many digits, which uses nothing of phigen.scheme and phigen.targets."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DIGITS = 50
 
 
 def precisely(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Run with `DIGITS` digits of mpmath."""
+    """Decorator: run the function with `DIGITS` digits of mpmath."""
 
     def wrapped(*args: Any, **kwargs: Any) -> Any:
         with mpmath.workdps(DIGITS):
@@ -29,7 +29,9 @@ def precisely(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def values(roots: Sequence[Expression], at: Mapping[str, Any]) -> list[Any]:
-    """Values of expressions as mpmath numbers of the current precision, by rules of its own."""
+    """Return the values of expressions as mpmath numbers of the current precision; the functions are computed by
+    `_RULES`, not by code of phigen.
+    """
     plan, ends = _plan(tuple(roots))
     results: list[Any] = []
     for rule, places in plan:
@@ -39,9 +41,10 @@ def values(roots: Sequence[Expression], at: Mapping[str, Any]) -> list[Any]:
 
 @lru_cache(maxsize=1024)
 def _plan(roots: tuple[Expression, ...]) -> tuple[list[tuple[Any, tuple[int, ...]]], list[int]]:
-    """The rule of each node below the roots, arguments first, and the places of its arguments; those of the roots.
+    """Return the nodes of the expressions in the order of their evaluation, each as its rule and the positions of its
+    arguments, and the positions of the roots.
 
-    The vector field of a path is evaluated thousands of times.
+    The result is cached, because the vector field of a path is evaluated thousands of times.
     """
     places: dict[Expression, int] = {}
     plan = []
@@ -52,7 +55,9 @@ def _plan(roots: tuple[Expression, ...]) -> tuple[list[tuple[Any, tuple[int, ...
 
 
 def _rule(e: Expression) -> Any:
-    """The name of a symbol; else the function that gives the value of a node from those of its arguments."""
+    """Return the name if the node is a symbol, otherwise the function that computes its value from the values of its
+    arguments.
+    """
     if e.op == "symbol":
         return e.value
     if e.op == "number":
@@ -65,7 +70,9 @@ def _rule(e: Expression) -> Any:
 
 
 def _entire(name: str, s: Any) -> Any:
-    """cos √s, sin(√s)/√s, (e^s − 1)/s or a derivative, by complex arithmetic: one formula for s of either sign."""
+    """Return cos √s, sin(√s)/√s, (√s − sin √s)/√s³, (e^s − 1)/s, or the derivative of such a function if ``name`` ends
+    with 1. Complex arithmetic allows one formula for both signs of s.
+    """
 
     def closed(z: Any) -> Any:
         root = mpmath.sqrt(z)
@@ -79,7 +86,9 @@ def _entire(name: str, s: Any) -> Any:
 
 
 def _phi(order: int, s: Any) -> Any:
-    """φ(s) = (1 − w cot w)/s, w = √s/2, or a derivative: from its Taylor coefficients 2ζ(2n+2)/(4π²)^(n+1) near 0."""
+    """Return φ(s) = (1 − w cot w)/s with w = √s/2, or its derivative of the given order: for |s| ≤ 12 from the Taylor
+    coefficients 2ζ(2n+2)/(4π²)^(n+1).
+    """
     if abs(s) > 12:
 
         def closed(u: Any) -> Any:
@@ -98,7 +107,7 @@ def _phi(order: int, s: Any) -> Any:
 
 
 def _anomaly(t: Any, r: Any, eta: Any, beta: Any, mu: Any, _spin: Any) -> Any:
-    """The universal anomaly of a Kepler motion, by a root of its equation."""
+    """Return the universal anomaly of a Kepler motion, as the root of its equation."""
 
     def residual(s: Any) -> Any:
         z = beta * s**2
@@ -112,13 +121,15 @@ def _anomaly(t: Any, r: Any, eta: Any, beta: Any, mu: Any, _spin: Any) -> Any:
 
 
 def _amplitude(t: Any, p: Any, r: Any) -> Any:
-    """tan(φ/4)/√P for the amplitude φ of √P t, from Jacobi's functions."""
+    """Return tan(φ/4)/√P with φ the Jacobi amplitude of √P t for the parameter 1 − R/P."""
     sn, cn = (mpmath.ellipfun(name, mpmath.sqrt(p) * t, m=1 - r / p) for name in ("sn", "cn"))
     return mpmath.tan(mpmath.atan2(sn, cn) / 4) / mpmath.sqrt(p)
 
 
 def _amplitude_integral(kind: str, t: Any, p: Any, r: Any) -> Any:
-    """The integral of S² from 0 to t, with ``kind`` sn, or of S²/D², with ``kind`` sd."""
+    """Return the integral of sn²/P from 0 to t with ``kind`` sn, or that of sd²/P with ``kind`` sd; the argument of sn
+    and sd is √P u, the parameter 1 − R/P.
+    """
 
     def integrand(u: Any) -> Any:
         return mpmath.ellipfun(kind, mpmath.sqrt(p) * u, m=1 - r / p) ** 2 / p
@@ -127,7 +138,7 @@ def _amplitude_integral(kind: str, t: Any, p: Any, r: Any) -> Any:
 
 
 def _third(t: Any, p: Any, r: Any, n: Any) -> Any:
-    """The integral of S²/(1 − nS²) from 0 to t."""
+    """Return the integral of S²/(1 − n S²) from 0 to t, where S(u) = sn(√P u)/√P with the parameter 1 − R/P."""
 
     def integrand(u: Any) -> Any:
         square = mpmath.ellipfun("sn", mpmath.sqrt(p) * u, m=1 - r / p) ** 2 / p
@@ -137,7 +148,7 @@ def _third(t: Any, p: Any, r: Any, n: Any) -> Any:
 
 
 def _companion(coefficients: Any) -> Any:
-    """The matrix of the multiplication by x modulo xⁿ − Σ c_k x^k."""
+    """Return the matrix of the multiplication by x modulo xⁿ − Σ c_k x^k."""
     matrix = mpmath.matrix(len(coefficients))
     for k, c in enumerate(coefficients):
         matrix[k, len(coefficients) - 1] = c
@@ -147,12 +158,14 @@ def _companion(coefficients: Any) -> Any:
 
 
 def _remainder(k: int, t: Any, *a: Any) -> Any:
-    """The coefficient of x^k in the remainder of e^{tx} − 1 at division by p = x⁴ − Σ a_j x^j."""
+    """Return the coefficient of x^k in the remainder of e^{tx} − 1 on division by p = x⁴ − Σ a_j x^j."""
     return mpmath.expm(t * _companion(a))[k, 0] - (k == 0)
 
 
 def _quotient(k: int, t: Any, *a: Any) -> Any:
-    """The coefficient of x^k in g, where the remainder of e^{tx} at division by p² is that by p, and p·g."""
+    """Return the coefficient of x^k in g, defined by: (e^{tx} mod p²) = (e^{tx} mod p) + p·g, with p = x⁴ − Σ
+    a_j x^j.
+    """
     square = [
         -sum((p[i] * p[n - i] for i in range(5) if 0 <= n - i < 5), mpmath.mpf(0))
         for p in [[*(-c for c in a), mpmath.mpf(1)]]
@@ -195,16 +208,18 @@ _RULES: dict[str, Callable[..., Any]] = {
 
 
 def in_many_digits(function: str, s: float) -> Any:
-    """The value of a function of expressions in the current precision of mpmath."""
+    """Return the value at s of a function that expressions may contain, in the current precision of mpmath."""
     rule = _RULES.get(function) or getattr(mpmath, function)
     return rule(mpmath.mpf(s))
 
 
 class PreciseStep:
-    """The one-step map in many digits: ``step(x)``, and ``defect(x)``, how far it is from a Poisson map at x.
+    """One-step map in many digits. ``step(x)`` is the next state; ``defect(x)`` measures the deviation from a Poisson
+    map at x.
 
-    Made from the bi-realisation and the graph series alone, by Newton's method on α(y, ∇S_h(y)) = x and
-    x' = β(y, ∇S_h(y)); the tangent map comes from implicit differentiation. For paths see precise_path.py.
+    The map uses only the bi-realisation (α, β) and the series S_h: Newton's method solves α(y, ∇S_h(y)) = x, then the
+    next state is β(y, ∇S_h(y)). The tangent map comes from implicit differentiation. precise_path.py does this for
+    paths.
     """
 
     def __init__(self, compilation: Compilation, parameters: Mapping[str, float], h: float) -> None:
@@ -264,7 +279,7 @@ class _Stage:
         return alpha, beta, total_derivative[:n, :], total_derivative[n:, :]
 
     def _solved(self, x: Sequence[Any]) -> tuple[Any, Any, Any]:
-        """β, Dα and Dβ, the derivatives along y, where α = x."""
+        """Solve α(y, ∇S_h(y)) = x for y; return β and the derivatives of α and β along y at the solution."""
         y, x = mpmath.matrix(list(x)), mpmath.matrix(list(x))
         for _ in range(60):
             alpha, beta, d_alpha, d_beta = self._linearised(list(y))
@@ -283,8 +298,8 @@ class _Stage:
 
 
 def _slope(compilation: Compilation, h: Fraction) -> list[Expression]:
-    """∇S_h as a graph, with h a number."""
-    # A composition is made of steps of order 2.
+    """Return the expressions of ∇S_h for a number h."""
+    # The stages of a composition are steps of order 2, which need S_1 only.
     system, terms = compilation.system, compilation.order.terms if len(compilation.program.fractions) == 1 else 1
     realisation = compilation.realisation
     series = graph_series(
@@ -301,7 +316,9 @@ def _columns(entries: Sequence[Any], rows: int, columns: int) -> Any:
 
 
 def relative_defect(tangent: Any, before: Any, after: Any) -> float:
-    """|T π(x) Tᵀ − π(x')| relative to |π(x')|."""
+    """Return the largest entry of T π(x) Tᵀ − π(x') relative to that of π(x'), where T is the tangent map from
+    x to x'.
+    """
     return float(_largest(tangent * before * tangent.T - after) / _largest(after))
 
 
@@ -311,7 +328,9 @@ def _largest(matrix: Any) -> Any:
 
 @precisely
 def tangent_by_differences(step: Callable[[Sequence[Any]], Sequence[Any]], x: Sequence[Any]) -> Any:
-    """The derivative of a map given in many digits, by central differences: good to a third of the digits or more."""
+    """Return the derivative of a map by central differences. If the map is given in many digits, at least a third of
+    them are correct.
+    """
     n, width = len(x), mpmath.mpf(10) ** (-DIGITS // 3)
     tangent = mpmath.matrix(n, n)
     for j in range(n):
@@ -329,5 +348,7 @@ def tangent_by_differences(step: Callable[[Sequence[Any]], Sequence[Any]], x: Se
 def defect_of_map(
     step: Callable[[Sequence[Any]], Sequence[Any]], poisson: Callable[[Sequence[Any]], Any], x: Sequence[Any]
 ) -> float:
-    """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| of any map, by differences in many digits."""
+    """Return the largest entry of DΦ π DΦᵀ − π∘Φ relative to that of π∘Φ at x, for any map Φ; DΦ is computed by
+    differences in many digits.
+    """
     return relative_defect(tangent_by_differences(step, x), poisson(x), poisson(step(x)))

@@ -1,4 +1,6 @@
-"""What a formula in MathML says, as a number: a reader of its own, to be compared with the expression behind it."""
+"""Evaluation of formulas in MathML: an independent reader, whose numbers tests compare with the values of the
+expressions that were written as MathML.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ _FUNCTIONS = {
 
 
 def value_of(markup: str, names: Mapping[str, float], functions: Mapping[str, object] | None = None) -> float:
-    """The value of one element, with values for the identifiers."""
+    """Return the number that an element denotes, with ``names`` as the values of identifiers."""
     root = ElementTree.fromstring(markup)
     known = {text_of(ElementTree.fromstring(mathml.name(n))): v for n, v in names.items()}
     table = {**_FUNCTIONS, **(functions or {})}
@@ -28,7 +30,7 @@ def value_of(markup: str, names: Mapping[str, float], functions: Mapping[str, ob
 
 
 def text_of(element: ElementTree.Element) -> str:
-    """A name as one line: x_1, p_(x_1)."""
+    """Return an identifier with its subscripts as text on one line: x_1, p_(x_1)."""
     if len(element) == 2 and element.tag == "msub":
         return f"{text_of(element[0])}_({text_of(element[1])})"
     return (element.text or "").strip() + "".join(map(text_of, element))
@@ -62,7 +64,9 @@ class _Reader:
         raise ValueError(f"unexpected element {e.tag}")
 
     def row(self, children: list[ElementTree.Element]) -> str:
-        """Elements side by side mean nothing in MathML: an operator must stand between any two."""
+        """Return the value of a row of elements. Between two operands an operator must stand, as MathML gives adjacent
+        elements no meaning.
+        """
         if len(children) > 1 and children[0].tag == "mo" and children[0].text == "|":
             return f"abs({self.row(children[1:-1])})"
         parts, operand = "", False

@@ -1,4 +1,6 @@
-"""Specs with one value replaced: every key of specs that use all keys, each with values of every wrong kind."""
+"""Specs with one value replaced by a wrong one. The specs together use every key of the format, and each value is
+replaced by values of all kinds.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from typing import Any
 from phigen.spec.problems import Problems
 from phigen.spec.yaml_source import Mapping, Node, Scalar, Sequence, decode, read
 
-#: Values as they are written: none is right at all keys, most are wrong at each.
+#: Replacements, as YAML text: each is wrong at most keys.
 VALUES = (
     "[]", "{}", "0", "-1", "nan", ".nan", ".inf", "1e400", "x", '""', "true", "null", "[[]]", "{a: {}}", "[null]",
     "1.5", "'7'", "²", "[1, [2]]", "{random: normal}", "2026-01-01", "missing.csv", "missing.npy", "-.inf", "1/0",
@@ -307,15 +309,15 @@ runs: {a: {sizes: [4], names: [a, b, c, "d e"], initial: {x: [1, 0, 0, 2], y: [0
 
 
 def tree_of(text: str) -> Node:
-    """The YAML nodes of a spec."""
+    """Return the YAML tree of a spec."""
     return read(decode(text.encode(), "<base>"), Problems("<base>", text))
 
 
 def written(node: Node | str) -> str:
-    """A node in flow style, on one line; what replaces a node is text."""
+    """Return a node as YAML in flow style, on one line. A replacement is text already and is returned unchanged."""
     match node:
         case Scalar():
-            bare = node.plain and not set(node.text) & set(",[]{}")  # in flow style these part values
+            bare = node.plain and not set(node.text) & set(",[]{}")  # these characters separate values in flow style
             return node.text if bare else "'" + node.text.replace("'", "''") + "'"
         case Sequence():
             return "[" + ", ".join(map(written, node.items)) + "]"
@@ -326,13 +328,13 @@ def written(node: Node | str) -> str:
 
 
 def document(tree: Node) -> str:
-    """A spec with each of its keys on a line."""
+    """Return the text of a spec, with each top-level key on a line."""
     assert isinstance(tree, Mapping)
     return "".join(f"{written(key)}: {written(value)}\n" for key, value in tree.entries.values())
 
 
 def places(node: Node, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """The paths of all values."""
+    """Yield the path of each value below a node, as a tuple of keys and indices."""
     items: Any = ()
     if isinstance(node, Mapping):
         items = [(key, value) for key, (_, value) in node.entries.items()]
@@ -344,7 +346,7 @@ def places(node: Node, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
 
 
 def replaced(tree: Node, path: tuple[Any, ...], value: str | None) -> Node:
-    """The tree with another text for the value at a path, or without it for None."""
+    """Return a copy of the tree with the value at ``path`` replaced by a text, or removed if the text is None."""
     tree = copy.deepcopy(tree)
     node: Any = tree
     for part in path[:-1]:
@@ -363,5 +365,5 @@ def replaced(tree: Node, path: tuple[Any, ...], value: str | None) -> Node:
 
 
 def mutants(base: str, rng: random.Random, count: int) -> list[tuple[tuple[Any, ...], str]]:
-    """A sample of places of a base, each with a value to put there."""
+    """Return a random sample of pairs: the path of a value in the spec ``BASES[base]``, and a replacement."""
     return rng.sample([(path, value) for path in places(tree_of(BASES[base])) for value in VALUES], count)

@@ -1,4 +1,4 @@
-"""JavaScript, run by Node: one process of it, started once, answers all tests of a worker."""
+"""JavaScript in Node: one process, started once, runs the code of all tests of a worker."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tools import tool
 
 _SECONDS = 300.0
 
-#: Reads modules and what to do with them, a line each, and writes the answers.
+#: Program of the process: it reads JSON lines, each with a module and the body of a function, and writes the results.
 _SERVER = """
 import { createInterface } from 'node:readline'
 const Work = (async () => {}).constructor
@@ -31,7 +31,9 @@ for await (const line of createInterface({ input: process.stdin })) {
 
 
 def asked(module: Path, body: str) -> Any:
-    """What the body of a function returns that has ``module``; the test fails if it throws."""
+    """Return the result of a JavaScript function with this body and the parameter ``module``. The test fails if the
+    function throws or takes too long.
+    """
     process = _started(tool("node"))
     late = Timer(_SECONDS, process.kill)
     late.start()
@@ -51,11 +53,11 @@ def asked(module: Path, body: str) -> Any:
 
 @cache
 def _started(program: str) -> subprocess.Popen[str]:
-    """Ends by itself, once nobody can ask it any more."""
+    """Return a running Node process. It ends when its standard input is closed, at the latest with this process."""
     command = [program, "--input-type=module", "-e", _SERVER]
     return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
 def answers(script: Path, jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """What the ``answers`` of a script say of jobs, NaN by its name."""
+    """Return the results of the function ``answers`` of a script for some jobs. NaN arrives as the string "NaN"."""
     return list(json.loads(asked(script, f"return module.answers(JSON.parse({json.dumps(json.dumps(jobs))}))")))

@@ -1,4 +1,6 @@
-"""NVIDIA's runtime compiler and assembler, from their wheels: device code compiled without a device."""
+"""Compilation of device code on machines without a graphics card, by the wheels of NVIDIA's runtime compiler NVRTC and
+of its assembler.
+"""
 
 import ctypes
 import re

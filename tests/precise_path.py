@@ -1,7 +1,8 @@
-"""A step of Karasev's scheme in many digits, with its tangent map: no series of the path, nothing of phigen.scheme.
+"""A step of Karasev's scheme in many digits, with its tangent map. It uses neither a series of the path nor anything of
+phigen.scheme.
 
 The path ṁ = π(m)p, its mean and the variational equations are integrated by extrapolation of the explicit midpoint
-rule, the equation p = ∇S_h(mean) is solved by Newton's method, and the tangent map follows by implicit differentiation.
+rule. Newton's method solves the equation p = ∇S_h(mean), and the tangent map follows by implicit differentiation.
 """
 
 from __future__ import annotations
@@ -26,42 +27,44 @@ from phigen.symbolic.symbols import Symbol, momentum
 
 PATH_DIGITS = 30
 
-#: The size of one stage of a composition.
+#: Symbol for the step size of one stage of a composition.
 STAGE = Symbol("h", "stage")
 
 
 @cache
 def by_paths(name: str, order: int | None = None) -> Compilation:
-    """A system of the corpus compiled with the bi-realisation karasev, whatever its spec asks for."""
+    """Compile a system of the corpus with the bi-realisation karasev, instead of the one in its spec."""
     return with_paths(spec_of(name), order)
 
 
 def with_paths(specification: spec.Spec, order: int | None = None, composition: str = "auto") -> Compilation:
-    """A spec compiled with the bi-realisation karasev."""
+    """Compile a spec with the bi-realisation karasev."""
     chosen = replace(specification, birealisation=BirealisationChoice("karasev"), composition=composition, gauge="none")
     return compile_spec(chosen, order=order)
 
 
 @cache
 def compile_paths(text: str, order: int | None = None, composition: str = "auto") -> Compilation:
-    """The same for a spec given as YAML without its first two keys."""
+    """Compile a spec, given as YAML without its first two keys, with the bi-realisation karasev."""
     return with_paths(spec.loads(f"phigen: 1\nname: t\n{text}"), order, composition)
 
 
 def numbers(compilation: Compilation, run: str) -> Setting:
-    """State, step size and parameters of a run."""
+    """Return the initial state, step size and parameters of a run of the spec."""
     run_of_spec, parameters = compilation.spec.runs[run], {p.name: float(p.value) for p in compilation.spec.parameters}
     parameters |= {k: float(v) for k, v in run_of_spec.parameters.items()}
     return Setting(tuple(float(v) for v in run_of_spec.initial), float(run_of_spec.step), parameters)
 
 
 def state_of(raw: RawC) -> list[Any]:
-    """The state of a C solver with what its compensated sum carries."""
+    """Return the state of a C solver plus its compensation terms, in many digits."""
     return [mpmath.mpf(float(x)) + mpmath.mpf(float(c)) for x, c in zip(raw.x, raw.carry, strict=True)]
 
 
 def flow_at_one(field: Callable[[list[Any]], list[Any]], start: Sequence[Any]) -> list[Any]:
-    """The time-1 flow: extrapolation of the explicit midpoint rule until two columns agree, in 1, 2, 4, … pieces."""
+    """Return the flow of a vector field at time 1, by extrapolation of the explicit midpoint rule. The time is divided
+    into 1, 2, 4, … intervals, until in each interval two successive columns of the extrapolation agree.
+    """
     pieces, target = 1, mpmath.mpf(10) ** (6 - mpmath.mp.dps)
     while pieces <= 1024:
         state, good = list(start), True
@@ -113,7 +116,7 @@ class PreciseSystem:
         self._linearised = [*slopes, *(columns[j][i] for i in range(n) for j in range(n)), *_flat(system.poisson)]
 
     def at(self, x: Sequence[Any], p: Sequence[Any] = ()) -> dict[str, Any]:
-        """Values of all symbols."""
+        """Return the values of all symbols: parameters, coordinates and, if given, covector."""
         pairs = [*zip(self.coordinates, x, strict=True), *(zip(self._covector, p, strict=True) if p else ())]
         return {**self.parameters, **dict(pairs)}
 
@@ -122,7 +125,7 @@ class PreciseSystem:
         return mpmath.matrix(self.n, self.n) + _square(values(_flat(self.system.poisson), self.at(x)), self.n)
 
     def path(self, x: Sequence[Any], p: Sequence[Any]) -> tuple[list[Any], list[Any]]:
-        """End and mean of the path."""
+        """Return the end and the mean of the path ṁ = π(m)p, m(0) = x, over the time from 0 to 1."""
         n = self.n
 
         def field(state: list[Any]) -> list[Any]:
@@ -132,7 +135,7 @@ class PreciseSystem:
         return state[:n], state[n:]
 
     def varied(self, x: Sequence[Any], p: Sequence[Any]) -> tuple[list[Any], list[Any], Any, Any, Any, Any]:
-        """End m and mean μ of the path, and ∂m/∂x, ∂m/∂p, ∂μ/∂x, ∂μ/∂p."""
+        """Return the end m and the mean μ of the path, and the matrices ∂m/∂x, ∂m/∂p, ∂μ/∂x, ∂μ/∂p."""
         n = self.n
 
         def field(state: list[Any]) -> list[Any]:
@@ -154,7 +157,7 @@ class PreciseSystem:
 
 
 class PrecisePathStep(PreciseSystem):
-    """One step, of one or several stages: ``step(x)`` gives Φ(x), ``step.solve(x)`` also DΦ(x)."""
+    """One step, with one or several stages: ``step(x)`` returns Φ(x), ``step.solve(x)`` returns Φ(x) and DΦ(x)."""
 
     def __init__(self, compilation: Compilation, parameters: Mapping[str, float], h: float) -> None:
         super().__init__(compilation, parameters)
@@ -166,9 +169,9 @@ class PrecisePathStep(PreciseSystem):
         self.parameters[STAGE] = mpmath.mpf(0)
         s = total(_power(i + 1) * term for i, term in enumerate(series))
         slope = gradient(s, self.coordinates)
-        hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # symmetric: rows or columns
+        hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # symmetric: by rows or by columns
         self._momenta = [*slope, *hessian]
-        # The solver multiplies h and the fraction in double precision.
+        # The solver multiplies h by the fraction of the stage in double precision, but this step in many digits.
         self.steps = [mpmath.mpf(h) * mpmath.mpf(f) for f in fractions]
 
     def _generate(self, mean: Sequence[Any]) -> tuple[Any, Any]:
@@ -185,7 +188,9 @@ class PrecisePathStep(PreciseSystem):
             return state
 
     def _covector_of(self, x: list[Any], h: Any) -> Any:
-        """The solution p of p = ∇S_h(mean), by a Newton iteration whose matrix is that of the first point."""
+        """Return the solution p of p = ∇S_h(mean). The Newton iteration keeps the matrix of the first point while the
+        residual halves at least.
+        """
         self.parameters[STAGE] = h
         slope, hessian = self._generate(x)
         inverse = mpmath.inverse(mpmath.eye(self.n) - hessian * self.poisson(x) / 2)
@@ -195,7 +200,7 @@ class PrecisePathStep(PreciseSystem):
             size = mpmath.norm(residual, mpmath.inf)
             if size <= mpmath.mpf(10) ** (8 - PATH_DIGITS) * (mpmath.norm(p, mpmath.inf) + mpmath.eps):
                 return p
-            if size > last / 2:  # slow: the exact matrix
+            if size > last / 2:  # slow convergence: use the exact Newton matrix
                 by_p = self.varied(x, list(p))[5]
                 inverse = mpmath.inverse(mpmath.eye(self.n) - self._generate(self.path(x, list(p))[1])[1] * by_p)
             last = size

@@ -1,4 +1,4 @@
-"""Random Poisson systems as specs, one for each kind and seed; brackets are computed with sympy, not with phigen."""
+"""Random Poisson systems as specs, by kind and seed. Their brackets are computed with sympy, not with phigen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ X = sympy.symbols("x1:6")
 
 @dataclass(frozen=True)
 class Drawn:
-    """A system: its spec without the first two keys, Casimirs as text, and a state at which it is regular."""
+    """A random system: its spec without the first two keys, its Casimirs as text, and a state at which the system is
+    regular.
+    """
 
     text: str
     casimirs: tuple[str, ...]
@@ -23,7 +25,7 @@ class Drawn:
 
 
 def draw(kind: str, seed: int) -> Drawn:
-    """The system of a kind and a seed; equal on every machine and Python."""
+    """Return the random system of a kind and a seed; it is the same on every machine and Python version."""
     source = random.Random(f"{kind} {seed}")
     pi, casimirs = KINDS[kind](source, seed)
     while pi.is_zero_matrix:
@@ -54,7 +56,7 @@ def _small(source: random.Random) -> sympy.Rational:
 
 
 def _polynomial(source: random.Random, x: Sequence[sympy.Symbol], degree: int, terms: int) -> sympy.Expr:
-    """A random polynomial: some monomials of the degree or less."""
+    """Return the sum of random monomials of at most the given degree."""
     result = sympy.Integer(0)
     for _ in range(terms):
         monomial = sympy.Integer(1)
@@ -65,7 +67,9 @@ def _polynomial(source: random.Random, x: Sequence[sympy.Symbol], degree: int, t
 
 
 def _hamiltonian(source: random.Random, x: Sequence[sympy.Symbol]) -> sympy.Expr:
-    """Positive squares with a random perturbation, a polynomial or a trigonometric one."""
+    """Return a sum of squares with positive coefficients and a small random perturbation, polynomial or
+    trigonometric.
+    """
     squares = sum(sympy.Rational(source.randint(1, 4), 4) * v**2 for v in x)
     if source.random() < 0.5:
         return squares + _polynomial(source, x, 3, 2) / 4
@@ -75,7 +79,9 @@ def _hamiltonian(source: random.Random, x: Sequence[sympy.Symbol]) -> sympy.Expr
 
 def _nambu(n: int) -> Callable[[random.Random, int], tuple[Matrix, list[sympy.Expr]]]:
     def structure(source: random.Random, seed: int) -> tuple[Matrix, list[sympy.Expr]]:
-        """f · det ∂(x_i, x_j, C_1, …)/∂x with random Casimirs C and factor f."""
+        """Return the brackets {x_i, x_j} = f · det ∂(x_i, x_j, C_1, …)/∂x with random Casimirs C and a random factor f,
+        and the Casimirs.
+        """
         x = X[:n]
         casimirs = [_polynomial(source, x, 3 if n == 3 else 2, 3) + v**2 for v in x[: n - 2]]
         factor = 1 + source.choice([0, sympy.Rational(1, 2), sympy.Rational(-1, 3)]) * source.choice(list(x))
@@ -92,7 +98,7 @@ def _nambu(n: int) -> Callable[[random.Random, int], tuple[Matrix, list[sympy.Ex
     return structure
 
 
-#: Structure constants {(i, j): {k: c}} of [E_i, E_j] = Σ c E_k, and the dimension.
+#: Lie algebras by name: the dimension, and the structure constants {(i, j): {k: c}} of [E_i, E_j] = Σ c E_k.
 ALGEBRAS: Mapping[str, tuple[int, Mapping[tuple[int, int], Mapping[int, int]]]] = {
     "so(3)": (3, {(0, 1): {2: 1}, (1, 2): {0: 1}, (0, 2): {1: -1}}),
     "sl(2)": (3, {(0, 1): {2: 1}, (0, 2): {0: 2}, (1, 2): {1: -2}}),
@@ -106,7 +112,9 @@ ALGEBRAS: Mapping[str, tuple[int, Mapping[tuple[int, int], Mapping[int, int]]]] 
 
 
 def _lie(source: random.Random, seed: int) -> tuple[Matrix, list[sympy.Expr]]:
-    """A known Lie algebra in a random basis: x' = A x with A a product of integer shears."""
+    """Return the Lie–Poisson brackets of a known algebra in a random basis, x' = A x with A a product of integer
+    shears. The list of Casimirs is empty.
+    """
     n, constants = ALGEBRAS[sorted(ALGEBRAS)[seed % len(ALGEBRAS)]]
     x = X[:n]
     pi = sympy.zeros(n)
@@ -125,7 +133,9 @@ def _lie(source: random.Random, seed: int) -> tuple[Matrix, list[sympy.Expr]]:
 
 
 def _log_canonical(source: random.Random, seed: int) -> tuple[Matrix, list[sympy.Expr]]:
-    """{x_i, x_j} = a_ij x_i x_j in three to five dimensions; for n = 3 the Casimir is a product of powers."""
+    """Return the brackets {x_i, x_j} = a_ij x_i x_j with random a_ij, in three to five dimensions. The list of Casimirs
+    is empty.
+    """
     n = 3 + seed % 3
     x, pi = X[:n], sympy.zeros(n)
     for i, j in combinations(range(n), 2):
@@ -135,7 +145,9 @@ def _log_canonical(source: random.Random, seed: int) -> tuple[Matrix, list[sympy
 
 
 def _pulled_back(source: random.Random, seed: int) -> tuple[Matrix, list[sympy.Expr]]:
-    """One of the others in the coordinates y = ψ(x), y_i = x_i + q_i(x_{i+1}, …) with random polynomials q_i."""
+    """Return the brackets of a system of another kind in the coordinates y = ψ(x), y_i = x_i + q_i(x_{i+1}, …) with
+    random polynomials q_i.
+    """
     base, casimirs = (_lie, _log_canonical, _nambu(3))[seed % 3](source, 0)
     n = base.shape[0]
     x = X[:n]

@@ -1,4 +1,4 @@
-"""Solvers of compilations, each made once; and the struct of the C solver, looked at from outside."""
+"""Solvers of compilations, each made once, and access to the struct of a C solver."""
 
 from __future__ import annotations
 
@@ -33,7 +33,9 @@ _made: dict[tuple[Any, ...], tuple[Compilation, Any]] = {}
 
 
 def _once(compilation: Compilation, key: str, make: Callable[[], Any]) -> Any:
-    """What was made of a compilation before, which is kept alive with it; compilations cannot be hashed."""
+    """Return the cached result of ``make`` for a compilation and key. The cache is by identity, since compilations
+    cannot be hashed, and keeps the compilation alive.
+    """
     place = (key, id(compilation))
     if place not in _made:
         _made[place] = compilation, make()
@@ -41,28 +43,28 @@ def _once(compilation: Compilation, key: str, make: Callable[[], Any]) -> Any:
 
 
 def files(compilation: Compilation, target: str) -> Mapping[str, str]:
-    """The generated files."""
+    """Return the generated files for a target, by file name."""
     command = f"{COMMAND} {compilation.program.name}"
     return _once(compilation, f"files {target}", lambda: emit(compilation.program, target, command))
 
 
 def single_file(compilation: Compilation) -> Mapping[str, str]:
-    """The generated C in one file."""
+    """Return the generated C in the form with a single file."""
     return _once(compilation, "single file", lambda: emit(compilation.program, "c", COMMAND, single_file=True))
 
 
 def library(compilation: Compilation) -> Path:
-    """The generated C as a library, made without a warning."""
+    """Compile the generated C without warnings and return the path of the library."""
     return library_cache.build(files(compilation, "c"))
 
 
 def interface(compilation: Compilation) -> Interface:
-    """The names that the runtime needs."""
+    """Return the names of coordinates, parameters and observables that the runtime needs."""
     return interface_of(compilation.program)
 
 
 def solver(compilation: Compilation, target: str) -> Solver:
-    """A solver of one target; compiled C comes from the cache."""
+    """Return a solver in C or NumPy; compiled C comes from the cache."""
     return _once(compilation, f"solver {target} {toolchain.BASE_FLAGS}", lambda: _solver(compilation, target))
 
 
@@ -74,7 +76,7 @@ def _solver(compilation: Compilation, target: str) -> Solver:
 
 
 def javascript(compilation: Compilation, options: str, statements: str, value: str) -> Any:
-    """What the generated JavaScript gives: ``value`` after ``statements``, of a solver ``s`` made with ``options``."""
+    """Run ``statements`` with a solver ``s`` of the generated JavaScript, made with ``options``; return ``value``."""
     (text,) = files(compilation, "js").values()
     with tempfile.TemporaryDirectory() as folder:
         write(Path(folder), {"solver.mjs": text})
@@ -83,7 +85,9 @@ def javascript(compilation: Compilation, options: str, statements: str, value: s
 
 
 class RawC:
-    """A generated C library called as a C program would, with a view of ``x`` and ``carry`` in the solver's struct."""
+    """A generated C library, called as a C program would call it. ``x`` and ``carry``, the state and its compensation
+    terms, are views of the solver's struct.
+    """
 
     def __init__(self, compilation: Compilation) -> None:
         self.name, self.n = compilation.program.name, compilation.program.dimension
@@ -93,21 +97,21 @@ class RawC:
         doubles = self.memory[: 16 * self.n].view(np.float64)
         self.x, self.carry = doubles[: self.n], doubles[self.n :]
         counters = self.memory[16 * self.n :][: 2 * ctypes.sizeof(ctypes.c_size_t)].view(np.uintp)
-        self.counters = counters  # steps, evaluations
+        self.counters = counters  # numbers of steps and of evaluations
 
     def call(self, function: str, result: Any, *args: Any) -> Any:
-        """Call ``NAME_function`` with arguments that are ctypes objects already."""
+        """Call the C function ``NAME_function`` with arguments that are ctypes objects."""
         f = getattr(self._library, f"{self.name}_{function}")
         f.restype = result
         return f(*args)
 
     @property
     def here(self) -> ctypes.c_void_p:
-        """The address of the struct."""
+        """Address of the solver's struct."""
         return ctypes.c_void_p(self.memory.ctypes.data)
 
     def init(self, x0: Sequence[float], parameters: Mapping[str, float] | None = None) -> int:
-        """``NAME_init``; parameters None passes a null pointer."""
+        """Call ``NAME_init`` and return its status. For the parameters None it receives a null pointer."""
         start = np.array(x0, dtype=float)
         packed = None
         if parameters is not None:
@@ -116,19 +120,19 @@ class RawC:
         return self.call("init", ctypes.c_int, self.here, packed, ctypes.c_void_p(start.ctypes.data))
 
     def step(self, h: float) -> int:
-        """``NAME_step``."""
+        """Call ``NAME_step`` and return its status."""
         return self.call("step", ctypes.c_int, self.here, ctypes.c_double(h))
 
     def integrate(self, h: float, steps: int) -> int:
-        """``NAME_integrate``."""
+        """Call ``NAME_integrate`` and return its status."""
         return self.call("integrate", ctypes.c_int, self.here, ctypes.c_double(h), ctypes.c_size_t(steps))
 
     def kick(self, change: Sequence[float]) -> int:
-        """``NAME_kick``."""
+        """Call ``NAME_kick``, which adds ``change`` to the state, and return its status."""
         array = np.array(change, dtype=float)
         return self.call("kick", ctypes.c_int, self.here, ctypes.c_void_p(array.ctypes.data))
 
     @precisely
     def exact_state(self) -> list[Any]:
-        """x + carry, in many digits."""
+        """Return the state plus its compensation terms, in many digits."""
         return [mpmath.mpf(float(x)) + mpmath.mpf(float(c)) for x, c in zip(self.x, self.carry, strict=True)]

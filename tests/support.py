@@ -1,4 +1,4 @@
-"""All that tests share, by the names that tests import."""
+"""Functions that many tests use, collected so that tests import them from one module."""
 
 from many_digits import *  # noqa: F403
 from solvers import *  # noqa: F403

@@ -1,4 +1,4 @@
-"""Systems that tests share: those of the corpus and their runs, and some written in a few lines."""
+"""Systems for tests: those of the corpus with their runs, and some written in a few lines."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from phigen.symbolic.expression import Expression, symbol
 from phigen.symbolic.numeric import evaluate_with_scale
 from phigen.symbolic.symbols import momentum
 
-#: The corpus, without the systems that depend on the time: tests/generated/test_time.py is about these.
+#: Systems of the corpus that depend on the time; tests/generated/test_time.py tests them, and `NAMES` leaves them out.
 TIMED = ("duffing", "seasonal_predator_prey", "spin_resonance")
-#: Those with forces: tests/generated/test_forces.py.
+#: Systems of the corpus with forces; tests/generated/test_forces.py tests them.
 FORCED = ("landau_lifshitz", "thruster_body")
-#: Those with noise: tests/generated/test_noise.py.
+#: Systems of the corpus with noise; tests/generated/test_noise.py tests them.
 NOISY = ("double_well", "thermal_chain", "thermal_spin")
-#: Those with a monitor: tests/scheme/test_monitor.py and tests/splitting/test_logarithmic.py.
+#: Systems of the corpus with a monitor; tests/scheme/test_monitor.py and tests/splitting/test_logarithmic.py test them.
 MONITORED = ("kepler_eccentric",)
-#: Those by Gauss collocation: tests/gauss.
+#: Systems of the corpus with the scheme Gauss collocation; tests/gauss tests them.
 COLLOCATED = ("comet_jupiter", "kowalevski_gauss")
-#: Those by splitting: tests/splitting.
+#: Systems of the corpus with the scheme splitting; tests/splitting tests them.
 SPLIT = ("earth_moon", "planets", "satellite_wheels")
 NAMES = sorted(
     {path.stem for path in resources.bundled_specs().glob("*.yaml")}
@@ -40,29 +40,29 @@ NAMES = sorted(
 )
 
 
-#: The lattices of the corpus: tests/lattice/test_corpus.py is about these.
+#: Lattices of the corpus; tests/lattice/test_corpus.py tests them.
 LATTICES = sorted(path.stem for path in (resources.bundled_specs() / "lattices").glob("*.yaml"))
 
 
 @cache
 def spec_of(name: str) -> spec.Spec:
-    """The spec of a system of the corpus."""
+    """Return the spec of a system of the corpus."""
     return spec.load(resources.bundled()[name])
 
 
-#: Every run of the corpus, as pairs of names.
+#: Pairs (system, run) of all runs of the systems in `NAMES`.
 RUNS = [(name, run) for name in NAMES for run in spec_of(name).runs]
 
-#: One system for each kind of step and of bi-realisation that the corpus has; tests/test_corpus.py tells what they
-#: cover. What takes long is done for these by `make test`, and for all by `make test-all`.
+#: One system for each kind of step and each kind of bi-realisation in the corpus; tests/test_corpus.py checks that.
+#: `make test` runs long tests for these systems only, and `make test-all` for the others too.
 QUICK = (
     "ablowitz_ladik3", "lotka_volterra", "nambu_pendulum", "pendulum", "pendulum_euler", "poisson_not_hamiltonian",
     "rigid_body",
 )  # fmt: skip
 
 
-#: Systems whose steps, bi-realisations and functions others have, of few coordinates as well: what is marked `corpus`
-#: goes through them where `--corpus` is given. That the C and NumPy of them is what it was, golden files tell.
+#: Systems that resemble others in steps, bi-realisations and functions, of both few and many coordinates. Tests with
+#: the mark `corpus` include them only with `--corpus`. Golden files show changes of their C and NumPy.
 ALIKE = (
     "charged_particle", "cyclotron", "dzhanibekov", "engel_geodesics", "gaussian_moments", "guiding_centre",
     "harmonic_oscillator", "kowalevski_top", "predator_prey", "quaternion_top", "rigid_body_dual", "rigid_body_paper",
@@ -71,7 +71,9 @@ ALIKE = (
 
 
 def slow_but(quick: Iterable[Any], of: Iterable[Any] = NAMES) -> list[Any]:
-    """Parameters of a test, some of them quick and the others slow; tuples are several parameters."""
+    """Return the cases ``of`` as parameters of a test; those that are not in ``quick`` have the mark `slow`. A tuple
+    gives the values of several parameters.
+    """
     values = [each if isinstance(each, tuple) else (each,) for each in of]
     chosen = [each if isinstance(each, tuple) else (each,) for each in quick]
     return [pytest.param(*each, marks=() if each in chosen else pytest.mark.slow) for each in values]
@@ -82,14 +84,14 @@ poisson: {brackets: {x1: {x2: -x3, x3: x2}, x2: {x3: -x1}}}
 hamiltonian: x1**2/2 + x2**2/4 + x3**2/6
 """
 
-#: Its reversals have solutions far away, at other energies.
+#: A rattleback. When its spin reverses, the equation of a step has further solutions, at other energies.
 RATTLEBACK = """coordinates: [pitch, roll, spin]
 poisson: {brackets: {pitch: {spin: 4*pitch}, roll: {spin: -roll}}}
 hamiltonian: (pitch**2 + roll**2 + spin**2)/2
 order: 6
 """
 
-#: so(3) in a basis that depends on parameters.
+#: The brackets of so(3) in a basis that depends on the parameters r and s.
 SCALED = """coordinates: [x, y, z]
 parameters: {r: 2, s: 3}
 poisson: {brackets: {x: {y: r*z, z: -y/r}, y: {z: s*x}}}
@@ -104,37 +106,40 @@ hamiltonian: x1 + x2 + x3
 
 
 def plain(specification: spec.Spec) -> spec.Spec:
-    """The spec with all code for speed, and with no gauge where it leaves that to phigen: tests/generated/test_gauge.py
-    is about gauges, tests/generated/test_profiles.py about short code."""
+    """Return the spec with the profile ``fast``, and with no gauge where the spec leaves the gauge to phigen:
+    tests/generated/test_gauge.py tests gauges, and tests/generated/test_profiles.py the other profile.
+    """
     return replace(
         specification, profile="fast", gauge="none" if specification.gauge == "auto" else specification.gauge
     )
 
 
 def compile_anew(text: str, order: int | None = None, scheme: str | None = None, **more: Any) -> Compilation:
-    """The compilation of a spec given as YAML without its first two keys, made by the phigen of this moment."""
+    """Compile a spec, given as YAML without its first two keys, with no cache, as tests need that modify phigen
+    itself.
+    """
     return compile_spec(plain(spec.loads(f"phigen: 1\nname: t\n{text}")), order=order, scheme=scheme, **more)
 
 
-#: The same, made once: for all tests but those that change phigen itself.
+#: Compile such a spec once and cache the compilation.
 compile_text = cache(compile_anew)
 
 
 def small(compilation: Compilation) -> Compilation:
-    """The same compilation with short C, which compiles in a third of the time."""
+    """Return the compilation with the profile ``small``, whose C compiles in a third of the time."""
     return replace(compilation, program=replace(compilation.program, profile="small"))
 
 
 @cache
 def as_given(name: str) -> Compilation:
-    """The compilation of a spec of the corpus, as it stands."""
+    """Compile a spec of the corpus without changes."""
     specification = spec_of(name)
     return compile_spec(specification, system=None if specification.lattice else described(name)[1])
 
 
 @cache
 def compiled(name: str, order: int | None = None, scheme: str | None = None) -> Compilation:
-    """The compilation of a system of the corpus, plain."""
+    """Compile a spec of the corpus after the changes that `plain` makes."""
     specification = spec_of(name)
     if order is None and scheme is None and specification.profile == "fast" and not as_given(name).program.gauge:
         return as_given(name)
@@ -143,20 +148,22 @@ def compiled(name: str, order: int | None = None, scheme: str | None = None) -> 
 
 @cache
 def described(name: str) -> tuple[spec.Spec, System, BiRealisation]:
-    """What is known of a system of the corpus before anything of its solver is made: quick, for choosing tests."""
+    """Return the spec, the system and the bi-realisation of a system of the corpus. This takes little time, as no
+    solver is generated, so tests can choose systems by it.
+    """
     specification = spec_of(name)
     system = system_from_spec(specification)
     return specification, system, realise(system, specification.birealisation)
 
 
 def first_run(compilation: Compilation) -> Run:
-    """The first run of a spec."""
+    """Return the first run of the spec of a compilation."""
     return next(iter(compilation.spec.runs.values()))
 
 
 @dataclass(frozen=True)
 class Setting:
-    """The numbers of a run: state, step size, parameters (all of them)."""
+    """Numbers of a run: initial state, step size, and the values of all parameters."""
 
     x: tuple[float, ...]
     h: float
@@ -164,7 +171,7 @@ class Setting:
 
 
 def setting(compilation: Compilation, name: str | None = None) -> Setting:
-    """The numbers of a run of the spec, the first unless another is named."""
+    """Return the numbers of a run of the spec: the named run, or the first one."""
     run = compilation.spec.runs[name] if name else first_run(compilation)
     defaults = {p.name: float(p.value) for p in compilation.spec.parameters}
     return Setting(
@@ -175,7 +182,9 @@ def setting(compilation: Compilation, name: str | None = None) -> Setting:
 
 
 def casimir_scales(compilation: Compilation, at: Setting) -> list[float]:
-    """The size of each Casimir at a state: the largest term that occurs in it, at least its value."""
+    """Return a scale for the round-off errors of each Casimir at a state: the absolute value of its largest term, but
+    at least that of the Casimir.
+    """
     values = _fractions(compilation.spec.coordinates, at)
     pairs = evaluate_with_scale(list(compilation.system.casimirs.values()), values, 30)
     return [max(abs(float(value)), 1e-300) for value, _ in pairs]
@@ -186,10 +195,10 @@ def _fractions(coordinates: Sequence[str], at: Setting) -> dict[str, Fraction]:
 
 
 def series_of(system, realisation, terms, static=()):
-    """S_1 … S_terms of a system in a tower."""
+    """Return S_1 … S_terms of the Hamilton–Jacobi series as elements of the differential ring of a tower."""
     return hamilton_jacobi(system, realisation, terms, static).polynomial(terms)
 
 
 def symbols(names: str) -> list[Expression]:
-    """Symbols from names separated by spaces; ``p:x`` is the momentum of x."""
+    """Return symbols for names separated by spaces; ``p:x`` denotes the momentum of x."""
     return [symbol(momentum(n[2:]) if n.startswith("p:") else n) for n in names.split()]

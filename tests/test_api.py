@@ -1,4 +1,4 @@
-"""The Python API, as the contract has it."""
+"""The Python API: `load`, `compile`, solvers and formulas."""
 
 import numpy as np
 import pytest
@@ -80,7 +80,7 @@ def test_system_from_sympy_compiles_and_takes_parameters():
 
 
 def test_the_order_that_nobody_asked_for_is_the_same_everywhere(tmp_path):
-    """In a file, in Python, in the schema of the format, for a splitting."""
+    """The default order is 4 for specs in files, for specs in Python, in the JSON schema and for a splitting."""
     text = "phigen: 1\nname: lv\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
     (tmp_path / "lv.yaml").write_text(text)
     sources = [tmp_path / "lv.yaml", spec.loads(text), phigen.load(tmp_path / "lv.yaml"), from_sympy()]
@@ -92,7 +92,9 @@ def test_the_order_that_nobody_asked_for_is_the_same_everywhere(tmp_path):
 
 
 def test_phigen_runs_the_profile_fast_unless_the_call_names_another(tmp_path):
-    """The spec's profile is about code that is built; single precision has no other than small."""
+    """The profile of a spec concerns code that users build. With single precision there is only the profile
+    ``small``.
+    """
     text = "phigen: 1\nname: lv\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
     (tmp_path / "lv.yaml").write_text(f"{text}profile: small\n")
     short, plain = spec.load(tmp_path / "lv.yaml"), spec.loads(text)
@@ -111,7 +113,7 @@ def test_phigen_runs_the_profile_fast_unless_the_call_names_another(tmp_path):
 def test_options_of_a_call_add_to_what_the_spec_asks_for():
     text = f"{OSCILLATOR}adjoint: true\nwithout: [ensemble]\nmodified_hamiltonian: 1\nreal: float\n"
     chosen = spec.loads(text)
-    parameters = frozenset({"parameters"})  # sessions of Python change them
+    parameters = frozenset({"parameters"})  # solvers in Python can change parameters
     assert compilation_of(chosen, tangent=True).program.extras == Extras(
         True, 1, frozenset({"ensemble"}), True, "float", parameters
     )
@@ -181,13 +183,15 @@ def test_error_of_load_shows_the_line(tmp_path):
 
 @pytest.mark.parametrize("lines", [2, 2000])
 def test_a_text_in_place_of_a_file_hears_what_reads_it(lines):
-    """A long one is no file name for the system either, which says so in an error of its own."""
+    """`phigen.compile` takes a file name. If it receives the text of a spec, the error names the function for texts,
+    also for a text that is too long to be a file name.
+    """
     with pytest.raises(phigen.SpecError, match=r"hint: phigen\.spec\.loads"):
         phigen.compile("phigen: 1\n" * lines)
 
 
 def test_formulas_are_those_of_the_method():
-    """The log-canonical chart and its S_3, as sympy objects that can be used as such."""
+    """The formulas of α, β and S_i for log-canonical brackets are sympy objects, for instance with derivatives."""
     formulas = phigen.formulas(from_sympy(), order=4)
     (x, y), (a, b) = formulas.system.coordinates, formulas.covector
     assert formulas.degree is None
@@ -235,7 +239,7 @@ def test_formulas_of_a_splitting_do_not_exist(tmp_path):
 def test_bundled_specs_have_names_here_too(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert phigen.load("rigid_body").name == "rigid_body"
-    (tmp_path / "rigid_body").write_text("phigen: 1\n")  # a file comes first
+    (tmp_path / "rigid_body").write_text("phigen: 1\n")  # a file has priority over a bundled spec
     with pytest.raises(phigen.SpecError):
         phigen.load("rigid_body")
 

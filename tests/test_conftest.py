@@ -1,4 +1,4 @@
-"""Messages about tests that are not run."""
+"""Messages of pytest about skipped tests."""
 
 import subprocess
 import sys

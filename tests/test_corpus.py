@@ -31,17 +31,18 @@ def test_reference_state_belongs_to_the_run_of_the_spec(name):
 
 
 def traits(name):
-    """The kind of the bi-realisation, and all functions that the generated C defines and calls."""
+    """Return the kind of the bi-realisation and the names of all functions that the generated C defines or calls."""
     return {described(name)[2].kind, *calls()[name]}
 
 
-#: Of the corpus only `guiding_centre` has powers along paths, and it takes long: tests/paths/test_functions.py and
-#: tests/generated/test_compilers.py have smaller systems.
+#: Functions that no system in `QUICK` calls. In the corpus only `guiding_centre` has powers along paths, and it takes
+#: long; tests/paths/test_functions.py and tests/generated/test_compilers.py have smaller systems with powers.
 ELSEWHERE = {"taylor_power"}
 
 
 def test_quick_systems_have_every_trait_of_the_corpus():
-    # Fast code has much beside; tests/attitude has systems of every kind with an attitude.
+    # The profile fast and attitudes add further functions, so only systems with the profile small and no attitude are
+    # compared. tests/attitude has systems of every kind with an attitude.
     short = [name for name in NAMES if described(name)[0].profile == "small" and not described(name)[0].reconstruct]
     assert set().union(*map(traits, short)) - set().union(*map(traits, QUICK)) == ELSEWHERE
     assert {described(name)[2].kind for name in NAMES} == {described(name)[2].kind for name in QUICK}

@@ -1,4 +1,6 @@
-"""The systems of the corpus against equations of motion written by hand, and states found without phigen."""
+"""Systems of the corpus compared with equations of motion written by hand and with reference states computed without
+phigen.
+"""
 
 import json
 from pathlib import Path
@@ -33,7 +35,7 @@ def test_vector_field_is_that_of_the_equations_of_motion(name):
 
 
 def _parameters(name):
-    """Defaults, as the decimal numbers that the specs state."""
+    """Return the default values of the parameters, exactly as the decimal numbers in the spec."""
     return {p.name: mpmath.mpf(str(float(p.value))) for p in compiled(name).system.parameters}
 
 

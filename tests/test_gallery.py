@@ -1,4 +1,6 @@
-"""docs/gallery.md is what docs/make_gallery.py makes of the specs of today; if not, that mends it: make figures."""
+"""docs/gallery.md is up to date: docs/make_gallery.py makes the same page of the present specs. `make figures` updates
+the page.
+"""
 
 import importlib.util
 import json

@@ -1,6 +1,5 @@
-"""The golden files are current: whole solvers in generated/, and the parts of the other systems in tests/golden.
-
-tests/golden.py says what is where.
+"""The golden files are current: whole solvers in generated/, and in tests/golden the paragraphs of other solvers that
+no whole solver has; see tests/golden.py.
 """
 
 import os
@@ -68,7 +67,9 @@ def test_generated_is_what_phigen_build_writes(monkeypatch, specs):
 
 @pytest.mark.parametrize("name", [*golden.WHOLE, *golden.PARTIAL])
 def test_code_is_fit_to_be_read(name):
-    """No long lines, no loops over one stage, no traces of how the runtime was put together; contents that are true."""
+    """Lines are short, methods with one stage have no loops over stages, names and conditions of the runtime templates
+    do not remain, and the table of contents lists the sections.
+    """
     for text in (text for file, text in golden.solver_files(name).items() if file.endswith((".c", ".h"))):
         assert max(map(len, text.splitlines())) <= 110
         assert not re.search(r"\bphi_|PHI_(?!GEN)|% 1\b|\n\n\n", text)
@@ -83,12 +84,12 @@ def test_code_is_fit_to_be_read(name):
 
 
 def expected():
-    """The files that `built` should make."""
+    """Return the contents of the files in generated/ that `built` should reproduce, by path."""
     return {str(p.relative_to(GENERATED)): p.read_bytes() for n in NAMES for p in (GENERATED / n).iterdir()}
 
 
 def built(tmp_path, environment=None, cwd=None, python=(), specs=None):
-    """The files that a process of its own writes: name → bytes."""
+    """Run `phigen build` in a new process and return the contents of the written files, by path."""
     specs = specs or resources.bundled_specs()
     output = tmp_path / f"out{len(list(tmp_path.iterdir()))}"
     files = [str(next(specs.rglob(f"{name}.yaml"))) for name in NAMES]

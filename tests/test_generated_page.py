@@ -1,4 +1,6 @@
-"""docs/generated.md followed to the letter: blocks, single steps and ensembles agree, compiled as the page says."""
+"""The examples of docs/generated.md work as the page says: compiled as described, blocks of steps, single steps and
+ensembles give the same results.
+"""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The tasks of docs/gradients.md are solved by their scripts."""
+"""The scripts of docs/gradients.md solve the tasks of that page."""
 
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
@@ -13,7 +13,7 @@ FOLDER = Path(__file__).parent.parent / "docs/gradients"
 
 
 def task(name):
-    """The script as a module."""
+    """Import a script of docs/gradients.md as a module."""
     specification = spec_from_file_location(name, FOLDER / f"{name}.py")
     module = module_from_spec(specification)
     sys.modules[name] = module
@@ -35,7 +35,7 @@ def test_orbit_closes_and_its_multipliers_are_those_of_a_symplectic_map():
     assert 5 < period < 8
     assert np.abs(start).max() < 1
     assert np.prod(multipliers) == pytest.approx(1, abs=1e-9)
-    assert np.sort(np.abs(multipliers - 1))[:2].max() < 1e-4  # double, so to half the digits
+    assert np.sort(np.abs(multipliers - 1))[:2].max() < 1e-4  # a double eigenvalue: half of the digits
 
 
 @pytest.mark.slow
@@ -53,7 +53,7 @@ def test_network_with_the_bracket_stays_on_the_leaf_without_learning_anything(mo
     monkeypatch.setattr(module, "LONG", 100.0)
     monkeypatch.setattr(module, "HELD_OUT", 10.0)
     monkeypatch.setattr(module, "RECORDS", 8)
-    # gradients of flows and of solvers have tests of their own
+    # Other tests check gradients of flows and of solvers, so this test replaces the two functions that train by them.
     monkeypatch.setattr(module, "fitted", lambda records: module.TRUE)
     monkeypatch.setattr(module, "trained", lambda run, weights, *_: (weights, [0.0]))
     with jax.enable_x64(True):

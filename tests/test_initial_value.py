@@ -15,7 +15,7 @@ def solver_of(name):
 
 
 def field(name, **parameters):
-    """The right-hand side for SciPy."""
+    """Return the right-hand side of the equations of motion as a function for SciPy."""
     solver = solver_of(name)
     if solver.interface.time:
         return lambda t, y: solver.vector_field(y, t, **parameters)
@@ -69,7 +69,7 @@ def test_an_event_ends_the_integration_where_it_is_met():
 
 
 def test_what_is_not_reached_is_told_by_the_status():
-    lotka = phigen.solve_ivp(solver_of("lotka_volterra"), (0, 1), [-3, 5, 0.001], h=0.01)  # infinite at 0.2554
+    lotka = phigen.solve_ivp(solver_of("lotka_volterra"), (0, 1), [-3, 5, 0.001], h=0.01)  # infinite at t = 0.2554
     assert lotka.status == -1
     assert not lotka.success
     assert 0 < lotka.t[-1] < 0.26

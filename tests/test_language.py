@@ -10,13 +10,13 @@ from syntax_trees import parsed
 
 ROOT = Path(__file__).resolve().parent.parent
 
-#: The rooms of phigen, and its modules beside them.
+#: The packages of phigen (rooms), and its modules outside packages.
 ROOMS = sorted(
     path.name for path in (ROOT / "phigen").iterdir() if path.suffix == ".py" or (path / "__init__.py").exists()
 )
-#: Variables and arguments that name nothing. Fields of records are left to readers.
+#: Forbidden names of variables and arguments: they do not say what the value is. Fields of records are not checked.
 EMPTY_NAMES = {"found", "given", "kept", "made", "own", "taken", "told", "wanted"}
-#: First words of docstrings that name their object last, or not at all.
+#: Forbidden first words of docstrings: a sentence that begins with one of them names its object last, or not at all.
 INVERTED = ("How", "Of", "That", "What", "Whatever")
 
 
@@ -27,7 +27,7 @@ def _stored(node: ast.AST) -> str | None:
 
 
 def empty_names(tree: ast.Module) -> list[str]:
-    """Variables and arguments of a module that name nothing, each with its line."""
+    """Return the variables and arguments of a module with forbidden names, each with its line."""
     fields = {
         id(line.target)
         for node in ast.walk(tree)
@@ -43,7 +43,7 @@ def empty_names(tree: ast.Module) -> list[str]:
 
 
 def breaches(tree: ast.Module) -> list[str]:
-    """Names and docstrings of a module that break the rules, each with its line."""
+    """Return the names and docstrings of a module that break the rules, each with its line."""
     listed = empty_names(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
@@ -76,7 +76,8 @@ def test_breaches_are_seen() -> None:
     assert [line.partition(" ")[2] for line in listed] == ["given", "found", "kept", "What a module has. …", "Of it. …"]
 
 
-#: Class names that two modules still share. No other name occurs twice, so that a name in a message has one place.
+#: Class names that two modules may share. All other class names occur once, so that a name in an error message
+#: identifies the class.
 SHARED_CLASS_NAMES = {"Constant", "Function"}
 
 
@@ -86,7 +87,7 @@ def test_class_names_occur_once() -> None:
     assert {name for name in names if names.count(name) > 1} <= SHARED_CLASS_NAMES
 
 
-#: Words that comments repeat on purpose: an argument is called steps, a type long long.
+#: Words that may occur twice in a row in comments, such as ``long long`` for the C type.
 REPEATED = {"steps", "planes", "long"}
 
 
@@ -104,7 +105,7 @@ def test_no_comment_of_generated_code_repeats_a_word() -> None:
 
 
 def _interrupted_paragraphs(page: str) -> list[str]:
-    """The lines inside paragraphs of a page that Markdown reads as items of a list, such as ``+ b = c``."""
+    """Return the lines inside paragraphs of a page that Markdown would take for list items, such as ``+ b = c``."""
     text = re.sub(r"```.*?```", "", page, flags=re.DOTALL)
     lines = text.splitlines()
     item, paragraph = re.compile(r"\s*(?:\d+\.|[-*+]) "), re.compile(r"[^\s#|*+-].*[^:.]$")

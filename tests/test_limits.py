@@ -1,4 +1,4 @@
-"""Specs that could exhaust the compiler are compiled or refused in seconds and in little memory."""
+"""Large specs, which could exhaust the compiler, are compiled or refused in a few seconds and with little memory."""
 
 import json
 import os
@@ -27,7 +27,7 @@ from phigen.symbolic.expression import ONE, symbol, total_at
 from phigen.symbolic.symbols import STEP
 from phigen.symbolic.tower import Tower
 
-#: What a refusal may take, and the memory that stops a test.
+#: Processor seconds that a refusal may take, and the memory in bytes at which the child process is stopped.
 SECONDS, CEILING = 5, 2**31
 
 
@@ -67,7 +67,7 @@ def log_canonical(n):
 
 
 def triangular(n):
-    """Canonical brackets after a change of coordinates whose inverse has very many terms."""
+    """Return a spec with canonical brackets after a change of coordinates whose inverse has very many terms."""
     x, u = names(n), [f"u{i}" for i in range(1, n + 1)]
     moved = ", ".join(
         f"{v}: {a} + ({'+'.join(x[i + 1 :] or ['0'])})**3" for i, (v, a) in enumerate(zip(u, x, strict=True))
@@ -85,7 +85,8 @@ SPACE = (names(10), "canonical: {q: [x1, x2, x3, x4, x5], p: [x6, x7, x8, x9, x1
 PLANE = (["x", "y"], "canonical: {q: [x], p: [y]}")
 
 
-#: A process of its own: a fork of one with threads may wait for ever for what one of them holds.
+#: Program that compiles a spec within limits on time and memory. It runs in a new interpreter, because a fork of a
+#: process with threads can wait for ever for a lock.
 CHILD = """
 import json, resource, sys
 from clock import slowness
@@ -108,7 +109,9 @@ print(json.dumps([said, spent / slowness(), (ended.ru_maxrss - began.ru_maxrss) 
 
 
 def compiled_in_a_child(text):
-    """What compiling says, and the processor time, in seconds of `clock`, and the megabytes it took."""
+    """Compile a spec in a child process. Return "compiled" or the error, the processor time in seconds of the reference
+    machine of `clock`, and the memory in MiB.
+    """
     command = [sys.executable, "-c", CHILD, str(4 * SECONDS), str(CEILING)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     process = subprocess.run(command, input=text, capture_output=True, text=True, check=False, env=environment)
@@ -118,7 +121,7 @@ def compiled_in_a_child(text):
 
 def test_the_memory_of_sums_counts_too(monkeypatch):
     many = names(30)
-    h = loads(spec(many, "brackets: {x1: {x2: 1}}", "+".join(many))).hamiltonian  # without a product
+    h = loads(spec(many, "brackets: {x1: {x2: 1}}", "+".join(many))).hamiltonian  # H is a sum without products
     (first,) = polynomial_series(h, list(map(symbol, many)), many, (), 1, symmetric=True).terms
     assert len(first) == 30
     monkeypatch.setattr(budgets, "TAYLOR_BYTES", 10_000)
@@ -132,7 +135,9 @@ def nested(depth):
 
 
 def test_derivatives_keep_no_room_for_terms_that_they_do_not_have():
-    """flint's have as much as what they are derivatives of: here 550 MB in place of 5."""
+    """Derivatives of flint reserve memory for as many terms as the polynomial has that they are derived from: here that
+    would be 550 MB instead of 5.
+    """
     many = names(255)
     tower = Tower(many)
     square = tower.integer_power(tower.combine(map(tower.variable, many)), 2)
@@ -143,7 +148,7 @@ def test_derivatives_keep_no_room_for_terms_that_they_do_not_have():
 
 
 def pages():
-    """Pages of memory that this process has asked for, used or not."""
+    """Return the number of memory pages that this process has requested, used or not."""
     return int(Path("/proc/self/statm").read_text().split()[0])
 
 
@@ -168,7 +173,7 @@ def test_rings_and_collected_polynomials_of_nested_functions_are_given_up_where_
     tower = Tower([*PLANE[0], STEP], [text.hamiltonian], PLANE[0])
     series = PolynomialSeries(tower, (tower.convert(text.hamiltonian),))
     term_counts = [len(collected_form(series, PLANE[0], [STEP], 10**6))]
-    for most in (10_000, 2_000):  # the entries of the Hessian, then the polynomials themselves
+    for most in (10_000, 2_000):  # with these limits the Hessian is too large, then the polynomials too
         monkeypatch.setattr(limits, "CELLS", most)
         term_counts.append(len(collected_form(series, PLANE[0], [STEP], 10**6)))
     assert term_counts == [2, 1, 0]
@@ -183,7 +188,7 @@ def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkey
 
 
 def test_what_lasts_counts_how_much_of_it_is_done(monkeypatch):
-    """Within the stages of the compiler, so that the count of each comes to its total."""
+    """Stages of the compiler that take long report progress, and their counts reach the announced totals."""
     monkeypatch.setattr(expression, "MANY", 20)
     monkeypatch.setattr(sampled.limits, "PROOF_PRODUCTS", 0)
     stages = {}
@@ -212,7 +217,7 @@ def test_products_of_matrices_are_counted_as_they_would_be_made():
     assert OperationCount(true, lambda name: name == "fixed").matrix(left, right) == true
     with pytest.raises(TooManyError):
         OperationCount(true - 1, lambda name: name == "fixed").matrix(left, right)
-    repeated = [{**row, **{j + 3: e for j, e in row.items()}} for row in right]  # equal columns make equal nodes
+    repeated = [{**row, **{j + 3: e for j, e in row.items()}} for row in right]  # equal columns count once
     assert OperationCount(true, lambda name: name == "fixed").matrix(left, repeated) == true
 
 
@@ -226,11 +231,13 @@ def test_equal_columns_of_matrices_are_looked_at_once(monkeypatch):
 
 
 def test_a_step_whose_matrices_are_too_large_is_composed_or_refused_before_they_are_made(monkeypatch):
-    """The estimate is more than 0.6 of the truth; steps of order 2 take less."""
+    """The estimated number of operations exceeds 0.6 of the true number. Above the limit, steps of order 2 are
+    composed, or the spec is refused.
+    """
     text = loads(log_canonical(10))
     direct = compile_spec(text).program
     true = cost(direct.step.linearise.roots)
-    few = 4 * 10**3 - 1  # below which systems of this size are looked at
+    few = 4 * 10**3 - 1  # systems of this size with fewer operations are not counted
     assert few > 0.6 * true
     for most, stages in ((true, 1), (few, 5)):
         monkeypatch.setattr(discretisation, "MOST_OPERATIONS", most)
@@ -238,13 +245,15 @@ def test_a_step_whose_matrices_are_too_large_is_composed_or_refused_before_they_
     with pytest.raises(LimitError, match=f"the matrices of a step would take more than {most} operations"):
         compile_spec(replace(text, composition="none"))
     dense = "*".join(f"cos({x})" for x in names(10))
-    monkeypatch.setattr(discretisation, "generating_function", None)  # of this it is known before any S_i is computed
+    monkeypatch.setattr(discretisation, "generating_function", None)  # the size is known before any S_i is computed
     with pytest.raises(LimitError, match="the matrices of a step"):
         compile_spec(loads(log_canonical(10).replace("hamiltonian: ", f"hamiltonian: {dense} + ")))
 
 
 def test_the_equations_of_a_path_are_counted_too(monkeypatch):
-    """They were made first, and then refused, where steps of order 2 would have done."""
+    """Equations of a path that are too large are not constructed: a composition of steps of order 2 replaces them, or
+    the spec is refused.
+    """
     text = spec(names(4), "lie_algebra: {name: gl(2)}", "+".join(f"{i}*x{i}**2" for i in range(1, 5)))
     text, counted = loads(text + "birealisation: karasev\n"), []
     monkeypatch.setattr(
@@ -255,13 +264,13 @@ def test_the_equations_of_a_path_are_counted_too(monkeypatch):
     assert 0.3 * true < counted[-1] <= true
     monkeypatch.setattr(discretisation, "MOST_OPERATIONS", counted[-1] - 1)
     assert len(compile_spec(text).program.fractions) == 5
-    monkeypatch.setattr(discretisation, "generating_function", lambda *_: direct)  # which is not too large by itself
+    monkeypatch.setattr(discretisation, "generating_function", lambda *_: direct)
     with pytest.raises(LimitError, match="the matrices of a step would take more"):
         compile_spec(replace(text, composition="none"))
 
 
 def test_an_elimination_that_is_too_long_for_a_function_is_a_loop(monkeypatch):
-    """Its operations were compared with n³ only, which are millions where n is 200."""
+    """The operations of the elimination, and not n³ alone, decide: for n = 200 the value of n³ is millions."""
     direct = compile_spec(loads(fput(8)), order=2).program.step
     assert direct.eliminate is not None
     monkeypatch.setattr(limits, "OPERATIONS", cost(direct.eliminate.roots) // 2)

@@ -1,4 +1,4 @@
-"""docs/paper.md: its numbers and figures are those of today, and its commands do what it says."""
+"""The numbers and figures of docs/paper.md agree with those that phigen computes now, and its commands work."""
 
 import json
 import math
@@ -26,7 +26,7 @@ STORED = {entry["figure"]: entry for entry in json.loads((DOCS / "figures" / "pa
 
 @cache
 def made(name: str) -> Plate:
-    """A figure of today; of the long run its first hundredth."""
+    """Compute a figure of the paper; of the long run of the rigid body only the first hundredth."""
     return rigid_body.errors_plate(rigid_body.EARLY) if name == "rigid_body" else PLATES[name]()
 
 
@@ -39,7 +39,7 @@ def test_numbers_are_current(name):
     for finding in today:
         before, now = stored[finding["quantity"]], finding["measured"]
         assert before["paper"] == finding["paper"]
-        # What is round-off differs from compiler to compiler.
+        # Round-off errors differ between compilers.
         roundoff = abs(now) < 1e-9 and abs(before["measured"]) < 1e-9
         assert roundoff or math.isclose(now, before["measured"], rel_tol=0.01), finding
 

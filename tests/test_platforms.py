@@ -1,4 +1,4 @@
-"""docs/platforms.md: other compilers, other machines, WebAssembly."""
+"""Generated C with other compilers, for other machines and for WebAssembly, as docs/platforms.md describes."""
 
 import os
 import subprocess
@@ -17,7 +17,8 @@ pytest.importorskip("ziglang")
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 ZIG = (sys.executable, "-m", "ziglang", "cc")
 
-#: A program without a library, which would take a minute to be made for another machine: it writes the bytes of x.
+#: A program that needs no C library, since compiling one for another machine takes a minute: it integrates and writes
+#: the bytes of the state to standard output.
 MAIN = """#include "maxwell_bloch.h"
 
 void *memmove(void *to, const void *from, size_t count)
@@ -73,7 +74,7 @@ def test_zig_is_taken_where_there_is_no_other_compiler(monkeypatch, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["nambu_pendulum", "kepler", "lotka_volterra"])
 def test_the_newest_clang_has_no_warning(name, tmp_path):
-    """zig's is some years newer than that of a distribution, and warns of more."""
+    """The clang of zig is newer than that of Linux distributions and has more warnings."""
     write(tmp_path, files(compiled(name), "c"))
     run([*ZIG, "-std=c99", *WARNINGS, "-c", f"{name}.c", "-o", "a.o"], tmp_path)
 
@@ -86,7 +87,7 @@ def test_c_compiles_for_other_systems(target, sources):
 
 @pytest.mark.slow
 def test_aarch64_gives_what_this_machine_gives(tmp_path):
-    """Newton's iteration, and blocks of steps in lanes."""
+    """An emulated ARM processor gives the same results: Newton's iteration, and blocks of steps in SIMD lanes."""
     emulator, at = tool("qemu-aarch64-static"), setting(compiled("maxwell_bloch"))
     write(tmp_path, {**files(compiled("maxwell_bloch"), "c"), "main.c": MAIN})
     numbers = [f"-DSTART={','.join(map(repr, at.x))}", f"-DSTEP={at.h!r}"]

@@ -18,7 +18,7 @@ def text(file):
 
 
 def recipe():
-    """The conda recipe."""
+    """Return the conda recipe as a mapping."""
     return YAML(typ="safe").load(text("packaging/conda/recipe.yaml"))
 
 
@@ -47,7 +47,9 @@ def test_conda_recipe_agrees_with_the_package():
 
 
 def test_conda_recipe_is_rendered():
-    """By rattler-build: unknown keys, requirements that are no specifications and unset variables are errors."""
+    """rattler-build renders the recipe; it reports unknown keys, invalid requirements and undefined variables as
+    errors.
+    """
     rattler_build = pytest.importorskip("rattler_build", reason="the recipe needs py-rattler-build of PyPI")
     recipe = text("packaging/conda/recipe.yaml")
     (variant,) = rattler_build.Stage0Recipe.from_yaml(recipe).render()

@@ -1,4 +1,4 @@
-"""Pages on Python followed to the letter."""
+"""The examples in the pages on Python work, and their output is what the pages show."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ pytest.importorskip("pandas")
 pytest.importorskip("xarray")
 
 
-#: Pages, with the number of their commands whose answers are compared.
+#: Pages by name, with the number of commands whose output is compared.
 PAGES = {"python": 1, "ensembles": 1, "gradients": 4}
 
 

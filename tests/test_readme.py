@@ -1,4 +1,4 @@
-"""The README's examples, compiled, run, and compared with what it says they print."""
+"""The examples of the README, compiled and run; the output is compared with that in the README."""
 
 import os
 import re
@@ -18,12 +18,12 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def blocks():
-    """Pairs (the paragraph before a fenced block, its text), in order."""
+    """Return pairs in the order of the README: the paragraph before a fenced block, and the text of the block."""
     return re.findall(r"([^\n]*)\n\n```\w+\n(.*?)```", README, flags=re.DOTALL)
 
 
 def block(start):
-    """The block whose introduction starts like this."""
+    """Return the text of the block whose preceding paragraph starts with ``start``."""
     texts = [text for introduction, text in blocks() if introduction.startswith(start)]
     assert len(texts) == 1, f"the README has {len(texts)} blocks introduced by {start!r}"
     return texts[0]
@@ -31,7 +31,7 @@ def block(start):
 
 @pytest.fixture
 def workshop(tmp_path):
-    """A folder with the README's files, and a path on which `phigen` is this one."""
+    """Return a folder with the files of the README, and an environment in whose path `phigen` is the tested version."""
     for name in ("tumbler.yaml", "main.c", "example.py"):
         (tmp_path / name).write_text(block(f"`{name}`"), encoding="utf-8")
     tools = tmp_path / "tools"

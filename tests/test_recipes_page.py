@@ -1,4 +1,4 @@
-"""docs/recipes.md followed to the letter."""
+"""The examples of docs/recipes.md work, and their output is what the page shows."""
 
 from pathlib import Path
 

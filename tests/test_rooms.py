@@ -1,4 +1,6 @@
-"""Figures of the architecture that may fall and must not rise: circles of imports, conditions, tests on kinds."""
+"""Measures of the architecture that must not grow: cycles of imports, lines of conditions in the runtimes, tests on the
+kind of a step.
+"""
 
 import ast
 import re
@@ -13,11 +15,11 @@ from phigen import resources
 
 ROOT = Path(__file__).resolve().parents[1]
 
-#: Modules of the largest circle of imports, where those inside functions count; names in tables (`phigen.registry`,
-#: `phigen.display`), which are imported when they are asked for, do not.
+#: Number of modules in the largest cycle of imports; imports inside functions count. Names in tables
+#: (`phigen.registry`, `phigen.display`), whose modules are imported on demand, do not count.
 LARGEST_CIRCLE = 2
 
-#: Rooms from the lowest to the highest: each imports those before it.
+#: Rooms (packages and modules of phigen) from the lowest to the highest: each imports only rooms before it.
 ORDER = [
     "_version",
     "progress",
@@ -66,13 +68,14 @@ ORDER = [
     "__main__",
 ]
 
-#: Lines of preprocessor conditions among the non-blank lines of the runtime in C, in percent.
+#: Largest share of lines with preprocessor conditions among the non-blank lines of the C runtime, in percent.
 CONDITIONS = 7.8
 
-#: The same for lines ``// #if``, ``// #else`` and ``// #endif`` of the runtime in JavaScript.
+#: Largest share of lines ``// #if``, ``// #else`` and ``// #endif`` in the JavaScript runtime, in percent.
 JAVASCRIPT_CONDITIONS = 2.8
 
-#: The modules of targets that use regular expressions, each with what these read. Passes over C read tokens.
+#: Modules of targets that may use regular expressions, each with the text that they read. Passes over C read tokens
+#: instead.
 REGULAR_EXPRESSIONS = {
     "phigen/targets/names.py": "names of the spec, for identifiers",
     "phigen/targets/reserved.py": "names of the spec, for identifiers",
@@ -88,14 +91,15 @@ REGULAR_EXPRESSIONS = {
     "phigen/targets/js/runtime.py": "lines of the runtime that include or import",
 }
 
-#: The most modules of one name, where those of the targets count as one, since each target may have its own.
+#: Largest number of modules with the same name. Modules of different targets count as one, since each target may have a
+#: module of this name.
 LARGEST_NAMESAKES = 3
 
-#: Tests on the kind of a step or of a compilation: ``isinstance``, class patterns, and comparisons of the records of
-#: kinds or of their names. Kinds differ by facts in their records, entries in tables, and methods.
+#: Number of tests on the kind of a step or of a compilation: ``isinstance``, class patterns, comparisons of kinds or of
+#: their names. Code should read the record of the kind, an entry in a table, or a method instead.
 KIND_TESTS = 0
 
-#: The kinds that are counted, by the modules that define them.
+#: Classes of steps and compilations, by the modules that define them; tests on these classes are counted.
 KINDS = {
     "phigen.scheme.steps": {"Newton", "Explicit", "Path", "Gauss", "Splitting", "Sweeps"},
     "phigen.scheme.step_kinds": {"NEWTON", "EXPLICIT", "PATH", "GAUSS", "SPLITTING", "SWEEPS"},
@@ -107,7 +111,9 @@ KINDS = {
 
 @cache
 def imports() -> dict[str, set[str]]:
-    """The modules of phigen that each module imports, inside functions too, but not for annotations alone."""
+    """Return the modules of phigen that each module imports. Imports inside functions count; imports for annotations
+    alone do not.
+    """
     files = {".".join(p.relative_to(ROOT).with_suffix("").parts): p for p in sorted((ROOT / "phigen").rglob("*.py"))}
     files = {name.removesuffix(".__init__"): path for name, path in files.items()}
     graph = {}
@@ -125,7 +131,7 @@ def imports() -> dict[str, set[str]]:
 
 
 def executed(tree: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of a module without those under ``if TYPE_CHECKING``."""
+    """Yield the nodes of a syntax tree, except those under ``if TYPE_CHECKING``."""
     for node in ast.iter_child_nodes(tree):
         if not (isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"):
             yield node
@@ -133,7 +139,7 @@ def executed(tree: ast.AST) -> Iterator[ast.AST]:
 
 
 def upward_imports() -> list[str]:
-    """The imports of modules from rooms above their own, as "MODULE imports MODULE"."""
+    """Return the imports of modules from rooms above their own, as "MODULE imports MODULE"."""
     level = {room: k for k, room in enumerate(ORDER)}
 
     def height(module: str) -> int:
@@ -144,14 +150,14 @@ def upward_imports() -> list[str]:
 
 
 def circles(graph: dict[str, set[str]]) -> list[set[str]]:
-    """The strongly connected components with more than one module, the largest first."""
+    """Return the strongly connected components with more than one module, the largest first."""
     reached = {name: reachable(graph, name) for name in graph}
     components = {frozenset(o for o in reached[name] if name in reached[o]) for name in graph}
     return sorted((set(c) for c in components if len(c) > 1), key=len, reverse=True)
 
 
 def reachable(graph: dict[str, set[str]], start: str) -> set[str]:
-    """The modules that a module leads to, itself included."""
+    """Return the modules that a module imports directly or indirectly, and the module itself."""
     seen, open_ = {start}, [start]
     while open_:
         for other in graph[open_.pop()] - seen:
@@ -161,7 +167,9 @@ def reachable(graph: dict[str, set[str]], start: str) -> set[str]:
 
 
 def conditions() -> tuple[int, int]:
-    """Lines of conditions in the runtime in C, include guards apart, and all that are not blank."""
+    """Return the number of lines with preprocessor conditions in the C runtime, without include guards, and that of all
+    non-blank lines.
+    """
     counted = total = 0
     for file in (resources.templates() / "c/runtime").glob("*.[ch]"):
         lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
@@ -172,14 +180,14 @@ def conditions() -> tuple[int, int]:
 
 
 def javascript_conditions() -> tuple[int, int]:
-    """Lines of conditions in the runtime in JavaScript, and all that are not blank."""
+    """Return the number of lines with conditions in the JavaScript runtime, and that of all non-blank lines."""
     files = (resources.templates() / "js/runtime").glob("*.mjs")
     lines = [line for f in files for line in f.read_text(encoding="utf-8").splitlines() if line.strip()]
     return sum(1 for line in lines if re.match(r"\s*(//|\*) #(if|else|endif)", line)), len(lines)
 
 
 def kind_tests(tree: ast.AST) -> list[int]:
-    """The lines of a module that ask for the kind of a step, a plan, or a compilation."""
+    """Return the lines of a module that test the kind of a step, a plan, or a compilation."""
     imported = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module in KINDS)
     kinds = {a.asname or a.name for node in imported for a in node.names if a.name in KINDS[node.module or ""]}
     asked = list[int]()
@@ -195,7 +203,7 @@ def kind_tests(tree: ast.AST) -> list[int]:
 
 
 def all_kind_tests() -> dict[str, list[int]]:
-    """The same for all modules that have any, by their names."""
+    """Return the lines that test kinds, for each module of phigen that has one."""
     files = sorted((ROOT / "phigen").rglob("*.py"))
     asked = {str(p.relative_to(ROOT)): kind_tests(parsed(p)) for p in files}
     return {name: lines for name, lines in asked.items() if lines}
@@ -207,7 +215,7 @@ def test_circles_of_imports_do_not_grow():
 
 
 def test_rooms_import_those_below_them():
-    """Inside functions too."""
+    """A room imports only lower rooms, inside functions too."""
     assert not upward_imports()
 
 
@@ -222,14 +230,16 @@ def test_conditions_in_the_runtime_in_javascript_do_not_grow():
 
 
 def test_regular_expressions_read_what_is_listed():
-    """No pass edits generated text by them."""
+    """Only the listed modules import ``re``, so no other one edits generated text by regular expressions."""
     files = [path for room in ("targets", "ir", "lanes") for path in sorted((ROOT / "phigen" / room).rglob("*.py"))]
     users = {str(p.relative_to(ROOT)) for p in files if re.search(r"^import re$", p.read_text("utf-8"), re.MULTILINE)}
     assert users == REGULAR_EXPRESSIONS.keys()
 
 
 def shared_names() -> Counter[str]:
-    """The names that several modules have, with their numbers; each target may have a module of a name."""
+    """Return the names that several modules have, with the numbers of these modules. Modules of different targets with
+    one name count once.
+    """
     files = (p for p in (ROOT / "phigen").rglob("*.py") if p.name != "__init__.py")
     rooms = {(p.stem, "targets" if "targets" in p.parts else p.parent) for p in files}
     return Counter({name: n for name, n in Counter(name for name, _ in rooms).items() if n > 1})

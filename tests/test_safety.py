@@ -1,4 +1,6 @@
-"""docs/safety.md: what it says of generated C is so."""
+"""The statements of docs/safety.md on generated C are true: bounded stacks, no calls except of libm, numbers of
+operations.
+"""
 
 import importlib.util
 import re
@@ -15,12 +17,12 @@ from phigen.errors import ToolchainError
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 _location = importlib.util.spec_from_file_location("make_safety", DOCS / "make_safety.py")
 safety = importlib.util.module_from_spec(_location)
-sys.modules[safety.__name__] = safety  # where dataclasses look for it
+sys.modules[safety.__name__] = safety  # the decorator dataclass looks for the module here
 _location.loader.exec_module(safety)
 
-#: Tables without the numbers that a compiler decides.
+#: The page docs/safety.md. The tables in it are compared except for numbers that depend on the compiler.
 PAGE = safety.PAGE.read_text(encoding="utf-8")
-#: Stacks of another version of gcc may be larger than those of the page by this factor.
+#: Factor by which the stack of another version of gcc may exceed that in the page.
 OTHER_COMPILERS = 1.5
 
 

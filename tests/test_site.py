@@ -1,4 +1,6 @@
-"""The site of the documentation: it builds without a warning, holds every page, and needs nothing from elsewhere."""
+"""The web site of the documentation builds without warnings, contains every page, and loads nothing from other
+sites.
+"""
 
 import importlib.util
 import os
@@ -48,7 +50,7 @@ def test_every_public_name_is_documented(site):
 def test_the_gallery_offers_a_panel_of_each_system_that_has_one(site):
     page = (site / "gallery.html").read_text(encoding="utf-8")
     offered = re.findall(r'<details data-live="?live/(\w+).html', page)
-    assert offered == ["pendulum_euler", "toda"]  # with noise there is none
+    assert offered == ["pendulum_euler", "toda"]  # systems with noise have no panel
     assert sorted(path.stem for path in site.glob("live/*.html")) == offered
     listed = re.findall(r'<a href="#(\w+)" class="md-nav__link"', page)
     assert {"vortices3", "lattices", "toda"} <= {*listed}
@@ -74,8 +76,8 @@ def test_a_system_of_the_gallery_runs_once_its_panel_is_opened(site, browser):
     panel = "document.querySelector('details[data-live=\"live/toda.html\"]')"
     frames = "document.querySelectorAll('details iframe').length"
     assert browser.value(frames) == 0
-    browser.value(f"{panel}.open = true; {panel}.scrollIntoView()")  # out of sight it would rest
-    height = f"{panel}.querySelector('iframe')?.style.height"  # by the panel itself, once it has begun
+    browser.value(f"{panel}.open = true; {panel}.scrollIntoView()")  # a panel that is not visible does not run
+    height = f"{panel}.querySelector('iframe')?.style.height"  # the panel sets its height when it starts
     wait = f"new Promise(done => {{ const look = () => {height} ? done({height}) : setTimeout(look, 50); look(); }})"
     assert float(browser.value(wait).removesuffix("px")) > 400
     browser.value(f"{panel}.open = false")

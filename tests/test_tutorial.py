@@ -1,4 +1,4 @@
-"""docs/tutorial.md followed to the letter; its figure is the one that its command draws."""
+"""The examples of docs/tutorial.md work, and the figure in the page is the one that the command of the page draws."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Files appear whole, together, or not at all."""
+"""Files are written atomically: each file is complete or absent, and several files appear together."""
 
 import os
 import stat

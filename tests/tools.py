@@ -1,4 +1,6 @@
-"""Programs that tests start. What a machine lacks is skipped, and told once at the end with how to get it."""
+"""Programs that tests start. A test without its program is skipped, and the end of the output lists the missing
+programs with the packages that contain them.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-#: What generated C compiles without, as gcc and clang call it.
+#: Warnings of gcc and clang that are errors for generated C.
 WARNINGS = (
     "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror",
 )  # fmt: skip
@@ -31,7 +33,9 @@ _LACK = " is not installed"
 
 
 def tool(name: str) -> str:
-    """The path of a program; without it the test is skipped, or fails where PHIGEN_ALL_TOOLS is set."""
+    """Return the path of a program. If it is not installed, skip the test, or let it fail if PHIGEN_ALL_TOOLS
+    is set.
+    """
     path = shutil.which(name)
     if path is None:
         if os.environ.get("PHIGEN_ALL_TOOLS"):
@@ -41,7 +45,7 @@ def tool(name: str) -> str:
 
 
 def run(command: Sequence[str | Path], folder: Path, **environment: str) -> str:
-    """What a command prints; the test fails if it fails."""
+    """Run a command and return its standard output; the test fails if the exit status is not 0."""
     process = subprocess.run(
         [str(c) for c in command],
         cwd=folder,
@@ -56,13 +60,15 @@ def run(command: Sequence[str | Path], folder: Path, **environment: str) -> str:
 
 
 def write(folder: Path, texts: Mapping[str, str]) -> None:
-    """Put files into a folder."""
+    """Write files into a folder; ``texts`` has their contents by name."""
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
 
 
 def not_tested(reasons: Iterable[str]) -> list[str]:
-    """Lines about skipped tests, from the reasons of each: what was missing, for how many tests, how to get it."""
+    """Return lines about skipped tests: the missing programs with the numbers of tests, and the command that installs
+    them. ``reasons`` has the reason of each skipped test.
+    """
     counted = Counter(reason.removeprefix("Skipped: ") for reason in reasons)
     lines, packages = [], []
     for reason, count in sorted(counted.items()):

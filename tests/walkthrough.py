@@ -1,8 +1,9 @@
-"""Pages of documentation followed to the letter: files written, commands typed, answers compared.
+"""Examples in pages of documentation: files are written, commands are run, and their output is compared with
+the page.
 
-A fenced block is a file if the last sentence before it starts with its name in backquotes. A ``console`` block holds
-commands after ``$`` and what they answer; ``…`` stands for anything, a line of its own for any lines. Numbers with
-a point need not agree to the last digit.
+A fenced block is a file if the last sentence before the block starts with the name of the file in backquotes. A
+``console`` block contains commands after ``$``, each followed by its output. In the output ``…`` stands for any text,
+and a line ``…`` for any number of lines. Numbers with a decimal point need not agree to the last digit.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _FILES = ("yaml", "python", "c", "js", "sh")
 
 
 def blocks(text: str) -> list[tuple[str, str, str]]:
-    """The paragraph before each fenced block, its language, and its text."""
+    """Return for each fenced block the paragraph before the block, the language, and the text of the block."""
     examples = []
     for match in re.finditer(r"^```(\w+)\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE):
         paragraph = text[: match.start()].rstrip().rsplit("\n\n", 1)[-1]
@@ -35,13 +36,13 @@ def blocks(text: str) -> list[tuple[str, str, str]]:
 
 
 def file_named_in(paragraph: str) -> str | None:
-    """`name.suffix` at the start of the paragraph's last sentence."""
+    """Return the file name with which the last sentence of the paragraph starts, or None."""
     match = re.search(r"(?:^|[.:;]\s+)`([\w-]+\.\w+)`[^`]*:$", paragraph)
     return match[1] if match else None
 
 
 def follow(page: Path, folder: Path) -> int:
-    """Do in a folder what the page says; the number of commands whose answers were compared."""
+    """Write the files of a page into a folder and run its commands there; return the number of commands."""
     environment = _environment(folder)
     count = 0
     for paragraph, language, text in blocks(page.read_text(encoding="utf-8")):
@@ -54,7 +55,7 @@ def follow(page: Path, folder: Path) -> int:
 
 
 def labels_of(svg: str) -> list[str]:
-    """The labels in an SVG file but the numbers along its axes."""
+    """Return the labels in an SVG file, without the numbers along its axes."""
     labels = re.findall(r"<text[^>]*>([^<]*)</text>", svg)
     return [label for label in labels if not re.fullmatch(r"[−\d.]*", label)]
 
@@ -79,13 +80,15 @@ def _type(text: str, folder: Path, environment: dict[str, str]) -> int:
 
 
 def typed(command: str, folder: Path, environment: dict[str, str], status: int = 0) -> tuple[int, str]:
-    """The exit code of a command, and what it said. phigen works in this process, unless the shell is needed."""
+    """Run a command and return its exit code and output. A ``phigen`` command runs in this process unless it needs the
+    shell.
+    """
     words = shlex.split(command)
     if words[0] == "phigen" and not set(command) & set("|&;<>$*~"):
         with contextlib.chdir(folder):
             result = CliRunner().invoke(group, words[1:], prog_name="phigen", env={"NO_COLOR": "1"})
         return result.exit_code, result.output
-    # So that echo $? tells about the command before it.
+    # The shell begins with the exit status of the previous command, so that ``echo $?`` prints it.
     typed = subprocess.run(
         ["sh", "-c", f"(exit {status})\n{command}"], cwd=folder, env=environment, check=False, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
@@ -94,7 +97,9 @@ def typed(command: str, folder: Path, environment: dict[str, str], status: int =
 
 
 def _agrees(answer: str, output: str) -> bool:
-    """Whether an answer of the page is that of today: numbers to two per cent, round-off as such."""
+    """Whether the output of a command agrees with that in the page: numbers up to two per cent, numbers below 1e-12
+    always.
+    """
     pattern = "".join(r"(?:.*\n)*?" if line == "…" else _pattern(line) + r"\n" for line in answer.splitlines())
     match = re.fullmatch(pattern, output)
     return bool(match) and all(
@@ -108,7 +113,9 @@ def _said(answer: str) -> list[str]:
 
 
 def _pattern(line: str) -> str:
-    """Numbers as groups, blanks in any quantity: columns move with the width of numbers."""
+    """Return a regular expression for a line: numbers are groups, and the number of blanks is arbitrary, as the widths
+    of columns depend on those of numbers.
+    """
     pieces = re.split(_NUMBER, line)
     texts = [re.sub(r"(?:\\ )+", " +", re.escape(text).replace("…", ".*")) for text in pieces]
     return rf"({_NUMBER})".join(texts)

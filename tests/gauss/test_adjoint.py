@@ -1,4 +1,6 @@
-"""Gradients through Gauss steps: against differences, against tangents, in all targets and profiles."""
+"""Gradients through Gauss steps, compared with finite differences and with tangent maps, in all targets and
+profiles.
+"""
 
 import ctypes
 from functools import cache
@@ -40,7 +42,8 @@ poisson: {canonical: {q: [x, y], p: [u, v]}}
 hamiltonian: (u**2 + v**2)/2 - k/sqrt(x**2 + y**2)
 monitor: (x**2 + (1 + b)*y**2)**(3/4)
 """
-#: Spec, order and start: momentum maps, coefficients by parameters, products, time and forces; steps to truncation.
+#: Spec, order and start: a momentum map, its coefficients with parameters, direct products of algebras, time and
+#: forces, logarithms; then a step that is a Poisson map to truncation only, and a monitor.
 KINDS = {
     "top": (TOP, 16, [0.9, 0.5, 0.8, 0.6, 0.1, 0.8]),
     "mixed": (MIXED, 4, [0.4, -0.8, 0.5, 0.3, 0.7]),
@@ -72,7 +75,7 @@ def start(kind):
 
 
 def given(kind):
-    """Parameters other than the defaults."""
+    """Return values of the parameters that differ from the defaults."""
     return {name: 1.07 * value for name, value in method(kind, "c").interface.parameters.items()}
 
 
@@ -81,14 +84,16 @@ def weights(shape):
 
 
 def difference(f, width=1e-3):
-    """The derivative at 0, by central differences of order 6."""
+    """Return the derivative of f at 0, by central differences of order 6."""
     return sum(w * (f(k * width) - f(-k * width)) for k, w in ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))) / width
 
 
 @pytest.mark.thin(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_pullback_is_the_gradient_of_the_run(kind):
-    """All rows have a cotangent. NumPy and the small C agree with the fast C."""
+    """Pullbacks agree with central differences; every stored state has a cotangent. NumPy and the C of profile small
+    agree with the fast C.
+    """
     fast, x, parameters, stride = method(kind, "c"), start(kind), given(kind), 2
     bar = weights((4, len(x)))
     rows, x0_bar, by = fast.pullback(x, H, STEPS, bar, stride, parameters=parameters)
@@ -109,7 +114,7 @@ def test_pullback_is_the_gradient_of_the_run(kind):
 
 
 @pytest.mark.parametrize("target", ["c", "numpy", "small"])
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "monitored"])  # where e follows the start
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "monitored"])
 def test_pullback_is_the_transpose_of_the_tangent_map(kind, target):
     integrator, x = method(kind, target), start(kind)
     bar, product = weights(len(x)), np.eye(len(x))
@@ -121,7 +126,9 @@ def test_pullback_is_the_transpose_of_the_tangent_map(kind, target):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_gradients_of_members_are_those_of_single_runs(target):
-    """With steps, parameters and times of their own."""
+    """Pullbacks of an ensemble whose members have different steps, parameters and start times agree with those of
+    single runs.
+    """
     integrator, rng, x = method("driven", target), np.random.default_rng(2), start("driven")
     many, h, t0 = x + 0.1 * rng.normal(size=(3, 2)), H * (1 + 0.1 * rng.random(3)), rng.random(3)
     member_values = {name: value * (1 + 0.1 * rng.random(3)) for name, value in given("driven").items()}
@@ -139,10 +146,12 @@ def test_gradients_of_members_are_those_of_single_runs(target):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
-    """Steps of later segments begin without what earlier ones predict, so digits are lost to rounding only."""
+    """A run that exceeds the memory of the tape is split into segments. The first step of a segment has no predictor,
+    so results may differ by rounding only.
+    """
     integrator, x, bar = method("mixed", target), start("mixed"), weights((4, 5))
     whole = integrator.pullback(x, H, 30, bar, 10)
-    monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 7 * 29)  # seven steps
+    monkeypatch.setattr(c_solver, "MAX_TAPE_VALUES", 7 * 29)  # room for seven steps
     if target == "numpy":
         monkeypatch.setattr(integrator.backend.module, "MAX_TAPE", 7 * 22)
     part = integrator.pullback(x, H, 30, bar, 10)
@@ -163,7 +172,9 @@ def test_transpose_of_a_step_that_fails_leaves_the_state():
 
 @pytest.mark.parametrize("name", ["so4_manakov", "henon_heiles"])
 def test_reverse_sweeps_start_from_those_of_the_step_after(name, monkeypatch):
-    """Predicted cotangents, also in the frame of another step, save a fifth of the sweeps, and change rounding only."""
+    """The sweeps for the cotangents of the stages start from the cotangents of the following step. This prediction,
+    also in the frame of another step, saves a fifth of the sweeps and changes only rounding.
+    """
     compilation = compile_spec(spec_of(name).overridden(order=16, scheme="gauss", adjoint=True))
     x0, h, steps = np.array([float(v) for v in first_run(compilation).initial]), 2.0 if "so4" in name else 0.5, 10
     module = solver(compilation, "numpy").backend.module

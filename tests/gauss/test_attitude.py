@@ -1,4 +1,4 @@
-"""Attitudes of Gauss steps: the quaternion of the group element, in both frames and with a position."""
+"""Attitudes from Gauss steps: the quaternion of the group element, for body and space frames, and with a position."""
 
 import numpy as np
 import pytest
@@ -22,20 +22,22 @@ START = np.array([0.8, -0.5, 0.7])
 
 
 def rotation(q):
-    """The matrix of a unit quaternion."""
+    """Return the rotation matrix of a unit quaternion."""
     w, u = q[0], q[1:]
     return np.stack([v + 2 * (w * np.cross(u, v) + np.cross(u, np.cross(u, v))) for v in np.eye(3)], axis=-1)
 
 
 def hat(v):
-    """The matrix of v ×."""
+    """Return the matrix of the map u ↦ v × u."""
     return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
 @pytest.mark.parametrize("target", ["c", "small", "numpy"])
 @pytest.mark.parametrize("sign", ["minus", "plus"])
 def test_momentum_in_the_other_frame_is_constant_for_large_steps(sign, target):
-    """Whatever the step: multiples of Casimirs, which `gauge: auto` takes from a quadratic H, rotate the body too."""
+    """The attitude takes the momentum to the other frame, where it is constant for any step size. `gauge: auto`
+    subtracts a multiple of a Casimir from a quadratic H, and the attitude includes the rotation by this multiple.
+    """
     profile = "profile: small\n" if target == "small" else ""
     text = BODY.format(sign=sign, more="") + profile
     run = solver(compile_text(text, 8), "numpy" if target == "numpy" else "c").integrate(START, 1.5, 50)
@@ -46,7 +48,7 @@ def test_momentum_in_the_other_frame_is_constant_for_large_steps(sign, target):
 
 @pytest.mark.parametrize("sign", ["minus", "plus"])
 def test_attitude_and_position_have_the_order_of_the_method(sign):
-    """Against ġ = gΩ, or Ωg, by another method."""
+    """Errors decrease with the order of the method, compared with a solution of ġ = gΩ or ġ = Ωg by DOP853."""
     compilation = compile_text(MOTION.format(sign=sign), 4)
     method, start = solver(compilation, "c"), np.array([*START, 0.4, -0.6, 0.3])
     left = sign == "plus"

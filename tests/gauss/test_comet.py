@@ -1,4 +1,6 @@
-"""A comet that meets Jupiter: steps with a monitor, compared with a Runge–Kutta method with step control."""
+"""A comet that has a close encounter with Jupiter: Gauss steps with a monitor, compared with a Runge–Kutta method with
+step size control.
+"""
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ MASSES = np.array([1.0, VALUES["mJ"], VALUES["mC"]])
 
 
 def newton(_, y):
-    """Rates of positions and momenta of three bodies."""
+    """Return the time derivatives of positions and momenta of three bodies."""
     q, p = y.reshape(2, 3, 2)
     between = q[np.newaxis] - q[:, np.newaxis]
     cubes = (np.square(between).sum(axis=-1) + np.eye(3)) ** 1.5
@@ -26,7 +28,9 @@ def newton(_, y):
 
 @pytest.mark.slow
 def test_energy_is_kept_through_the_encounter_and_the_comet_goes_where_newton_says():
-    """The whole energy is a million times that of the comet."""
+    """The relative energy error is small through the encounter, although the total energy is a million times that of
+    the comet, and the final position of the comet agrees with DOP853.
+    """
     integrator = solver(compile_spec(SPEC), "c")
     run = integrator.integrate(START, float(RUN.step), RUN.steps)
     until = float(run.t[-1])

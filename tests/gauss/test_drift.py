@@ -1,4 +1,4 @@
-"""Sweeps stop late enough: energies do not drift, by the mean over many members of an ensemble."""
+"""Fixed-point sweeps stop late enough: the mean energy of many members of an ensemble does not drift."""
 
 from dataclasses import replace
 
@@ -30,12 +30,13 @@ def energy(x):
 
 @pytest.mark.parametrize(("profile", "members"), [("fast", 128), pytest.param("small", 512, marks=pytest.mark.slow)])
 def test_mean_energy_does_not_drift(profile, members, monkeypatch):
-    """The standard error of the mean is 5e-15 in batches of members, and 2.4e-15 where stages are in a loop.
+    """The standard error of the mean energy error is 5e-15 in SIMD batches of members, and 2.4e-15 with the profile
+    small, where stages are in a loop.
 
-    If sweeps stop at the change that suffices for single trajectories with their stages in lanes, the mean drifts by
-    −9e-14 in batches and by 2e-14 in loops.
+    With the weaker stopping criterion that suffices for single trajectories, the mean would drift by −9e-14 in batches
+    and by 2e-14 in loops.
     """
-    monkeypatch.setattr(toolchain, "BASE_FLAGS", (*toolchain.BASE_FLAGS, "-O3"))  # ten million steps
+    monkeypatch.setattr(toolchain, "BASE_FLAGS", (*toolchain.BASE_FLAGS, "-O3"))  # for ten million steps
     method = solver(compile_spec(replace(loads(HENON), profile=profile)), "c")
     draws = np.random.default_rng(1).normal(size=(members, 4))
     starts = 0.15 * draws / np.linalg.norm(draws, axis=1, keepdims=True)

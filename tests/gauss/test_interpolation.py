@@ -1,4 +1,6 @@
-"""The collocation polynomial of the last step: where it leads, how accurate it is, and what is found by it."""
+"""The collocation polynomial of the last step: its values at the ends of the step, its order, and crossings of sections
+that are found with it.
+"""
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/2 - cos(q) + q*sin(2*t)/4
 scheme: gauss
 """
-#: No Poisson map is known for this bracket.
+#: A bracket for which phigen knows no Gauss step that is a Poisson map.
 DIRECT = """coordinates: [x, y, z]
 poisson: {brackets: {x: {y: z**2}, y: {z: x}, z: {x: y}}}
 hamiltonian: (x**2 + 2*y**2 + z**4)/2
@@ -25,7 +27,8 @@ casimirs: {C: x**2/2 + y**2/2 + z**3/3}
 scheme: gauss
 structure: to truncation
 """
-#: Systems with group elements, with logarithms, with the time, and to truncation.
+#: Systems with group elements, with logarithms of coordinates and with time, and one whose step is a Poisson map to
+#: truncation only; each with its step size.
 CASES = {
     "so4": (lambda: compiled("so4_manakov", 8, "gauss"), 0.5),
     "logarithms": (lambda: compiled("volterra5", 8, "gauss"), 0.2),
@@ -40,7 +43,7 @@ def start_of(case, compilation):
 
 
 def sessions(compilation, x0):
-    """Sessions at the start, in NumPy and in C."""
+    """Return sessions that start at x0: in NumPy, in fast C and in short C."""
     methods = solver(compilation, "numpy"), solver(compilation, "c"), solver(small(compilation), "c")
     return [m.backend.start(x0, m.backend.interface.parameters) for m in methods]
 
@@ -51,7 +54,7 @@ def test_polynomial_leads_from_the_start_of_the_step_to_its_end(case):
     x0 = start_of(case, compilation)
     inside = []
     for session in sessions(compilation, x0):
-        assert session.interpolated([0.5]) is None  # before the first step
+        assert session.interpolated([0.5]) is None  # no polynomial before the first step
         session.advance(h, 3)
         before = session.state()
         session.advance(h, 1)
@@ -60,7 +63,7 @@ def test_polynomial_leads_from_the_start_of_the_step_to_its_end(case):
         assert last == pytest.approx(session.state(), abs=2e-15)
         inside.append(middle)
         session.kick(np.zeros(len(x0)))
-        assert session.interpolated([0.5]) is None  # the last step does not lead here
+        assert session.interpolated([0.5]) is None  # the kicked state is not the end of the last step
     script = f"s.integrate({h}, 4);"
     inside.append(javascript(compilation, f"x0: {x0.tolist()}", script, "[...s.interpolate([0.3])[0]]"))
     for other in inside[1:]:
@@ -105,9 +108,10 @@ def test_steps_of_another_size_start_from_the_polynomial(ratio):
 
 @pytest.mark.parametrize("target", slow_but(["c"], ["numpy", "c"]))
 def test_no_crossing_inside_a_long_step_is_missed(target):
-    """Steps of three eighths of a turn, inside of which q rises above 1.27 and falls again.
+    """All crossings q = 1.27 are found with steps of three eighths of a period, in some of which q rises above 1.27 and
+    falls again.
 
-    A parabola through values of three steps does not show all of these.
+    A parabola through the values of three steps would miss some of these crossings.
     """
     method = solver(compile_text(PENDULUM, 16), target)
     long, short = (
@@ -133,7 +137,7 @@ def test_crossings_between_steps_are_on_the_leaf():
 
 
 def test_members_that_fail_leave_the_others_as_they_are():
-    """NumPy keeps the predictors of the members that are left."""
+    """If a member fails in NumPy, the remaining members keep their predictors and results."""
     method = solver(compiled("henon_heiles", 8, "gauss"), "numpy")
     starts = np.array([[0.1, 0.1, 0.1, 0.1], [0.1, 0.12, 0.1, 0.2], [3.0, 4.0, 5.0, 6.0]])
     with pytest.raises(StepError) as failed:

@@ -1,4 +1,4 @@
-"""Members of an ensemble with Gauss steps, one in each SIMD lane, compared with single trajectories."""
+"""Ensembles of Gauss steps with one member in each SIMD lane, compared with single trajectories."""
 
 import numpy as np
 import pytest
@@ -48,11 +48,13 @@ scheme: gauss
 
 @pytest.mark.parametrize(("text", "order"), [(TOP, 4), pytest.param(OSCILLATOR, 12, marks=pytest.mark.slow)])
 def test_members_in_lanes_follow_their_own_trajectories(text, order):
-    """Eleven members with their own parameters and steps: full batches, and one with lanes that are left over."""
+    """Eleven members with different parameters and steps fill batches of SIMD lanes, except the last batch, which has
+    unused lanes.
+    """
     method = solver(compile_text(text + f"order: {order}\n"), "c")
     draws = np.random.default_rng(order)
     starts = draws.uniform(0.3, 1.0, (11, len(method.coordinates)))
-    starts[3] = 0.0  # an equilibrium of the oscillator; the scale of changes is not that of the state
+    starts[3] = 0.0  # an equilibrium of the oscillator, where the state gives no scale
     steps, a = draws.uniform(0.05, 0.1, 11), draws.uniform(0.5, 1.0, 11)
     frames = method.ensemble(starts, steps, 60, stride=20, parameters={"a": a})
     for m in range(11):
@@ -62,12 +64,14 @@ def test_members_in_lanes_follow_their_own_trajectories(text, order):
 
 @pytest.mark.parametrize("text", [DRIVEN, COMET])
 def test_batches_follow_the_time_and_energy_level_of_each_member(text):
-    """The batch of the first four ends when two have failed, and the others continue one by one."""
+    """Members have different start times or energy levels. In the first batch of four members two fail, and the others
+    continue without SIMD.
+    """
     method = solver(compile_text(text + "order: 4\n"), "c")
     draws = np.random.default_rng(3)
     starts = draws.uniform(0.5, 0.7, (6, len(method.coordinates)))
     failing = [1, 2]
-    starts[1], starts[2] = 1e200, 60.0 if text is DRIVEN else 1e180  # not finite, or sweeps diverge
+    starts[1], starts[2] = 1e200, 60.0 if text is DRIVEN else 1e180  # overflow, or divergent sweeps
     start_times = {"t0": draws.uniform(-1, 1, 6)} if text is DRIVEN else {}
     steps, a = draws.uniform(0.05, 0.1, 6), draws.uniform(0.9, 1.0, 6)
     with pytest.raises(StepError) as failed:

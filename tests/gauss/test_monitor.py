@@ -1,4 +1,4 @@
-"""Gauss steps that are equal in another time: K = g (H + e) in place of H."""
+"""Gauss steps of equal size in a fictitious time τ: they integrate K = g·(H + e), with the monitor g, instead of H."""
 
 from functools import cache
 
@@ -23,12 +23,13 @@ casimirs: {C: x**2 + y**2 + z**2}
 monitor: 1/(1 + c*x**2 + z**2)
 """
 DAMPED = f"{TOP}forces: {{covector: {{x: -a*y/9}}}}\n"
-#: The brackets of so(3) times 1 + C, which no momentum map is known for, and a force across the leaves.
+#: The brackets of so(3) times 1 + R with R = x² + y² + z², for which no momentum map is known; a force crosses the
+#: symplectic leaves.
 SPREAD = "{x: {y: z*(1 + R), z: -y*(1 + R)}, y: {z: x*(1 + R)}}".replace("R", "x**2 + y**2 + z**2")
 LEAVING = TOP.replace("{lie_algebra: {name: so(3)}}", f"{{brackets: {SPREAD}}}") + (
     "structure: to truncation\nforces: {vector: {x: -x*c/9}}\n"
 )
-#: Spec, start, step in τ.
+#: Systems by name: spec, start, and step in the fictitious time τ.
 CASES = {
     "kepler": (KEPLER, [1, 0.1, 0, 0.5], 0.4),
     "top": (TOP, [0.4, 0.8, -0.5], 0.8),
@@ -51,7 +52,9 @@ def compilation(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_state_and_time_have_the_order_of_the_method(case):
-    """The state lies on the orbit of steps in t, where the time says, and errors shrink with the order."""
+    """After steps in τ, state and time agree with a run in t by a method of order 16, and errors decrease with the
+    order 6.
+    """
     _, x0, h = CASES[case]
     plain = solver(compile_spec(written(case, monitored=False).overridden(order=16)), "c")
     errors = []
@@ -84,7 +87,9 @@ BRACKETS = {
 
 @pytest.mark.parametrize("case", BRACKETS)
 def test_step_for_a_fixed_e_is_a_poisson_map(case):
-    """The tangent map holds e fixed. Of large steps, at order 2, with errors far above rounding."""
+    """The tangent map at fixed energy level e is a Poisson map, here for large steps of order 2, whose errors are far
+    above rounding.
+    """
     poisson, (_, x0, h) = BRACKETS[case], CASES[case]
     following, tangent = solver(compile_spec(written(case).overridden(order=2, tangent=True)), "numpy").step_tangent(
         x0, h

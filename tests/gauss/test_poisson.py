@@ -1,4 +1,6 @@
-"""Gauss steps with exact structure are Poisson maps for steps of any size; those to truncation are not, and say so."""
+"""Gauss steps with exact structure are Poisson maps for steps of any size. Steps with `structure: to truncation` are
+not, and phigen says so.
+"""
 
 import re
 from dataclasses import replace
@@ -12,7 +14,8 @@ from phigen.errors import SpecError
 from phigen.geometry.families import named
 from phigen.spec import loads
 
-#: Each kind of algebra: so(3), se(3), two so(3), so(3) ⋉ 2R³, nilpotent, affine, direct sums, constant; by logarithms.
+#: Systems with each kind of algebra: so(3), se(3), two copies of so(3), so(3) ⋉ 2R³, nilpotent, affine, direct sums,
+#: constant brackets, and brackets that are constant in logarithms.
 EXACT = (
     "rigid_body", "kowalevski_gauss", "so4_manakov", "satellite", "toda3", "engel_geodesics", "maxwell_bloch",
     "spin_chain5", "henon_heiles", "volterra5",
@@ -33,7 +36,8 @@ poisson: {brackets: {n: {q: p, p: -q}, q: {p: 1}}}
 hamiltonian: n**2/2 + q**3/5 + n*p/3
 casimirs: {C: n + (q**2 + p**2)/2}
 """
-#: Logarithms beside constant brackets and so(3); one of the coordinates is negative, and one is 0.
+#: Brackets that are constant in logarithms, combined with constant brackets and so(3). In the start one coordinate is
+#: negative, and one is 0.
 LOGARITHMS = """coordinates: [x, y, n, w, u, q, p, a, b, c]
 poisson:
   brackets: {x: {y: x*y, n: x*n/3}, y: {n: y*n}, w: {u: -w}, q: {p: 1}, a: {b: -c, c: b}, b: {c: -a}}
@@ -50,20 +54,20 @@ STARTS = {
 
 
 def of(spec, order, target="numpy", **more):
-    """A Gauss solver with tangents."""
+    """Return a Gauss solver with tangent maps for a spec."""
     variant = replace(spec, reconstruct="", composition="auto", **more)
     return solver(compile_spec(variant.overridden(order=order, scheme="gauss", tangent=True)), target)
 
 
 def defect(method, x, h, poisson):
-    """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ|, where tangents are exact to round-off."""
+    """Return the largest entry of DΦ π DΦᵀ − π∘Φ relative to that of π∘Φ. DΦ is exact to round-off."""
     following, tangent = method.step_tangent(x, h)
     after = poisson(following)
     return np.abs(tangent @ poisson(x) @ tangent.T - after).max() / np.abs(after).max()
 
 
 def poisson_of(spec):
-    """π as a function of NumPy, by the entries of the spec's system."""
+    """Return π as a function of x that returns a NumPy array."""
     import sympy
 
     from phigen.geometry.system import system_from_spec
@@ -95,11 +99,12 @@ def test_written_systems_step_by_poisson_maps(name):
     moved = method.integrate(start, 0.25, 80)
     for values in moved.casimirs.values():
         assert np.ptp(values) <= 2e-13
-    # energies of a symplectic method of order 2 oscillate: they do not stay, and do not leave
+    # the energy error of a symplectic method of order 2 oscillates: it is not zero and does not grow
     assert 1e-6 < np.ptp(moved.energy) < 0.3 * (1 + np.abs(moved.energy).max())
 
 
-#: Algebras of matrices: with a form, complex, without a form, and with a skew one.
+#: Matrix algebras with their dimensions. so(5) preserves a symmetric form and sp(4) a skew one, su(3) is complex, sl(3)
+#: and gl(3) preserve no form.
 MATRICES = {"sl(3)": 8, "su(3)": 8, "sp(4)": 10, "so(5)": 10, "gl(3)": 9}
 
 
@@ -117,7 +122,9 @@ def test_matrix_algebras_step_by_poisson_maps(name):
 
 @pytest.mark.slow
 def test_algebras_without_known_matrices_step_by_poisson_maps():
-    """so(5) with factors, for which only the enveloping algebra has a quotient."""
+    """Structure constants of so(5) in a scaled basis, in which phigen does not recognise the matrices of so(5): it
+    finds a quotient of the enveloping algebra instead.
+    """
     lie, factors = named("so", 5), [1, 2, -1, 3, 1, 2, 1, -1, 3, 2]
     brackets = {
         f"x{i + 1}": {
@@ -137,7 +144,9 @@ def test_algebras_without_known_matrices_step_by_poisson_maps():
 
 
 def test_direct_step_is_no_poisson_map_and_says_so():
-    """On the rigid body at the same step the defect is far above rounding."""
+    """For the rigid body the defect DΦ π DΦᵀ − π∘Φ is far above rounding, and label and generated code say that the
+    step is no Poisson map.
+    """
     spec = replace(spec_of("rigid_body"), structure="to truncation")
     compilation = compile_spec(spec.overridden(order=4, scheme="gauss", tangent=True))
     x = np.array([0.4, -0.8, 0.5])
@@ -176,7 +185,9 @@ def test_direct_step_keeps_quadratic_casimirs():
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["numpy", "c"])
 def test_casimirs_do_not_drift(target):
-    """Over many steps that are not small Casimirs wander by rounding only."""
+    """Over many long steps the errors of Casimirs grow like the square root of the number of steps, as rounding errors
+    do.
+    """
     steps = 300 if target == "numpy" else 20_000
     method = solver(compiled("so4_manakov", 8, "gauss"), target)
     x0 = [float(v) for v in first_run(compiled("so4_manakov", 8, "gauss")).initial]
@@ -188,7 +199,9 @@ def test_casimirs_do_not_drift(target):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("order", [2, 4, 6, 8])
 def test_order_is_that_of_the_method(order):
-    """Errors on a nonlinear problem shrink by the power 2s, measured where they are far from rounding."""
+    """Errors on a nonlinear problem decrease by 2^order if the step is halved, for steps with errors far above
+    rounding.
+    """
     text, start = STARTS["shifted"]
     compilation = compile_text(f"{text}scheme: gauss\n", order)
     method = solver(compilation, "c")
@@ -219,13 +232,14 @@ def test_check_proves_what_a_step_is():
     assert any("quadratic momentum map" in s.name and s.verdict == "proved" for s in statements)
 
 
-#: A bracket that is neither constant, nor linear, nor so in logarithms.
+#: A bracket that is neither constant nor linear, and not constant in logarithms of the coordinates either.
 CURVED = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: x*y + z**2}}}\nhamiltonian: x**2 + y**2\n"
-#: The brackets {u, v} = uv of u = x + y and v = x − y, which a linear change of coordinates hides.
+#: The bracket {u, v} = uv of u = x + y and v = x − y, written in x and y: it is constant in log u and log v, but phigen
+#: does not find this linear change of coordinates.
 HIDDEN = (
     "coordinates: [x, y]\npoisson: {brackets: {x: {y: (y**2 - x**2)/2}}}\nhamiltonian: x**2 + y**4\nscheme: gauss\n"
 )
-#: A solvable Lie algebra without a star algebra that is known.
+#: A solvable Lie algebra for which phigen knows no associative algebra with an involution.
 SOLVABLE = "coordinates: [x, y, z]\npoisson: {brackets: {x: {y: y + z, z: z}}}\nhamiltonian: x**2 + y\nscheme: gauss\n"
 REFUSED = {
     "hidden logarithms": (HIDDEN, "no exact Poisson map is known", "use linear combinations"),
@@ -273,7 +287,9 @@ def test_lattices_are_refused():
 
 
 def test_verify_measures_the_defect_of_a_step_to_truncation(tmp_path):
-    """It is of one order more than the method, and nothing is required of it but that."""
+    """`phigen verify` reports the defect of a step to truncation, of one order more than the method, and requires
+    nothing else of it.
+    """
     from click.testing import CliRunner
 
     from phigen.cli import group

@@ -1,4 +1,6 @@
-"""Predictors of the stages: few sweeps in C, JavaScript and NumPy, after kicks and changes of the step size too."""
+"""Predictors of the stages: steps take few sweeps in C, JavaScript and NumPy, also after kicks and changes of the step
+size.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,13 +11,13 @@ from support import RawC, compiled, first_run, javascript, small, solver
 
 from phigen.compilation import Compilation
 
-#: Steps of a run of which all but the first are predicted.
+#: Number of steps of a run. The first step has no predictor.
 STEPS = 200
 
 
 @dataclass(frozen=True)
 class Case:
-    """A system of the corpus, solved by a Gauss method, with a start and a step."""
+    """A system of the corpus with a Gauss method, a start and a step size."""
 
     name: str
     order: int
@@ -23,26 +25,28 @@ class Case:
 
     @property
     def compilation(self) -> Compilation:
-        """The compilation, with fast C."""
+        """Compilation with the profile fast."""
         return compiled(self.name, self.order, "gauss")
 
     @property
     def x0(self) -> list[float]:
-        """The start of the first run."""
+        """Initial state of the first run of the spec."""
         return [float(v) for v in first_run(self.compilation).initial]
 
     @property
     def h(self) -> float:
-        """A multiple of the step of the first run."""
+        """Step size: a multiple of that of the first run."""
         return self.step_factor * float(first_run(self.compilation).step)
 
 
-#: Two algebras, so(4) and se(3); the steps are regular motion.
+#: Systems on so(4) and se(3) with regular motion.
 SO4, SE3 = Case("so4_manakov", 12, 4), Case("kowalevski_top", 8, 2)
 
 
 def sweeps_in_c(case: Case, sizes: Sequence[float], kick: float, compilation: Compilation) -> list[int]:
-    """Sweeps in each step of these sizes; each step but the first follows a kick of all coordinates."""
+    """Return the number of sweeps in each step, for steps of the given sizes. Before each step but the first, ``kick``
+    is added to all coordinates.
+    """
     raw, counts = RawC(compilation), [0]
     change = np.full(raw.n, kick)
     assert raw.init(case.x0) == 0
@@ -66,7 +70,7 @@ def sweeps_in_javascript(case: Case, sizes: Sequence[float], kick: float = 0.0) 
     change = f"s.kick(new Array({len(case.x0)}).fill({kick}));" if kick else ""
     body = f"const counts = []; for (const h of {list(sizes)}) {{ if (s.steps) {{ {change} }} s.step(h); "
     counts = javascript(case.compilation, f"x0: {case.x0}", body + "counts.push(s.evaluations); }", "counts")
-    return (1 + np.diff([0, *counts])).tolist()  # the first sweep of each step is not counted
+    return (1 + np.diff([0, *counts])).tolist()  # the counter leaves out the first sweep of a step
 
 
 def sweeps_in_numpy(case: Case, sizes: Sequence[float], kick: float = 0.0) -> list[int]:
@@ -95,7 +99,9 @@ TARGETS: list[Callable[..., list[int]]] = [sweeps_in_short_c, sweeps_in_fast_c, 
 
 @pytest.mark.parametrize("count", TARGETS)
 def test_steps_of_regular_motion_take_few_sweeps(count):
-    """From the state alone they take eight, or ten."""
+    """With a predictor steps take about three and eight sweeps; with the last state alone they would take eight and
+    ten.
+    """
     for case, limit in [(SO4, 3.1), (SE3, 8.0)]:
         assert np.mean(count(case, [case.h] * STEPS)) <= limit
 
@@ -109,17 +115,19 @@ def test_steps_after_kicks_are_predicted_by_the_last_step(count):
 
 @pytest.mark.parametrize("count", TARGETS)
 def test_steps_of_a_new_size_are_predicted_by_the_last_step_of_the_old_one(count):
-    """The step after that is predicted by steps of the new size only."""
+    """The first step of a new size is predicted by the last step of the old size, and the second one by steps of the
+    new size only.
+    """
     for case in SO4, SE3:
         shorter = 0.3 * case.h
         *_, first, second = count(case, [case.h] * 8 + [shorter] * 2)
         first_unpredicted, second_by_one_step = count(case, [shorter] * 2)
         assert first < first_unpredicted
-        assert second <= second_by_one_step + 1  # at another state
+        assert second <= second_by_one_step + 1  # one more, since the states differ
 
 
 def targets_and_compilations(case):
-    """Targets, with fast and short C."""
+    """Return the compilation for each target: NumPy, fast C, and short C."""
     return {"numpy": case.compilation, "c": case.compilation, "short c": small(case.compilation)}
 
 

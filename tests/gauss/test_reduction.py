@@ -1,4 +1,6 @@
-"""Gauss steps whose sweeps iterate momenta only: positions follow from these by the squared matrix of the method."""
+"""Gauss steps whose sweeps iterate momenta only: positions follow from the momenta by the square of the matrix of
+coefficients.
+"""
 
 from fractions import Fraction
 
@@ -25,7 +27,9 @@ def reduced(text):
 @pytest.mark.parametrize("precision", [DOUBLE, SINGLE])
 @pytest.mark.parametrize("stages", range(1, 9))
 def test_reduced_steps_are_exactly_symplectic(stages, precision):
-    """By the conditions of Suris for Nyström methods, ν_ij − ν_ji = τ_i − τ_j."""
+    """The rounded coefficients satisfy the conditions of Suris for symplectic Nyström methods exactly: ν_ij − ν_ji =
+    τ_i − τ_j.
+    """
     table = tableau(stages, precision)
     nu = [[Fraction(v) for v in row] for row in table.doubled]
     tau = [Fraction(t) for t in table.times]
@@ -46,7 +50,9 @@ def test_what_no_unknown_depends_on_is_not_iterated():
 
 
 def test_brackets_of_positions_exclude_reduced_sweeps_of_exact_steps():
-    """Here q1 and p1 follow from q2 and p2, and the conditions of Suris do not suffice."""
+    """With this order of coordinates q1 and p1 would follow from q2 and p2. They have a nonzero bracket, so the
+    conditions of Suris do not suffice, and all unknowns are iterated.
+    """
     text = CANONICAL.replace("q1, q2, p1, p2]\n", "q1, p1, q2, p2]\n", 1) + "order: 8\nhamiltonian: q1*q2 + p1*p2\n"
     assert reduced(text) is None
     assert reduced(CANONICAL + "order: 8\nhamiltonian: q1*q2 + p1*p2\n").followers == (0, 1)
@@ -59,7 +65,7 @@ def test_unknowns_that_depend_on_themselves_are_iterated_all():
 @pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("text", [HENON + "4", HENON + "12", HENON + "16", NAMBU])
 def test_reduced_sweeps_solve_the_equations_of_all_unknowns(text):
-    """NumPy iterates all unknowns."""
+    """C with reduced sweeps agrees with NumPy, which iterates all unknowns."""
     x = [0.3, 0.4, 0.0] if "theta" in text else [0.0, 0.1, 0.49, 0.0]
     compilation = compile_text(text)
     ends = [solver(compilation, target).integrate(x, 0.4, 50).x[-1] for target in ("c", "numpy")]

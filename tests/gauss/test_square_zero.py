@@ -1,4 +1,6 @@
-"""Functionals of a subalgebra in place of the part of a group element in a square-zero ideal: the same step."""
+"""Lie algebras with an ideal whose products vanish (square-zero): functionals on a subalgebra replace the part of a
+group element in the ideal. The step is the same, with fewer unknowns.
+"""
 
 import random
 from dataclasses import replace
@@ -18,7 +20,7 @@ from phigen.geometry.sympy_bridge import to_sympy
 from phigen.spec import loads
 from phigen.symbolic.verdict import REFUTED
 
-#: A heavy top in coordinates whose order hides the ideal, with terms of H that mix both kinds.
+#: A heavy top whose order of coordinates mixes momenta and gravity, with terms of H in which both occur.
 TOP = """coordinates: [g2, m3, g1, m1, g3, m2]
 poisson:
   brackets:
@@ -41,13 +43,15 @@ CASES = {
     "top": lambda: compile_text(TOP, 8),
     "satellite": _satellite,
 }
-#: Families and sizes of Lie algebras, with the number of unknowns.
+#: Families and sizes of Lie algebras, with the number of unknowns of a stage.
 NAMED = [("se", 3, 8), ("se", 2, 4), ("so", 4, 8), ("heisenberg", 2, 6)]
 
 
 @pytest.mark.parametrize(("family", "size", "unknowns"), NAMED)
 def test_ideals_of_named_algebras(family, size, unknowns):
-    """Motions have translations as an ideal; so(4) has none, and that of a Heisenberg algebra is not square-zero."""
+    """In se(n) the translations are a square-zero ideal. so(4) has no ideal that serves, and the ideal of a Heisenberg
+    algebra is not square-zero.
+    """
     algebra = quaternionic(named(family, size))
     ideal = square_zero_ideal(algebra)
     assert bool(ideal) == (family == "se")
@@ -61,7 +65,9 @@ def test_a_product_in_the_ideal_is_noticed():
 
 
 def test_bodies_in_several_fields_have_the_unknowns_of_one():
-    """The 12 components of G for so(3) ⋉ 2R³ become 8 unknowns."""
+    """For so(3) ⋉ 2R³, a body in two fields, the 12 components of a group element reduce to 8 unknowns, as for a body
+    in one field.
+    """
     compilation = CASES["satellite"]()
     assert [group.algebra.dimension for group in compilation.gauss.groups] == [12]
     assert compilation.program.step.unknowns == 8
@@ -69,7 +75,9 @@ def test_bodies_in_several_fields_have_the_unknowns_of_one():
 
 @pytest.mark.parametrize("name", CASES)
 def test_momenta_follow_the_equations_at_any_unknowns(name):
-    """By sympy, in exact arithmetic: the derivative of x along the field of the unknowns is π∇H, wherever they are."""
+    """The vector field of the unknowns makes the momenta x obey ẋ = π∇H at any values of the unknowns; sympy compares
+    both in exact arithmetic.
+    """
     compilation = CASES[name]()
     points, source = stage_map(compilation.discretised, compilation.gauss), random.Random(1)
     system = points.system.to_sympy()
@@ -89,7 +97,9 @@ def test_momenta_follow_the_equations_at_any_unknowns(name):
 
 @pytest.mark.parametrize("target", ["numpy", "c", "small"])
 def test_steps_are_those_of_group_elements(target, monkeypatch):
-    """Between the ends of steps as well, by increments in the frame of the end, which predict the next step."""
+    """States agree with those of steps by whole group elements, at the ends of steps and in between. In between they
+    use increments in the frame of the end of the step; these predict the next step as well.
+    """
     states = []
     for ideal in (square_zero_ideal, lambda algebra: ()):
         monkeypatch.setattr(realisation, "square_zero_ideal", ideal)

@@ -1,4 +1,6 @@
-"""Star algebras: found for Lie algebras of small rank, their axioms decided in exact arithmetic."""
+"""Star algebras (associative algebras with an involution) are found for Lie algebras of small rank, and their axioms
+are decided in exact arithmetic.
+"""
 
 import random
 from dataclasses import replace
@@ -15,7 +17,8 @@ from phigen.geometry.families import named
 from phigen.geometry.matrix_algebras import from_structure_constants
 from phigen.symbolic.expression import number, symbol
 
-#: Dimensions of the algebras: quaternions over the reals, two copies of them, dual ones; nilpotent and solvable ones.
+#: Dimension of the star algebra for each Lie algebra: quaternions, two copies of them, dual quaternions, and algebras
+#: for nilpotent and solvable Lie algebras.
 DIMENSIONS = {
     ("so", 3): 4, ("su", 2): 4, ("sl", 2): 4, ("so", 4): 8, ("se", 3): 8, ("se", 2): 4, ("heisenberg", 2): 6,
     ("aff", 1): 3, ("gl", 2): 6,
@@ -23,7 +26,7 @@ DIMENSIONS = {
 
 
 def constants(brackets):
-    """Structure constants from {(i, j): {k: number}}."""
+    """Return structure constants with expressions as entries, from {(i, j): {k: number}}."""
     structure_constants = {}
     for (i, j), row in brackets.items():
         structure_constants.setdefault(i, {})[j] = {k: number(v) for k, v in row.items()}
@@ -57,7 +60,9 @@ def test_oscillator_algebra_has_one():
 
 
 def test_change_of_basis_with_parameters():
-    """[a, b] = r·c, [b, c] = s·a, [c, a] = b/r, which is so(3) or sl(2) by the sign of s."""
+    """The brackets [a, b] = r·c, [b, c] = s·a, [c, a] = b/r with parameters r and s define so(3) or sl(2), depending on
+    the sign of s; both have one star algebra.
+    """
     r, s = symbol("r"), symbol("s")
     lie = from_structure_constants(3, {0: {1: {2: r}, 2: {1: -1 / r}}, 1: {2: {0: s}}})
     algebra = quaternionic(lie)
@@ -66,7 +71,9 @@ def test_change_of_basis_with_parameters():
 
 
 def test_algebras_of_matrices_have_one_of_matrices():
-    """so(5) keeps a form on R^5; sl(3) and motions of R^4 keep none, and act on vectors and covectors."""
+    """so(5) preserves a form on R⁵, so the star algebra is that of 5×5 matrices. sl(3) and se(4) preserve no form and act on
+    vectors and covectors.
+    """
     algebras = {name: of_matrices(named(*name)) for name in (("so", 5), ("sl", 3), ("se", 4))}
     assert {name: a and (a.dimension, a.sound) for name, a in algebras.items()} == {
         ("so", 5): (25, True),
@@ -89,14 +96,16 @@ def test_a_wrong_product_is_noticed():
 
 
 def table_of(lie):
-    """The brackets of basis elements, as lists of fractions."""
+    """Return the brackets of basis elements as lists of fractions, by pairs of indices."""
     n = range(lie.dimension)
     rows = {(i, j): lie.bracket(i, j) for i in n for j in n}
     return {at: [Fraction(row[k].value) if k in row else Fraction(0) for k in n] for at, row in rows.items()}
 
 
 def in_basis_of(lie, rows, back):
-    """The algebra in the basis with these rows, of the old basis; ``back`` is the inverse."""
+    """Return the algebra, with its centre enlarged, in a new basis. ``rows`` has the new basis vectors in the old
+    basis, and ``back`` is the inverse matrix.
+    """
     n, m = lie.dimension, len(rows)
     old = {at: [*row, *[Fraction(0)] * (m - n)] for at, row in table_of(lie).items()}
     new = {}
@@ -110,7 +119,7 @@ def in_basis_of(lie, rows, back):
 
 
 def scaled(lie, seed, centre=0):
-    """The algebra and a centre in its basis, permuted and multiplied by integers."""
+    """Return the sum of the algebra and a centre, in its old basis with vectors permuted and multiplied by integers."""
     m, source = lie.dimension + centre, random.Random(seed)
     places, factors = source.sample(range(m), m), [source.choice([1, 2, -1, 3]) for _ in range(m)]
     rows = [[Fraction(factors[i] * (places[i] == j)) for j in range(m)] for i in range(m)]
@@ -119,7 +128,7 @@ def scaled(lie, seed, centre=0):
 
 
 def rebased(lie, seed, centre=0):
-    """The algebra and a centre in a basis with random integers."""
+    """Return the sum of the algebra and a centre, in a basis with random integer coefficients."""
     m, source = lie.dimension + centre, random.Random(seed)
     rows = [[Fraction(int(i == j)) for j in range(m)] for i in range(m)]
     back = [list(row) for row in rows]
@@ -137,8 +146,9 @@ SO31 = from_structure_constants(6, constants({
     (2, 3): {4: 1}, (2, 4): {3: -1}, (3, 4): {2: -1}, (3, 5): {1: 1}, (4, 5): {0: -1},
 }))  # fmt: skip
 
-#: Members of families, with the dimension of a centre to be added (to su(n) for u(n)), and that of the star algebra: of
-#: those whose algebras are found in any basis, and of those that are found where the basis is a sparse one.
+#: Lie algebras, the dimension of a centre to be added (for instance to su(n) for u(n)), and the dimension of the star
+#: algebra. phigen finds those of `ANY_BASIS` in any basis, those of `SPARSE_BASIS` only in bases with few structure
+#: constants.
 ANY_BASIS = {
     "so(3)": (named("so", 3), 0, 4), "so(4)": (named("so", 4), 0, 8), "so(3,1)": (SO31, 0, 8),
     "sl(2)": (named("sl", 2), 0, 4), "se(3)": (named("se", 3), 0, 8), "heisenberg(2)": (named("heisenberg", 2), 0, 6),
@@ -181,5 +191,5 @@ def test_enveloping_algebras_have_their_quotient(family, size):
     quotient = enveloping(named(family, size))
     assert quotient is not None
     assert quotient.sound
-    assert enveloping(named("se", 3)) is None  # it is not simple
+    assert enveloping(named("se", 3)) is None  # se(3) is not simple
     assert enveloping(named("so", 4)) is None

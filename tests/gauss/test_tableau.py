@@ -1,4 +1,4 @@
-"""Coefficients of Gauss collocation: right to rounding, and symplectic without rounding."""
+"""Coefficients of Gauss collocation: correct to rounding, and exactly symplectic after rounding."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -21,14 +21,18 @@ def test_nodes_and_weights_are_those_of_legendre(stages):
 
 
 def test_nodes_have_more_digits_than_are_used():
-    """c = 1/2 − √3/6 of two stages, by 3 = (3 − 6c)²."""
+    """Nodes are computed with more digits than double precision: the first node for two stages, c = 1/2 − √3/6,
+    satisfies (3 − 6c)² = 3 to 50 digits.
+    """
     c = gauss_nodes(2)[0]
     assert abs((3 - 6 * c) ** 2 - 3) < Fraction(1, 10**50)
 
 
 @pytest.mark.parametrize("stages", STAGES)
 def test_mixing_is_symplectic_without_rounding(stages):
-    """μ_ij + μ_ji = 1 in exact arithmetic, and reversing the order of the stages gives the adjoint method."""
+    """The rounded coefficients satisfy μ_ij + μ_ji = 1 exactly. With the stages in reverse order they also satisfy the
+    condition of a symmetric (self-adjoint) method exactly.
+    """
     for precision, digits in ((DOUBLE, np.float64), (SINGLE, np.float32)):
         table = tableau(stages, precision)
         mu = [[Fraction(v) for v in row] for row in table.mixing]
@@ -39,7 +43,7 @@ def test_mixing_is_symplectic_without_rounding(stages):
 
 @pytest.mark.parametrize("stages", STAGES)
 def test_stages_integrate_polynomials(stages):
-    """Σ_j a_ij c_j^k = c_i^{k+1}/(k+1) for k < s."""
+    """The stages integrate polynomials of degree below s: Σ_j a_ij c_j^k = c_i^{k+1}/(k+1) for k < s."""
     method = tableau(stages)
     a = np.array(method.mixing) * method.weights
     c = np.array(method.nodes)
@@ -49,7 +53,9 @@ def test_stages_integrate_polynomials(stages):
 
 @pytest.mark.parametrize("stages", [2, 4, 8])
 def test_prediction_extrapolates_slow_signals(stages):
-    """Of f = cos(ωt) the offsets at the next step's stages follow from the last step's to a small part."""
+    """For f = cos(ωt) the increments at the stages of the next step, predicted by the values of the last step, have
+    small errors.
+    """
     method, omega = tableau(stages), 0.5
     c, b = np.array(method.nodes), np.array(method.weights)
     offsets = np.array(method.prediction) @ (b * np.cos(omega * (c - 1)))
@@ -58,7 +64,9 @@ def test_prediction_extrapolates_slow_signals(stages):
 
 @pytest.mark.parametrize("stages", STAGES)
 def test_continuation_is_exact_for_polynomials(stages):
-    """Of f = t^k with k < s, t from the end of the last step, the next step's offsets are c^{k+1}/(k+1)."""
+    """For f = t^k with k < s, and t counted from the end of the last step, the predicted increments at the stages of
+    the next step are c^{k+1}/(k+1).
+    """
     method = tableau(stages)
     c, b = np.array(method.nodes), np.array(method.weights)
     for k in range(stages):
@@ -67,7 +75,7 @@ def test_continuation_is_exact_for_polynomials(stages):
 
 
 def test_coefficients_that_are_rounded_one_by_one_are_refuted():
-    """a_ij/b_j in floating point misses the identity, and the check says so."""
+    """Coefficients a_ij/b_j that are rounded one by one violate μ_ij + μ_ji = 1, and the proof reports that."""
     from support import compiled
 
     compilation = compiled("henon_heiles", 8, "gauss")

@@ -1,4 +1,4 @@
-"""Gauss steps in all targets and profiles: equal to round-off, tangents and failures included."""
+"""Gauss steps in all targets and profiles are equal to round-off, also their tangent maps and failures."""
 
 import re
 from dataclasses import replace
@@ -25,7 +25,7 @@ STEPS = 40
 
 
 def methods(compilation):
-    """The solvers of a compilation, by target."""
+    """Return the solvers of a compilation by name: NumPy, fast C, and C of profile small."""
     return {
         "numpy": solver(compilation, "numpy"),
         "c": solver(compilation, "c"),
@@ -34,7 +34,7 @@ def methods(compilation):
 
 
 def ends(compilation, x0, h, **more):
-    """Where the solvers end after some steps, JavaScript included."""
+    """Return the final states of all solvers after `STEPS` steps, JavaScript included."""
     final_states = {name: m.integrate(x0, h, STEPS, **more).x[-1] for name, m in methods(compilation).items()}
     final_states["js"] = np.array(
         javascript(compilation, f"x0: {list(map(float, x0))}", f"s.integrate({h}, {STEPS});", "[...s.x]")
@@ -59,7 +59,9 @@ def test_targets_are_equal_to_rounding(name, order):
 
 @pytest.mark.parametrize("size", [0.0, 1e-170, 1e-160])
 def test_steps_begin_at_the_origin_and_close_to_it(size):
-    """Squares of such states underflow, and changes are relative to them; a force leads away."""
+    """Steps start at the origin or so close to it that squares of the state underflow, although changes are measured
+    relative to the state. A force drives the pendulum away.
+    """
     pendulum = FORCED.replace("time: t\n", "").replace("g*q*sin(2*t)", "g*q/1000")
     spin = (
         "coordinates: [x, y, z]\npoisson: {lie_algebra: {name: so(3)}}\nhamiltonian: x + y**2/2 + z**2\nscheme: gauss\n"
@@ -76,7 +78,9 @@ def test_steps_begin_at_the_origin_and_close_to_it(size):
 
 
 def test_time_and_forces_enter_at_the_stages():
-    """A pendulum with friction, driven: all targets are equal, and right to the order of the method."""
+    """For a driven pendulum with friction all targets are equal, and their errors are those of the order of the
+    method.
+    """
     compilation = compile_text(FORCED, 8)
     final_states = ends(compilation, [0.3, 0.4], 0.2)
     exact = solver(compile_text(FORCED, 16), "c").integrate([0.3, 0.4], 0.1, 2 * STEPS).x[-1]
@@ -102,7 +106,9 @@ def test_tangents_are_equal_and_those_of_the_step(name):
 
 @pytest.mark.parametrize("target", ["numpy", "c", "small"])
 def test_a_step_that_is_too_large_fails_soon(target):
-    """Sweeps that do not contract end the solve long before their number is used up, and leave the state."""
+    """If sweeps do not contract, the step fails long before the maximal number of sweeps, and the state is the last
+    valid one.
+    """
     method = methods(compiled("henon_heiles", 8, "gauss"))[target]
     with pytest.raises(StepError) as failed:
         method.integrate([0.1, 0.3, 0.2, 0.4], 40.0, 5)
@@ -112,7 +118,7 @@ def test_a_step_that_is_too_large_fails_soon(target):
 
 @pytest.mark.parametrize("target", ["c", "small"])
 def test_kicks_and_new_steps_forget_what_was_predicted(target):
-    """After set_state, kick and another h a solver goes on as a fresh one does."""
+    """After a kick and a change of h, a solver continues as a new solver would from the same state."""
     compilation = compiled("so4_manakov", 8, "gauss")
     method = methods(compilation)[target]
     x0 = np.array([float(v) for v in first_run(compilation).initial])
@@ -145,7 +151,9 @@ def test_steps_back_undo_steps():
 
 
 def test_gauge_shifts_the_hamiltonian_that_is_discretised():
-    """H and H − λC have the same flow: with the shift the same states to the order, from other stages."""
+    """H and H − λC have the same flow. With the gauge λ the states agree up to the error of the method, but the stages
+    differ.
+    """
     spec = spec_of("rigid_body")
     shifted = replace(spec, gauge={"C": number(1) / number(3)})
     methods_ = [
@@ -158,8 +166,7 @@ def test_gauge_shifts_the_hamiltonian_that_is_discretised():
 
 
 def test_structure_constants_may_be_parameters():
-    """Momentum maps whose coefficients depend on parameters: the same in all targets, with parameters other than the
-    defaults."""
+    """Momentum maps may depend on parameters: all targets agree, for parameters that differ from the defaults."""
     compilation = compile_text(f"{SCALED}scheme: gauss\n", 6)
     x0, more = [0.3, -0.2, 0.4], {"r": 1.5, "s": 2.5}
     states = [m.integrate(x0, 0.3, 20, **more).x[-1] for m in methods(compilation).values()]
@@ -179,12 +186,14 @@ scheme: gauss
 
 
 def gauged(text, order):
-    """The compilation of a spec as it is, with its automatic gauge."""
+    """Compile a spec without changes, with its automatic gauge."""
     return compile_spec(loads(f"phigen: 1\nname: t\n{text}").overridden(order=order))
 
 
 def test_long_steps_take_few_sweeps():
-    """By the multiple of C that gauge: auto takes from H, the predictor, and an end of sweeps at rounding."""
+    """Long steps of a stiff body take few sweeps, since `gauge: auto` subtracts a multiple of C from H, stages are
+    predicted, and sweeps end at rounding.
+    """
     compilation = gauged(STIFF, 16)
     (sweeps,) = javascript(compilation, "x0: [1, 1, 1]", "s.integrate(0.01, 200);", "[s.evaluations/200]")
     assert sweeps < 14
@@ -194,27 +203,27 @@ def test_gauge_makes_velocities_small():
     stiff, tops = gauged(STIFF, 4), compile_spec(spec_of("kowalevski_gauss"))
     (multiple,) = stiff.gauge.fixed.values()
     (value,) = substitute([multiple], {"a": number(103), "b": number(101), "c": number(4)})
-    assert value == number(Fraction(208, 6))  # C has the second derivatives 2
-    assert not tops.gauge.fixed  # those of its Casimirs are orthogonal to those of H
+    assert value == number(Fraction(208, 6))  # the Hessian of C is 2·identity
+    assert not tops.gauge.fixed  # the Hessians of its Casimirs are orthogonal to that of H
     assert not gauged(f"{STIFF}gauge: none\n", 4).gauge.fixed
 
 
 def in_single_precision(name, order):
-    """The compilation whose C computes with numbers of 32 bits."""
+    """Return a compilation whose C computes with numbers of 32 bits."""
     double = small(compiled(name, order, "gauss"))
     return replace(double, program=replace(double.program, extras=replace(double.program.extras, real="float")))
 
 
 @pytest.mark.slow
 def test_energy_does_not_drift_in_single_precision():
-    """Over 20,000 steps it wanders by some units of rounding."""
+    """In 20,000 steps in single precision the energy changes by a few rounding errors only."""
     compilation = in_single_precision("henon_heiles", 12)
     run = solver(compilation, "c").integrate([float(v) for v in first_run(compilation).initial], 0.4, 20_000, 500)
     assert np.abs(run.energy - run.energy[0]).max() <= 1e-6
 
 
 def test_coefficients_are_symplectic_in_single_precision():
-    """mu_ij + mu_ji = 1 without error, for the literals as a compiler reads them."""
+    """The coefficients in the C, as a compiler reads them in single precision, satisfy μ_ij + μ_ji = 1 exactly."""
     text = files(in_single_precision("henon_heiles", 12), "c")["henon_heiles.c"]
     rows = re.search(r"henon_heiles_mixing\[.*?\] = \{(.*?)\};", text, re.S)[1].strip().split("\n")
     mixing = [[Fraction(float(np.float32(v))) for v in re.findall(r"(-?[\d.e-]+)f", row)] for row in rows]

@@ -1,4 +1,6 @@
-"""Velocities of group elements as sums over momenta at the frame: the same as by coordinates, with fewer products."""
+"""Velocities of group elements as collected sums over momenta in the frame: the same as by coordinates, with fewer
+products.
+"""
 
 import pytest
 from support import compile_text, compiled
@@ -6,7 +8,8 @@ from support import compile_text, compiled
 from phigen.gauss.stage_map import at_unknowns, stage_map, vector_field
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Affine and other components together; shifts; a central element without a coordinate.
+#: Specs with constant and linear brackets together, with shifted momenta, and with a central element that has no
+#: coordinate.
 WRITTEN = {
     "mixed": "coordinates: [x, y, z, q, p]\nparameters: {a: 3}\n"
     "poisson: {brackets: {x: {y: z, z: -y}, y: {z: x}, q: {p: 1}}}\n"
@@ -34,5 +37,5 @@ def test_collected_velocities_are_those_by_coordinates(name):
 
 
 def test_products_of_a_stage_are_few():
-    """Sums over the frame of both copies of so(3) save products on so(4): by coordinates there are 95."""
+    """On so(4) collected sums over both copies of so(3) leave 91 products in a stage; by coordinates there are 95."""
     assert compiled("so4_manakov", 8, "gauss").program.about.operations["multiplications"] <= 91
