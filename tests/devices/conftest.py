@@ -4,14 +4,14 @@ import pytest
 
 from phigen.runtime import toolchain
 
-#: Kernels compile in a fifth of the time without optimisation, as C does in tests.
+#: Tests compile kernels of OpenCL without optimisation, in a fifth of the time.
 os.environ["PYOPENCL_BUILD_OPTIONS"] = "-cl-opt-disable"
 
 
 @pytest.fixture(autouse=True, scope="module")
 def c_without_contraction(compiled_solvers):
-    """C in which products and sums are rounded one by one, as on devices."""
+    """Compile C without fused multiply-add, so that each product and sum is rounded as on devices."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(toolchain, "TUNING_FLAGS", ("-ffp-contract=off",))
-        patch.setenv("CC", "gcc -g0")  # a command of its own: the flags that a command accepts are remembered
+        patch.setenv("CC", "gcc -g0")  # another command: the compiler flags are cached for each command
         yield

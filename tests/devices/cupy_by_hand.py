@@ -1,9 +1,10 @@
-"""The part of CuPy that phigen calls, without a card: kernels of CUDA text, compiled by g++, run on the processor.
+"""Imitation of the part of CuPy that phigen calls, for machines without a graphics card: g++ compiles the CUDA kernels,
+and the processor runs them.
 
-Argument checks are those of CuPy 14: `set` and `get` need arrays of the same type and shape, and kernels take arrays of
-the device, scalars of NumPy, and structs (arrays of size one) by value. Beyond CuPy, the number of arguments and their
-sizes are compared with the kernel, and arrays must be those of the current device. As on a card, copies to the device
-and kernels are executed in their order, but not before a `get` waits for them. NVRTC compiles the text too.
+Arguments are checked as by CuPy 14: `set` and `get` need arrays of the same type and shape, and kernels take arrays of
+the device, scalars of NumPy, and structs (arrays of size one) by value. Beyond CuPy, the number and sizes of arguments
+are compared with those of the kernel, and arrays must belong to the current device. As on a card, kernels and copies to
+the device are executed in order, but only when a `get` waits for them. If NVRTC is installed, it compiles the code too.
 """
 
 import ctypes
@@ -69,7 +70,7 @@ class CompileException(Exception):  # noqa: N818  (its name in CuPy)
 
 
 class Device:
-    """A context of a device; ``current`` are the numbers of the devices that were entered."""
+    """Context manager that selects a device. ``current`` is the stack of the numbers of the selected devices."""
 
     current = (0,)
 
@@ -84,7 +85,7 @@ class Device:
         Device.current = Device.current[:-1]
 
 
-#: Work that was passed to the devices and is not done: functions without arguments.
+#: Queue of copies and kernels that are not executed yet, as functions without arguments.
 _STREAM = []
 
 
@@ -94,7 +95,7 @@ def _finish():
 
 
 class ndarray:  # noqa: N801  (its name in CuPy)
-    """Bytes of the device; they must be copied explicitly."""
+    """Array on the device; data are copied only by `set` and `get`."""
 
     def __init__(self, host, device):
         self.host, self.dtype, self.shape, self.device = host, host.dtype, host.shape, device
@@ -125,12 +126,12 @@ class ndarray:  # noqa: N801  (its name in CuPy)
 
 def empty(shape, dtype=float, order="C"):
     host = np.empty(shape, dtype)
-    host.view(np.uint8)[...] = 0xAA  # no kernel may rely on zeros
+    host.view(np.uint8)[...] = 0xAA  # memory of a device is not zero at first
     return ndarray(host, Device.current[-1])
 
 
 class RawKernel:
-    """A kernel of a module; ``launched`` are the numbers of the devices of launches."""
+    """Kernel of a module. ``launched`` lists the device number of each launch."""
 
     launched: ClassVar = []
 
@@ -162,7 +163,7 @@ def _passed(argument):
 
 
 class RawModule:
-    """A compiled text."""
+    """Module compiled from CUDA code."""
 
     def __init__(self, code=None, *, path=None, options=(), backend="nvrtc", **others):
         assert not others

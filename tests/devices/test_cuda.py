@@ -1,4 +1,4 @@
-"""Generated code as CUDA, by NVIDIA's compilers: they need no card."""
+"""Generated code compiled as CUDA by NVIDIA's compilers, which need no graphics card."""
 
 import nvrtc
 import pytest
@@ -11,7 +11,7 @@ pytestmark = pytest.mark.skipif(not nvrtc.is_installed(), reason="the wheels of 
 
 
 def resources_of(name, architecture, folder, order=None, *options):
-    """The resources of the kernel of ensembles."""
+    """Compile the device code of a system and return the resources of its ensemble kernel."""
     (text,) = emit(compilation_of(name, order=order, profile="small").program, "device", COMMAND).values()
     compiled = nvrtc.assembled(nvrtc.ptx(text, architecture, *options), architecture, folder)
     return compiled[f"{name}_ensemble_kernel"]
@@ -48,7 +48,9 @@ def test_small_systems_stay_in_registers(name, architecture, tmp_path):
 @pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("architecture", nvrtc.ARCHITECTURES)
 def test_four_blocks_of_a_rigid_body_fit_into_the_registers_of_a_multiprocessor(architecture, tmp_path):
-    """With 65,536 registers; without spills. Three blocks fit by default."""
+    """With the macro BLOCKS=4, four blocks of 128 threads fit into 65,536 registers without spills. With the default,
+    only three fit.
+    """
     options = ["-Drigid_body_COMMON", "-Drigid_body_BLOCKS=4"]
     used = resources_of("rigid_body", architecture, tmp_path, 4, *options)
     assert (used.spilled, used.stack) == (0, 0)

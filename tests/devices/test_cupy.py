@@ -1,4 +1,4 @@
-"""Target cuda by CuPy, with a module in its place that runs kernels on the processor; see `cupy_by_hand`."""
+"""The target cuda, with an imitation of CuPy that runs kernels on the processor; see `cupy_by_hand`."""
 
 import sys
 
@@ -26,7 +26,7 @@ order: 2
 
 @pytest.fixture
 def cupy(monkeypatch):
-    """A module in place of CuPy."""
+    """Replace the package cupy by the imitation, and return it."""
     module = cupy_by_hand.module()
     monkeypatch.setitem(sys.modules, "cupy", module)
     monkeypatch.setattr(cuda, "_OPENED", {})
@@ -40,7 +40,9 @@ def both(source):
 
 @pytest.mark.slow
 def test_members_have_the_bits_of_c(cupy):
-    """With common coefficients, which are passed by value, and with coefficients, parameters and steps of their own."""
+    """Members agree bit by bit with C: with coefficients that all members share, passed by value, and with different
+    parameters and steps.
+    """
     device, c = both(compile_text(BODY))
     assert repr(device.device) == "<CUDA device: Emulated card, 1024 MiB>"
     x0 = np.random.default_rng(2).standard_normal((300, 3)) + 1
@@ -79,7 +81,7 @@ def test_faults_of_a_card_are_reported_and_lose_no_members(cupy, monkeypatch):
 
     monkeypatch.setattr(cupy_by_hand.RawKernel, "__call__", launch)
     np.testing.assert_array_equal(device.ensemble(x0, 0.1, 5), expected)
-    assert launches == [(1,)] * 7  # the coefficients, all members, half of them, and four quarters
+    assert launches == [(1,)] * 7  # launches: coefficients, all members, one half, four quarters
     launches.clear()
     failing += [cupy_by_hand.CUDADriverError("CUDA_ERROR_ILLEGAL_ADDRESS: an illegal memory access")]
     with pytest.raises(
@@ -108,7 +110,7 @@ def test_a_second_card_has_arrays_and_kernels_of_its_own(monkeypatch):
         solver = phigen.compile(compilation, "cuda", profile="small", device=index)
         cupy_by_hand.RawKernel.launched.clear()
         np.testing.assert_array_equal(solver.ensemble(x0, 0.1, 5), expected)
-        assert cupy_by_hand.RawKernel.launched == [index] * 2  # the coefficients, and the members
+        assert cupy_by_hand.RawKernel.launched == [index] * 2  # one launch for coefficients, one for members
     with pytest.raises(
         TypeError, match="device is '1', but must be a number; the devices of CUDA are 0: Emulated card"
     ):
@@ -116,7 +118,7 @@ def test_a_second_card_has_arrays_and_kernels_of_its_own(monkeypatch):
 
 
 def test_without_nvrtc_the_error_says_what_to_install(cupy, monkeypatch):
-    """CuPy finds the library when it compiles for the first time."""
+    """CuPy loads NVRTC at the first compilation; if that fails, the error names the package to install."""
 
     def absent(module):
         raise RuntimeError('Failure finding "libnvrtc.so.12"')
@@ -156,7 +158,9 @@ def test_without_its_package_the_target_says_what_to_install(monkeypatch):
 
 
 def test_the_module_in_place_of_cupy_has_its_signatures():
-    """Those of the installed package, which can be imported without a card."""
+    """The functions of the imitation have the signatures of the installed CuPy, which can be imported without a
+    graphics card.
+    """
     real = pytest.importorskip("cupy")
     signatures = {
         real.RawModule: "RawModule(str code=None, *, str path=None, tuple options=(), str backend='nvrtc'",

@@ -1,4 +1,4 @@
-"""Address spaces of generated code for devices, without a driver."""
+"""Address spaces in the generated code for devices; these tests need no driver."""
 
 import re
 
@@ -9,7 +9,7 @@ from systems import as_given, slow_but, small
 from phigen.compiler import emit
 from phigen.targets.device.dialect import DEVICES_ONLY, qualified
 
-#: Of each kind of step, of time, noise and a monitor.
+#: Systems: one for each kind of step, with time, with noise and with a monitor, and a lattice.
 KINDS = (
     *("pendulum_euler", "lotka_volterra", "kepler_eccentric", "nambu_pendulum", "kowalevski_gauss"),
     *("seasonal_predator_prey", "thermal_spin", "fput"),
@@ -19,7 +19,9 @@ CORPUS = (*KINDS, "comet_jupiter", "kepler", "satellite", "food_web", "kdv", "ti
 
 @pytest.mark.parametrize("name", slow_but(KINDS, dict.fromkeys(CORPUS)))
 def test_all_objects_of_a_file_have_an_address_space(name):
-    """Emission raises `ValueError` for others; functions are spelt as functions, and tables as tables."""
+    """In the generated code each function has the qualifier of functions, and each table that of constants. Emission
+    raises `ValueError` for other objects at file scope.
+    """
     (text,) = emit(small(as_given(name)).program, "device", COMMAND).values()
     assert "PHI_" not in text
     objects = text[text.index(DEVICES_ONLY) :]
@@ -59,7 +61,9 @@ order: 2
 
 @pytest.mark.parametrize("real", ["", "real: float\n"])
 def test_no_phrase_of_the_runtime_is_left_in_functions_of_lattices(real):
-    """Those of implicit steps of spins have local tables, and loops that are unrolled."""
+    """No macro of the C runtime (PHI_…) is left in the code of implicit steps of spins, which has local tables and
+    unrolled loops.
+    """
     (text,) = emit(compile_text(SPINS + real).program, "device", COMMAND).values()
     assert "t_phi0" in text
     assert "PHI_" not in text

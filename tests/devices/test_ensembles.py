@@ -1,4 +1,4 @@
-"""Ensembles on devices, by OpenCL on the processor, against C."""
+"""Ensembles on devices, run by OpenCL on the processor and compared with C."""
 
 import math
 import pickle
@@ -23,7 +23,7 @@ from phigen.targets.device.registers import spilling
 
 pytest.importorskip("pyopencl")
 
-#: Functions that libraries round in their own ways; all else has the same bits everywhere.
+#: Functions whose last bits depend on the mathematical library; all other operations give the same bits everywhere.
 TRANSCENDENTAL = {"exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "atan", "anomaly"}
 
 CORPUS = sorted(path.stem for path in resources.bundled_specs().glob("*.yaml"))
@@ -36,7 +36,8 @@ hamiltonian: (x1**2/I1 + x2**2/I2 + x3**2/3)/2
 casimirs: {C: x1**2 + x2**2 + x3**2}
 order: 2
 """
-#: Of each kind of step, of time, of noise, and of a monitor: the others need --corpus.
+#: Systems for quick tests. `LONGER` has one for each kind of step, with time, with noise and with a monitor; the rest
+#: of the corpus needs --corpus.
 QUICK = ("pendulum_euler",)
 LONGER = (
     "kepler_eccentric",
@@ -55,7 +56,7 @@ def cases():
 
 
 def both(source):
-    """The solvers of a source by OpenCL and by C, whose steps are the same."""
+    """Return the solvers of a system in OpenCL and in C, both with the profile small."""
     compilation = compilation_of(source, profile="small")
     return [phigen.compile(compilation, target, profile="small") for target in ("opencl", "c")]
 
@@ -68,7 +69,9 @@ def starts(name, members):
 
 @pytest.mark.parametrize("name", [*cases()])
 def test_members_are_those_of_c(name):
-    """Bit by bit without functions of a library; noise by the same numbers."""
+    """Members agree with C, bit by bit if the system calls no function of `TRANSCENDENTAL` and has no noise. With noise
+    both draw the same random numbers.
+    """
     device, c = both(name)
     x0, h = starts(name, 5)
     drawn = {"seed": 7} if c.interface.noise else {}
@@ -128,7 +131,9 @@ def test_bits_do_not_depend_on_the_size_of_work_groups(body, x0, size):
 
 
 def test_work_groups_are_smaller_where_shared_memory_is_little(body, x0, monkeypatch):
-    """A predictor of the body has 216 bytes, so that 20 kB are enough for 92 members."""
+    """The predictor of a member takes 216 bytes of shared memory, so 20 kB suffice for 92 members, and groups of 64 are
+    chosen.
+    """
     device, _ = body
     again = pickle.loads(pickle.dumps(device))
     assert again.backend._group() == {}
@@ -139,7 +144,9 @@ def test_work_groups_are_smaller_where_shared_memory_is_little(body, x0, monkeyp
 
 @pytest.mark.slow
 def test_work_groups_are_no_larger_than_a_device_can_run(x0, monkeypatch):
-    """Of members with and without predictors in shared memory, and of lattices."""
+    """Groups have at most the size that the device allows: for ensembles with and without predictors in shared memory,
+    and for lattices.
+    """
     device, compiled = opencl.device(), []
     build = device.compiled
     monkeypatch.setattr(device, "group", 40)
@@ -186,7 +193,7 @@ def test_a_launch_without_memory_is_divided(body, x0, monkeypatch):
 
     monkeypatch.setattr(device.device, "launch", limited)
     np.testing.assert_array_equal(device.ensemble(x0, 0.1, 20), expected)
-    assert sizes == [1, 100, 50, 50]  # one work item computes the coefficients
+    assert sizes == [1, 100, 50, 50]  # first one work item for the coefficients
 
 
 def test_a_lost_device_leaves_the_members_that_are_done(body, x0, monkeypatch):
@@ -195,7 +202,7 @@ def test_a_lost_device_leaves_the_members_that_are_done(body, x0, monkeypatch):
 
     def lost(*arguments):
         launches.append(arguments)
-        if len(launches) > 2:  # the coefficients, and the first batch
+        if len(launches) > 2:  # the coefficients and the first batch succeed
             raise DeviceError("the device was lost")
         launch(*arguments)
 
@@ -240,7 +247,7 @@ def test_an_array_that_exceeds_the_memory_of_the_device_is_one():
     ],
 )
 def test_sizes_of_kernels_are_those_of_the_generated_code(name, options):
-    """The numbers of the interface and the constants in the header have the same sources."""
+    """The sizes in the Python interface equal the constants in the generated code, since they have the same sources."""
     program = compilation_of(name, profile="small", **options).program
     (text,) = emit(program, "device", "phigen build").values()
 
@@ -257,7 +264,7 @@ def test_sizes_of_kernels_are_those_of_the_generated_code(name, options):
 
 
 def test_steps_that_a_card_runs_slowly_are_warned_of(body, x0, monkeypatch):
-    """By what the driver tells of the kernel."""
+    """A warning appears if the driver reports that the kernel uses memory besides registers."""
     device, _ = body
     again = pickle.loads(pickle.dumps(device))
     monkeypatch.setattr(again.device, "is_card", True)
@@ -269,7 +276,9 @@ def test_steps_that_a_card_runs_slowly_are_warned_of(body, x0, monkeypatch):
 
 
 def test_files_say_which_steps_spill_registers():
-    """By what the compiler of CUDA measured: see docs/devices.md."""
+    """The header of the generated code names steps that spill registers, by measurements with the CUDA compiler; see
+    docs/devices.md.
+    """
     (text,) = emit(compilation_of("kepler", order=6, profile="small").program, "device", "phigen build").values()
     note = (
         "the steps of kepler (4 coordinates, 118 coefficients) need more registers than cards have (kepler of order 6"

@@ -1,4 +1,6 @@
-"""The host programs of docs/devices: that of OpenCL runs on the processor, those of CUDA and HIP are compiled."""
+"""The host programs of docs/devices: the program for OpenCL runs on the processor, and those for CUDA and HIP are
+compiled.
+"""
 
 from pathlib import Path
 
@@ -23,7 +25,9 @@ def header(tmp_path_factory):
 
 @pytest.mark.slow
 def test_program_for_opencl_computes_the_members_of_c(header, tmp_path):
-    """With the loader and the driver of the wheels; the loader needs the first variable not to be absent."""
+    """The program for OpenCL computes the same members as C. It uses the OpenCL loader and driver of the Python wheels.
+    The loader needs the environment variable PYOPENCL_HOME, which may be empty.
+    """
     folder = Path(pytest.importorskip("pyopencl").__file__).parent / ".libs"
     loaders = list(folder.glob("libOpenCL-*"))
     if not loaders:
@@ -47,7 +51,7 @@ def test_program_for_opencl_computes_the_members_of_c(header, tmp_path):
     ("language", "options"), [("cuda", ["-nocudainc", "-nocudalib"]), ("hip", ["-nogpuinc", "-nogpulib"])]
 )
 def test_program_for_cuda_and_hip_compiles(language, options, header, tmp_path):
-    """The host's half, by clang; the kernel is compiled by test_cuda.py and test_hip.py."""
+    """Clang compiles the host part of the program; test_cuda.py and test_hip.py compile the kernels."""
     options = [
         *options,
         "--cuda-host-only",

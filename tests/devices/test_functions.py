@@ -1,4 +1,6 @@
-"""Functions of φ on devices, which call no tangent of the library, by OpenCL on the processor."""
+"""The function φ(s) = (1 − w cot w)/s, w = √s/2, and derivatives on devices, run by OpenCL on the processor; the code
+calls no tangent of the library.
+"""
 
 import mpmath
 import numpy as np
@@ -51,15 +53,17 @@ def test_functions_of_phi_are_accurate_up_to_the_limit_of_their_range(real):
     with mpmath.workdps(40):
         for value, row in zip(points, out, strict=False):
             w = mpmath.sqrt(abs(value)) / 2
-            condition = 1 + (abs(w / mpmath.sin(w)) if value > 16 else 0)  # of the cotangent: large near its poles
-            for order, term in ((0, 0), (1, 0.125 / abs(value))):  # the closed form of the derivative has a term 1/8s
+            condition = 1 + (abs(w / mpmath.sin(w)) if value > 16 else 0)  # condition number of cot
+            for order, term in ((0, 0), (1, 0.125 / abs(value))):  # φ′ has a term 1/(8s)
                 expected = special.precisely(mpmath.mp, order, mpmath.mpf(float(value)))
                 bound = 40 * condition ** (order + 1) * abs(expected) + 4 * term
                 assert abs(row[order] - expected) < np.finfo(kind).eps * bound
 
 
 def test_members_beyond_the_range_have_a_status():
-    """A body that rotates about an axis by 10⁸ radians a step: C makes the step, devices report the member."""
+    """A member that rotates by 10⁸ radians in a step is beyond the range of φ on devices: C makes the step, and devices
+    report the member as failed.
+    """
     compilation = compile_text(BODY)
     device, c = (phigen.compile(compilation, target, profile="small") for target in ("opencl", "c"))
     x0 = np.array([[0.0, 0, 1], [0, 0, 1e9], [0.0, 0, 2]])

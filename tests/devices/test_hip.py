@@ -1,4 +1,4 @@
-"""Generated code as HIP, by clang, without the libraries of ROCm: it compiles to the assembly of a card."""
+"""Generated code compiled as HIP by clang to the assembly of a graphics card, without the libraries of ROCm."""
 
 from pathlib import Path
 

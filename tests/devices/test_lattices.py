@@ -1,4 +1,4 @@
-"""Lattices on devices, by OpenCL on the processor, against C."""
+"""Lattices on devices, run by OpenCL on the processor and compared with C."""
 
 import numpy as np
 import nvrtc
@@ -37,7 +37,9 @@ def both(source):
 
 
 def beginning(name, interface):
-    """A random state, a step, parameters at sites, and random numbers."""
+    """Return a start for a lattice: a random state, the step size, and the other arguments (random parameters at sites,
+    and a seed if there is noise).
+    """
     rng, run = np.random.default_rng(0), next(iter(spec_of(name).runs.values()))
     if interface.graph or interface.pairs:
         start = start_of(spec_of(name), run)
@@ -59,7 +61,7 @@ def test_fields_are_those_of_c(name):
 
 
 def of_group_size(device, size):
-    """The same solver with another number of work items in a group."""
+    """Return the solver with another number of work items in a group."""
     files, interface = device.backend._files, device.interface
     other = DeviceLattice(files, interface, "opencl", {f"{interface.name}_GROUP": size})
     return LatticeSolver(other, interface, device.spec)
@@ -134,7 +136,9 @@ hamiltonian: p**2/2 + (q[i+1]-q)**2/2 + (q[i+1]-q)**3/12
 
 @pytest.mark.slow
 def test_compensated_sums_of_floats_are_those_of_c(tmp_path):
-    """Their energy drifts no further, and a resumed run has the bits of one that was not interrupted."""
+    """In single precision with compensated sums, states on devices are close to those of C, energy drifts no more than
+    in C, and a resumed run has the same bits as an uninterrupted one.
+    """
     device, c = both(loads(CHAIN + "real: float\nsolver: {compensated: true}\n"))
     x = 0.3 * np.random.default_rng(0).standard_normal((2, 32))
     ours, theirs = (solver.integrate(x, 0.05, 600, stride=60) for solver in (device, c))
@@ -198,7 +202,7 @@ def test_steps_equal_in_tau_keep_clock_and_state_of_failed_and_resumed_runs(monk
         session.advance(h, 1)
     np.testing.assert_array_equal(session.state(), state)
     assert session.time() == elapsed
-    with pytest.raises(BackendError, match="BAD_ARGUMENT"):  # a single body: its potential energy is not negative
+    with pytest.raises(BackendError, match="BAD_ARGUMENT"):  # a single body has no negative potential energy
         device.backend.start(x[:, :1], {"m": more["m"][:1]})
 
 

@@ -1,4 +1,4 @@
-"""Linear equations on devices: elimination with pivots by selection, compiled as C."""
+"""Linear equations on devices: Gaussian elimination with pivots by selection; the code is compiled as C."""
 
 import ctypes
 
@@ -17,7 +17,9 @@ int solve(double *matrix, double *side) { return phi_solve(matrix, side); }
 
 
 def test_equations_whose_pivots_are_zero_or_small_are_solved(tmp_path):
-    """Random permutations of triangular matrices, with small pivots on their diagonals; and a singular matrix."""
+    """Solve random row permutations of triangular matrices, in which some entries are 0 or 1e-12, so that pivoting is
+    needed; a singular matrix is reported.
+    """
     write(tmp_path, {"solve.c": PROGRAM, "model.h": ""})
     runtime = resources.templates() / "c/runtime"
     flags = ["-std=c99", "-shared", "-fPIC", "-O1", "-I", ".", "-I", runtime, "solve.c", "-o", "solve.so"]

@@ -1,4 +1,4 @@
-"""Ensembles in single precision on devices, against C."""
+"""Ensembles in single precision on devices, compared with C."""
 
 import re
 
@@ -27,7 +27,9 @@ real: float
     "scheme", [pytest.param("series", marks=pytest.mark.slow), pytest.param("splitting", marks=pytest.mark.slow)]
 )
 def test_members_have_the_bits_of_c_and_its_casimirs(scheme, tmp_path):
-    """By compensated sums: 500 steps change a Casimir by a few roundings of floats."""
+    """Members agree with C bit by bit. Thanks to compensated sums, 500 steps change a Casimir by a few rounding errors
+    only.
+    """
     compilation = compile_text(f"{BODY}order: 2\nscheme: {scheme}\n")
     device, c = (phigen.compile(compilation, target, profile="small") for target in ("opencl", "c"))
     x0 = np.random.default_rng(2).standard_normal((20, 3)) + 1

@@ -90,7 +90,7 @@ def test_states_on_the_axes_have_frames(start):
 
 
 def test_other_coordinates_are_right_where_momenta_vanish():
-    """At zero momentum the frame F has |F|² = 0. The scale by which changes of the other coordinates are measured does not
+    """At zero momentum the frame F has |F|² = 0. The scale by which changes of other coordinates are measured does not
     depend on |F|².
     """
     make, h = CASES["mixed"]

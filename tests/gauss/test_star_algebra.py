@@ -71,8 +71,8 @@ def test_change_of_basis_with_parameters():
 
 
 def test_algebras_of_matrices_have_one_of_matrices():
-    """so(5) preserves a form on R⁵, so the star algebra is that of 5×5 matrices. sl(3) and se(4) preserve no form and act on
-    vectors and covectors.
+    """so(5) preserves a form on R⁵, so the star algebra is that of 5×5 matrices. sl(3) and se(4) preserve no form and
+    act on vectors and covectors.
     """
     algebras = {name: of_matrices(named(*name)) for name in (("so", 5), ("sl", 3), ("se", 4))}
     assert {name: a and (a.dimension, a.sound) for name, a in algebras.items()} == {
