@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 30c0e6e0e4262726382b8a9cfc0986f5ef8bd1b1fb7a308f2df1363b1f3d85dd
+ * body-sha256: e9b87de690b54a53353aace70bc4632fe5f6ea1bbb12e86b5b2131915fc74c96
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -47,8 +47,8 @@ const FRACTIONS = [1.0];
 const MIDDLES = [0.5];
 
 /**
- * The number of coefficients that depend on parameters and step size only. After them come those that also
- * depend on the time.
+ * Number of coefficients that depend on parameters and step size only; they are followed by the coefficients
+ * that also depend on the time.
  */
 const PREPARED = 22;
 
@@ -58,7 +58,7 @@ const COEFFICIENTS = 33;
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** Largest accepted error, relative to y. */
+/** Largest accepted error of the solution y of a stage, relative to y. */
 const TOLERANCE = 1e-20;
 
 /** Everything that depends on parameters and step size only. */
@@ -227,7 +227,7 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -247,7 +247,7 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
-// Parts of some systems only:
+// Modules that only some systems need:
 
 // ---- The solver ----
 
@@ -305,7 +305,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h, from which the time is counted. */
+  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -377,7 +377,7 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // some may be undefined
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -430,7 +430,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Replace the state by x with the rounding error carry. */
+  /** Replace the state by x, with carry as the compensation term. */
   #place(x, carry) {
     shiftHistory(this, x);
     this.x.set(x);
@@ -475,7 +475,7 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x and its time or at given ones. */
+  /** The Hamiltonian; x and t are the present state and time by default. */
   hamiltonian(x = this.x, t = this.t) {
     energyAt(this.params, t, x, number);
     return number[0];
@@ -488,7 +488,7 @@ export class Solver {
     return out;
   }
 
-  /** The vector field dx/dt, at x and its time or at given ones. */
+  /** The vector field dx/dt; x and t are the present state and time by default. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorFieldAt(this.params, t, x, out);
@@ -521,21 +521,21 @@ function prepareProbe(params, table) {
   prepare(params, PROBE_STEP, table);
 }
 
-/** Return a table of coefficients for each stage. */
+/** Return an array of coefficients, all 0, for each stage of a step. */
 function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
-/** Names of the fields that a step changes. */
+/** Names of the fields of a solver that a step changes. */
 const SAVED = ["x", "carry", "t"];
 
-/** Return copies of the fields that a step changes. */
+/** Return copies of the fields of a solver that a step changes. */
 function savedState(solver) {
   const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
   return Object.fromEntries(copies);
 }
 
-/** Restore the fields that a step changes from copies. */
+/** Restore the fields of a solver that a step changes, from copies. */
 function restoreState(solver, copies) {
   for (const [name, value] of Object.entries(copies)) {
     if (value.slice) solver[name].set(value);
@@ -546,8 +546,8 @@ function restoreState(solver, copies) {
 // ---- The implicit step, by Newton's method ----
 
 /**
- * The largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|; NaN or infinity if a correction
- * is.
+ * Relative size of a correction of y: the largest ratio of |correction_i| to |y_i| + FLOOR times the largest
+ * |y_j|; NaN or infinite if a component of the correction is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -625,7 +625,7 @@ function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Shift the predictors of all stages by the change of the state of a solver to x. */
+/** Shift the predictors of all stages, when the state of a solver changes to x. */
 function shiftHistory(solver, x) {
   for (const history of solver.history) history.shift(solver.x, x);
 }
@@ -638,13 +638,13 @@ function startFrom(history, x, y) {
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution and its backward differences, which extrapolate to the next solution. Affects
- * the speed only.
+ * Predictor: the last solution of a stage and its backward differences, which extrapolate to the next
+ * solution. It affects the speed only.
  */
 class History {
-  /** Number of differences that are known. */
+  /** Number of stored entries: the last solution and its differences. */
   count = 0;
-  /** Number of differences that the extrapolation adds up. */
+  /** Number of entries whose sum is the prediction. */
   order = 0;
   #difference = Array.from({ length: DIFFERENCES }, () => new Float64Array(DIM));
 
@@ -722,8 +722,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
- * equation may have solutions far away, at another energy, unrelated to the motion.
+ * Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+ * is too large may have solutions far away, at another energy, unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -779,8 +779,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state in compensated arithmetic. small holds the compensation term and other
- * small terms: rounded together with change, they would drift.
+ * Add change + small to the state by compensated summation. small holds the compensation term and other terms
+ * that are small compared with change.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change

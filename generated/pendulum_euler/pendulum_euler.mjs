@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0e6fde65623fc24526a52d381ebc65990bbfd343176a6a0644d4140b1428c5c9
+ * body-sha256: e4960d3ba835c3756bc5fe93a153e8d3f59b17e62a7c40242689a0638eba75da
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -40,7 +40,7 @@ const POSITIVE = ["g"];
 /** A step of size h is the composition of stages of these fractions of h. */
 const FRACTIONS = [1.0];
 
-/** Number of values that depend on parameters and step size only. */
+/** Number of coefficients: functions of parameters and step size. */
 const COEFFICIENTS = 2;
 
 /** Everything that depends on parameters and step size only. */
@@ -113,7 +113,7 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -133,7 +133,7 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
-// Parts of some systems only:
+// Modules that only some systems need:
 
 // ---- The solver ----
 
@@ -189,7 +189,7 @@ export class Solver {
   params;
   /** Coefficients of each stage: functions of parameters and step size. */
   coef = emptyTables();
-  /** Steps and time at the last change of h, from which the time is counted. */
+  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -257,7 +257,7 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // some may be undefined
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -310,7 +310,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Replace the state by x with the rounding error carry. */
+  /** Replace the state by x, with carry as the compensation term. */
   #place(x, carry) {
     this.x.set(x);
     this.carry.set(carry);
@@ -354,7 +354,7 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x and its time or at given ones. */
+  /** The Hamiltonian; x and t are the present state and time by default. */
   hamiltonian(x = this.x, t = this.t) {
     energyAt(this.params, t, x, number);
     return number[0];
@@ -367,7 +367,7 @@ export class Solver {
     return out;
   }
 
-  /** The vector field dx/dt, at x and its time or at given ones. */
+  /** The vector field dx/dt; x and t are the present state and time by default. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorFieldAt(this.params, t, x, out);
@@ -395,21 +395,21 @@ function prepareProbe(params, table) {
   prepare(params, PROBE_STEP, table);
 }
 
-/** Return a table of coefficients for each stage. */
+/** Return an array of coefficients, all 0, for each stage of a step. */
 function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
-/** Names of the fields that a step changes. */
+/** Names of the fields of a solver that a step changes. */
 const SAVED = ["x", "carry", "t"];
 
-/** Return copies of the fields that a step changes. */
+/** Return copies of the fields of a solver that a step changes. */
 function savedState(solver) {
   const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
   return Object.fromEntries(copies);
 }
 
-/** Restore the fields that a step changes from copies. */
+/** Restore the fields of a solver that a step changes, from copies. */
 function restoreState(solver, copies) {
   for (const [name, value] of Object.entries(copies)) {
     if (value.slice) solver[name].set(value);
@@ -421,7 +421,7 @@ function restoreState(solver, copies) {
 
 const increment = new Float64Array(DIM);
 
-/** One stage of a step, x + increment(x); returns a status. */
+/** Make one stage of a step, x + increment(x); returns a status. */
 function makeStage(solver, stage) {
   explicit(solver.coef[stage], solver.x, increment);
   solver.evaluations++;
@@ -434,8 +434,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state in compensated arithmetic. small holds the compensation term and other
- * small terms: rounded together with change, they would drift.
+ * Add change + small to the state by compensated summation. small holds the compensation term and other terms
+ * that are small compared with change.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0b9861e472e6fa41b60644b305073694e7b8841b9c22a747c37228bfde0b8af7
+ * body-sha256: b5ac073c708443feac1ad0801b123870371e9f406f84da0fee2d18ee92cc297d
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -49,16 +49,16 @@ const GAUGE = Object.freeze(["C"]);
 /** A step of size h is the composition of stages of these fractions of h. */
 const FRACTIONS = [1.0];
 
-/** Number of values that depend on parameters and step size only. */
+/** Number of coefficients: functions of parameters and step size. */
 const COEFFICIENTS = 35;
 
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** Largest accepted error, relative to y. */
+/** Largest accepted error of the solution y of a stage, relative to y. */
 const TOLERANCE = 1e-20;
 
-/** The polynomial with these coefficients, the constant first. */
+/** Value at s of the polynomial with these coefficients, the constant first. */
 function polynomial(coefficients, s) {
   return coefficients.reduceRight((value, c) => value * s + c, 0);
 }
@@ -525,7 +525,7 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -545,7 +545,7 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
-// Parts of some systems only:
+// Modules that only some systems need:
 
 // ---- The solver ----
 
@@ -605,7 +605,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h, from which the time is counted. */
+  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -677,7 +677,7 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // some may be undefined
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -730,7 +730,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Replace the state by x with the rounding error carry. */
+  /** Replace the state by x, with carry as the compensation term. */
   #place(x, carry) {
     shiftHistory(this, x);
     this.x.set(x);
@@ -776,7 +776,7 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x and its time or at given ones. */
+  /** The Hamiltonian; x and t are the present state and time by default. */
   hamiltonian(x = this.x, t = this.t) {
     energyAt(this.params, t, x, number);
     return number[0];
@@ -789,7 +789,7 @@ export class Solver {
     return out;
   }
 
-  /** The vector field dx/dt, at x and its time or at given ones. */
+  /** The vector field dx/dt; x and t are the present state and time by default. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorFieldAt(this.params, t, x, out);
@@ -817,21 +817,21 @@ function prepareProbe(params, table) {
   prepare(params, new Float64Array(GAUGE.length), PROBE_STEP, table);
 }
 
-/** Return a table of coefficients for each stage. */
+/** Return an array of coefficients, all 0, for each stage of a step. */
 function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
-/** Names of the fields that a step changes. */
+/** Names of the fields of a solver that a step changes. */
 const SAVED = ["x", "carry", "t"];
 
-/** Return copies of the fields that a step changes. */
+/** Return copies of the fields of a solver that a step changes. */
 function savedState(solver) {
   const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
   return Object.fromEntries(copies);
 }
 
-/** Restore the fields that a step changes from copies. */
+/** Restore the fields of a solver that a step changes, from copies. */
 function restoreState(solver, copies) {
   for (const [name, value] of Object.entries(copies)) {
     if (value.slice) solver[name].set(value);
@@ -842,8 +842,8 @@ function restoreState(solver, copies) {
 // ---- The implicit step, by Newton's method ----
 
 /**
- * The largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|; NaN or infinity if a correction
- * is.
+ * Relative size of a correction of y: the largest ratio of |correction_i| to |y_i| + FLOOR times the largest
+ * |y_j|; NaN or infinite if a component of the correction is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -911,7 +911,7 @@ function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Shift the predictors of all stages by the change of the state of a solver to x. */
+/** Shift the predictors of all stages, when the state of a solver changes to x. */
 function shiftHistory(solver, x) {
   for (const history of solver.history) history.shift(solver.x, x);
 }
@@ -924,13 +924,13 @@ function startFrom(history, x, y) {
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution and its backward differences, which extrapolate to the next solution. Affects
- * the speed only.
+ * Predictor: the last solution of a stage and its backward differences, which extrapolate to the next
+ * solution. It affects the speed only.
  */
 class History {
-  /** Number of differences that are known. */
+  /** Number of stored entries: the last solution and its differences. */
   count = 0;
-  /** Number of differences that the extrapolation adds up. */
+  /** Number of entries whose sum is the prediction. */
   order = 0;
   #difference = Array.from({ length: DIFFERENCES }, () => new Float64Array(DIM));
 
@@ -1008,8 +1008,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
- * equation may have solutions far away, at another energy, unrelated to the motion.
+ * Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+ * is too large may have solutions far away, at another energy, unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -1059,14 +1059,14 @@ function sizeOfNoise() {
   return 0;
 }
 
-/** Read the gauge from the options of a solver, else choose it at the initial state. */
+/** Set the gauge of a solver: from its options, or if they have none, chosen at the initial state. */
 function takeGauge(solver, { gauge }) {
   solver.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(solver.params, solver.x);
 }
 
-// ---- The choice of the gauge: multiples of Casimirs subtracted from H ----
+// ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ----
 
-/** Direction of the motion at a point, a unit vector; 0 at equilibria. */
+/** Direction of the vector field at a point, a unit vector; 0 at equilibria. */
 function direction(params, at) {
   const slope = new Float64Array(DIM);
   vectorField(params, at, slope);
@@ -1094,7 +1094,9 @@ function sampled(params, x) {
   return states;
 }
 
-/** The sum of |pi grad S_3|^2 over the samples, where S_3 is the leading error of the method. */
+/**
+ * The leading error of the method: the sum of |pi grad S_3|^2 over the samples; S_3 is its first error term.
+ */
 function gaugeError(params, gauge, samples) {
   const error = new Float64Array(DIM);
   let sum = 0;
@@ -1105,7 +1107,7 @@ function gaugeError(params, gauge, samples) {
   return sum;
 }
 
-/** Value of the error polynomial at centre + t width, by Newton's formula from forward differences. */
+/** Value of the error, a polynomial in one factor, at centre + t width, from its forward differences. */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
   for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + DEGREE / 2 - k) / (k + 1)) * error;
@@ -1113,7 +1115,7 @@ function errorOnLine(difference, t) {
 }
 
 /**
- * The shift of gauge[c], in units of width, that minimises the error, from its values on successively finer
+ * The shift of gauge[c], in units of width, that minimises the error, by a search on successively finer
  * grids.
  */
 function leastOnLine(params, gauge, c, width, samples) {
@@ -1144,9 +1146,9 @@ function leastOnLine(params, gauge, c, width, samples) {
 }
 
 /**
- * The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
- * starting from the least-squares solution of grad H = sum of multiples of grad C. Zero where a result is not
- * finite.
+ * The gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from
+ * x. Each is optimised after the other, starting from the least-squares solution of grad H = sum of gauge[c]
+ * grad C_c; 0 where a result is not finite.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x
@@ -1180,8 +1182,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state in compensated arithmetic. small holds the compensation term and other
- * small terms: rounded together with change, they would drift.
+ * Add change + small to the state by compensated summation. small holds the compensation term and other terms
+ * that are small compared with change.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c1f078bd4797ab081a98c213d7a280a91e04314b66d756bfa493396acc89b643
+ * body-sha256: 1086952c6fd9c3801dc978895618d57e3dddb258f6bfe06455cf9fae8780e8f9
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -49,7 +49,8 @@ const DEFAULT_PARAMETERS = Object.freeze({
 const POSITIVE = ["T", "damping_rate"];
 
 /**
- * The sources of noise; the numbers of increments of each in a step, and of all; the bound of normal variates.
+ * Names of the sources of noise; number of increments of each in a step, and of all together; the bound at
+ * which normal variates are truncated.
  */
 const SOURCES = Object.freeze(["bath_x", "bath_y", "bath_z"]);
 const PARTS = 1;
@@ -63,8 +64,8 @@ const FRACTIONS = [1.0];
 const MIDDLES = [0.5];
 
 /**
- * The number of coefficients that depend on parameters and step size only. After them come those that also
- * depend on the step.
+ * Number of coefficients that depend on parameters and step size only; they are followed by the coefficients
+ * that also depend on the step.
  */
 const PREPARED = 7;
 
@@ -74,10 +75,10 @@ const COEFFICIENTS = 13;
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** Largest accepted error, relative to y. */
+/** Largest accepted error of the solution y of a stage, relative to y. */
 const TOLERANCE = 1e-20;
 
-/** The polynomial with these coefficients, the constant first. */
+/** Value at s of the polynomial with these coefficients, the constant first. */
 function polynomial(coefficients, s) {
   return coefficients.reduceRight((value, c) => value * s + c, 0);
 }
@@ -324,7 +325,7 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -344,7 +345,7 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
   return solver;
 }
 
-// Parts of some systems only:
+// Modules that only some systems need:
 
 // ---- The solver ----
 
@@ -408,7 +409,7 @@ export class Solver {
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());
-  /** Steps and time at the last change of h, from which the time is counted. */
+  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -484,7 +485,7 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // some may be undefined
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -538,7 +539,7 @@ export class Solver {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Replace the state by x with the rounding error carry. */
+  /** Replace the state by x, with carry as the compensation term. */
   #place(x, carry) {
     shiftHistory(this, x);
     this.x.set(x);
@@ -584,7 +585,7 @@ export class Solver {
     return { x: ends.map(({ end }) => end), status: ends.map(({ status }) => status) };
   }
 
-  /** The Hamiltonian, at x and its time or at given ones. */
+  /** The Hamiltonian; x and t are the present state and time by default. */
   hamiltonian(x = this.x, t = this.t) {
     energyAt(this.params, t, x, number);
     return number[0];
@@ -604,7 +605,7 @@ export class Solver {
     return out;
   }
 
-  /** The vector field dx/dt, at x and its time or at given ones. */
+  /** The vector field dx/dt; x and t are the present state and time by default. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorFieldAt(this.params, t, x, out);
@@ -632,21 +633,21 @@ function prepareProbe(params, table) {
   prepare(params, PROBE_STEP, table);
 }
 
-/** Return a table of coefficients for each stage. */
+/** Return an array of coefficients, all 0, for each stage of a step. */
 function emptyTables() {
   return FRACTIONS.map(() => new Float64Array(COEFFICIENTS));
 }
 
-/** Names of the fields that a step changes. */
+/** Names of the fields of a solver that a step changes. */
 const SAVED = ["x", "carry", "t"];
 
-/** Return copies of the fields that a step changes. */
+/** Return copies of the fields of a solver that a step changes. */
 function savedState(solver) {
   const copies = SAVED.map((name) => [name, solver[name].slice ? solver[name].slice() : solver[name]]);
   return Object.fromEntries(copies);
 }
 
-/** Restore the fields that a step changes from copies. */
+/** Restore the fields of a solver that a step changes, from copies. */
 function restoreState(solver, copies) {
   for (const [name, value] of Object.entries(copies)) {
     if (value.slice) solver[name].set(value);
@@ -657,8 +658,8 @@ function restoreState(solver, copies) {
 // ---- The implicit step, by Newton's method ----
 
 /**
- * The largest ratio of a correction to |y_i| + FLOOR times the largest |y_j|; NaN or infinity if a correction
- * is.
+ * Relative size of a correction of y: the largest ratio of |correction_i| to |y_i| + FLOOR times the largest
+ * |y_j|; NaN or infinite if a component of the correction is.
  */
 function relativeSize(y, correction) {
   let norm = 0;
@@ -748,12 +749,12 @@ function philox(counter, key) {
   return [a, b, c, d];
 }
 
-/** A number in [0, 1), from 53 bits of two words. */
+/** A number in [0, 1), from 53 bits of two random words of 32 bits. */
 function unit(high, low) {
   return ((high >>> 5) * 67108864 + (low >>> 6)) * 2 ** -53;
 }
 
-/** The two words of a number of 64 bits. */
+/** The lower and the upper 32 bits of a number of 64 bits. */
 function words(number) {
   const bits = BigInt.asUintN(64, BigInt(number));
   return [Number(bits & 0xffffffffn), Number(bits >> 32n)];
@@ -768,7 +769,8 @@ function twoNormals(counter, key) {
 }
 
 /**
- * Seed, member and step0 from the options of a solver. Throws StepError for values that are not admissible.
+ * The values of seed, member and step0, which select random numbers, from the options of a solver. Throws
+ * StepError for values that are not admissible.
  */
 function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   for (const [name, value] of Object.entries({ seed, member, step0 })) {
@@ -786,7 +788,7 @@ function takeDraws(solver, options) {
 
 // ---- Noise ----
 
-/** Compute normal variates of variance 1 for a step, in pairs. */
+/** Compute normal variates of mean 0 and variance 1 for a step. */
 function normals(seed, member, step, values) {
   const [low, high] = words(step);
   for (let k = 0; k < DRAWS; k += 2) {
@@ -796,7 +798,7 @@ function normals(seed, member, step, values) {
 }
 
 /**
- * Set the increments of the noise in the next step to the given ones, else to random ones.
+ * Set the increments of the noise in the next step: to `increments`, or if this is undefined, to random ones.
  *
  * @returns {boolean} false if one is not finite, or some are missing
  */
@@ -807,13 +809,13 @@ function draw(solver, increments) {
     dw.set(increments);
   } else {
     normals(seed, member, BigInt(step0) + BigInt(steps), dw);
-    const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // so that a step of -h inverts one of h
+    const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // a step of -h inverts a step of h
     for (let k = 0; k < DRAWS; k++) dw[k] *= size;
   }
   return dw.every(Number.isFinite);
 }
 
-/** Set the increments of the noise in the next step. Throws StepError if given ones are not admissible. */
+/** Set the increments of the noise in the next step. Throws StepError if `increments` is not admissible. */
 function drawStep(solver, increments) {
   if (draw(solver, increments)) return;
   throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${increments}`);
@@ -839,7 +841,7 @@ function clearHistory(solver, stage) {
   solver.history[stage].clear();
 }
 
-/** Shift the predictors of all stages by the change of the state of a solver to x. */
+/** Shift the predictors of all stages, when the state of a solver changes to x. */
 function shiftHistory(solver, x) {
   for (const history of solver.history) history.shift(solver.x, x);
 }
@@ -852,13 +854,13 @@ function startFrom(history, x, y) {
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution and its backward differences, which extrapolate to the next solution. Affects
- * the speed only.
+ * Predictor: the last solution of a stage and its backward differences, which extrapolate to the next
+ * solution. It affects the speed only.
  */
 class History {
-  /** Number of differences that are known. */
+  /** Number of stored entries: the last solution and its differences. */
   count = 0;
-  /** Number of differences that the extrapolation adds up. */
+  /** Number of entries whose sum is the prediction. */
   order = 0;
   #difference = Array.from({ length: DIFFERENCES }, () => new Float64Array(DIM));
 
@@ -936,8 +938,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
- * equation may have solutions far away, at another energy, unrelated to the motion.
+ * Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+ * is too large may have solutions far away, at another energy, unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage
@@ -996,8 +998,8 @@ const sums = new Float64Array(DIM);
 const rests = new Float64Array(DIM);
 
 /**
- * Add change + small to the state in compensated arithmetic. small holds the compensation term and other
- * small terms: rounded together with change, they would drift.
+ * Add change + small to the state by compensated summation. small holds the compensation term and other terms
+ * that are small compared with change.
  *
  * @param {{x: Float64Array, carry: Float64Array}} state
  * @param {ArrayLike<number>} change

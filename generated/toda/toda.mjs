@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 542f42a393e1c000bde863e0260fb6cabc412480d02bf9b61b633f9000af34d1
+ * body-sha256: 482403f3ec189a29fe260499931ce5065c00db2ab1395dc717a0081a4248b720
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -28,7 +28,7 @@ const AXES = Object.freeze(["i"]);
 const COORDINATES = Object.freeze(["a", "b"]);
 const CASIMIRS = Object.freeze(["momentum", "length"]);
 
-/** The kind of each Casimir: a value at each of the "sites", or their "sum" or "product". */
+/** The kind of each Casimir: a value at each site ("sites"), or the "sum" or "product" over all sites. */
 const CASIMIR_KINDS = Object.freeze(["sum", "product"]);
 
 /**
@@ -41,15 +41,17 @@ const DEFAULT_PARAMETERS = Object.freeze({
 const POSITIVE = [];
 const AT_SITES = [];
 
-/** Along each axis: whether the ends are open, the smallest size, the number that divides all sizes. */
+/** Along each axis: whether the ends are open, the smallest size, and a number that must divide the size. */
 const OPEN = [false];
 const LEAST = [2];
 const PERIODS = [1];
 
-/** The neighbours of a site that kernels read, by their offsets along the axes. */
+/** Offsets, along the axes, of the neighbours of a site that the functions of the model read. */
 const NEAR = [[-1], [1]];
 
-/** Terms of H that open ends remove: the smallest and the largest offset of their sites along each axis. */
+/**
+ * For each kind of term of H that open ends remove, the smallest and largest offset of its sites per axis.
+ */
 const BOUNDS = [];
 
 /** Number of coefficients in a row. */
@@ -64,7 +66,7 @@ const TIMES = [0.08298440641740498, 0.2452989571842711, 0.39630980149836803, 0.6
 const SCHEDULE = [[0, 0], [1, 1], [0, 2], [1, 3], [0, 4], [1, 5], [0, 6], [1, 7], [0, 8], [1, 9], [0, 10],
   [1, 11], [0, 12]];
 
-/** The sweeps of each part of H. */
+/** For each part of H, the functions that apply its flow to all sites ("sweeps"), one after the other. */
 const FLOWS = [[sweep1], [sweep2]];
 
 /** Everything that depends on parameters and the time of a flow only. */
@@ -174,7 +176,7 @@ function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
 function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
@@ -199,7 +201,7 @@ function march(solver, h, count, makeStep = () => solver.step(h)) {
 /** The options of the constructor. */
 const OPTIONS = "x0 sizes params".split(" ");
 
-/** Compute the coefficients of a step: a row for each of TIMES. */
+/** Compute the coefficients of a step of size h, a row for each entry of TIMES. */
 function prepareStep(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
   return rows;
@@ -242,11 +244,11 @@ export class Solver {
   sites;
   /** Coefficients, functions of parameters and step size: a row for each flow or stage. */
   rows = emptyRows();
-  /** The state before a step. */
+  /** Copy of the state before the present step, which is restored if the step fails. */
   before;
   /** Predictors of steps of one size. */
   past = {};
-  /** Steps and time at the last change of h, from which the time is counted. */
+  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -274,7 +276,7 @@ export class Solver {
     return this.sites.params;
   }
 
-  /** Sites along each axis. */
+  /** Number of sites along each axis. */
   get sizes() {
     return this.sites.sizes;
   }
@@ -351,7 +353,7 @@ export class Solver {
     return march(this, h, count);
   }
 
-  /** The density of the Hamiltonian at each site, at x and its time or at given ones. */
+  /** The density of the Hamiltonian at each site; x and t are the present state and time by default. */
   density(x = this.x, t = this.t) {
     const out = new Float64Array(this.sites.count);
     this.sites.t = t;
@@ -359,13 +361,13 @@ export class Solver {
     return out;
   }
 
-  /** The Hamiltonian, at x and its time or at given ones. */
+  /** The Hamiltonian at a state and a time, by default the present ones. */
   hamiltonian(...at) {
     return sumOf(this.density(...at));
   }
 
   /**
-   * The terms of the Casimirs at each site, one Casimir after the other in the order of CASIMIRS.
+   * The contributions of each site to the Casimirs, one Casimir after the other in the order of CASIMIRS.
    * CASIMIR_KINDS says whether a Casimir is the value at each site ("sites"), their sum, or their product.
    */
   casimirs(x = this.x) {
@@ -374,7 +376,7 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H, laid out as x, at x and its time or at given ones. */
+  /** The right-hand side pi(x) grad H, laid out as x; x and t are the present state and time by default. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(x.length);
     this.sites.t = t;
@@ -383,7 +385,7 @@ export class Solver {
   }
 }
 
-/** Compute a row of coefficients. */
+/** Compute the row of coefficients of a flow over time * h. */
 function prepareRow(params, time, h, row) {
   prepare(params, time * h, row);
 }
@@ -431,7 +433,7 @@ class Sites {
     if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
     const params = Object.create(null);
     for (const [name, value] of Object.entries({ ...DEFAULT_PARAMETERS, ...overrides })) {
-      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: not an array
+      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: a single number
       const listed = typeof value === "object" && length !== undefined;
       const values = listed ? finite(value, length, name) : [value];
       if (!values.every((v) => Number.isFinite(v) && (v > 0 || !POSITIVE.includes(name)))) {
@@ -453,7 +455,7 @@ class Sites {
     }
   }
 
-  /** Position of each site along each axis. */
+  /** Position of a site along each axis. */
   #place(site) {
     const place = [];
     for (let axis = AXES.length - 1; axis >= 0; axis--) {
@@ -474,7 +476,7 @@ class Sites {
     }, 0);
   }
 
-  /** 1 if all sites from offset low to offset high exist, along each open axis, else 0. */
+  /** 1 if all neighbours of a site from offset low to high exist, along each axis, else 0. */
   #holds(site, bounds) {
     const place = this.#place(site);
     const inside = ([low, high], axis) => place[axis] + low >= 0 && place[axis] + high < this.sizes[axis];

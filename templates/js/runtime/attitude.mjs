@@ -11,7 +11,7 @@ import { ATTITUDE, ELEMENT } from "./model.mjs";
 
 const adds = new Float64Array(ELEMENT);
 
-/** Multiply the group element of a trajectory by 1 + factor, in compensated arithmetic. */
+/** Multiply the attitude of a solver by the attitude increment 1 + factor, in compensated arithmetic. */
 export function turnBy({ turned, turnedCarry }, factor) {
   turnAdds(turned, factor, adds);
   for (let i = 0; i < ELEMENT; i++) {
@@ -24,7 +24,7 @@ export function turnBy({ turned, turnedCarry }, factor) {
   normalise(turned, turnedCarry);
 }
 
-/** Start the attitude from the group element first, at the present state of the solver. */
+/** Set the attitude at the present state of the solver to the group element first. */
 export function beginAttitude(solver, first) {
   solver.firstElement = Float64Array.from(first);
   solver.turned = identityElement();
@@ -32,14 +32,14 @@ export function beginAttitude(solver, first) {
   takeTurningRate(solver);
 }
 
-/** The group element of the body: the initial one times the factors of all steps. */
+/** The group element of the attitude: the initial element times the increments of all steps. */
 export function currentElement(solver) {
   const element = new Float64Array(ELEMENT);
   multiplyAfter(firstOf(solver), solver.turned, element);
   return element;
 }
 
-/** The group element of an attitude and, if the body has one, a position that the user gives; checks both. */
+/** The group element of an attitude and, if the body has a position, of position. Throws StepError. */
 export function elementOf(steps, attitude, position) {
   const elements = [...(attitude ?? identityElement().subarray(0, ATTITUDE))];
   addPosition(elements, position);

@@ -1,6 +1,6 @@
 import { elementProduct } from "./attitude_quaternions.mjs";
 
-/** Compute first · later: later rotations, in body coordinates, are factors on the right. */
+/** Compute the product first · later: later rotations, in body coordinates, are factors on the right. */
 export function multiplyAfter(first, later, product) {
   elementProduct(first, later, product);
 }

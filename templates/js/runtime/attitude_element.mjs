@@ -1,6 +1,6 @@
 import { turn } from "./model.mjs";
 
-/** Compute the group element of a stage with solution y, minus the identity. */
+/** Compute the attitude increment of a stage with solution y, minus the identity. */
 export function factorBy(coef, y, factor) {
   turn(coef, y, factor);
 }

@@ -6,9 +6,9 @@ const smallCovector = new Float64Array(COVECTOR);
 const squared = new Float64Array(ELEMENT);
 
 /**
- * Compute exp(P) - 1 for the matrix P of a covector: exp(P/2^k) is squared k times. The last number of the
- * covector bounds the square of the norm of P. Each squaring doubles rounding errors; orthogonal matrices are
- * made orthogonal again after it.
+ * Compute exp(P) - 1 for the matrix P that the numbers covector define: exp(P/2^k) is squared k times. The
+ * last of these numbers bounds the square of the norm of P. Each squaring doubles rounding errors, so
+ * orthogonal matrices are made orthogonal again after it.
  */
 export function fromCovector(covector, element) {
   let size = covector[COVECTOR - 1];

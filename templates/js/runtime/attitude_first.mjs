@@ -1,4 +1,4 @@
-/** The group element at the start of a trajectory. */
+/** The group element of the attitude at the start of a trajectory. */
 export function firstOf(solver) {
   return solver.firstElement;
 }

@@ -4,14 +4,14 @@ import { uniformMotion } from "./attitude_rate.mjs";
 import { rateOf } from "./attitude_rate_plain.mjs";
 import { ATTITUDE, ELEMENT, TURNING } from "./model.mjs";
 
-/** Compute the rate of the rotation by the gauge, after x or the attitude has been set. */
+/** Compute the rate of the gauge rotation, after x or the attitude has been set. */
 export function takeTurningRate(solver) {
   solver.turningRate = new Float64Array(TURNING);
   rateOf(solver, solver.turningRate);
   solver.attitudeFrom = solver.t;
 }
 
-/** The initial group element times the rotation by the gauge since then. */
+/** The initial group element of the attitude times the gauge rotation since then. */
 export function firstOf({ firstElement, turningRate, t, attitudeFrom }) {
   const both = new Float64Array(ELEMENT);
   multiplyAfter(firstElement, uniformMotion(turningRate, t - attitudeFrom), both);

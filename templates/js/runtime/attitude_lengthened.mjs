@@ -1,6 +1,7 @@
 /**
- * Divide the quaternion 1 + q by its length, in place of q. If its real part is negative, its sign is changed
- * first: otherwise corrections of lengths would act in reverse.
+ * Divide the quaternion 1 + q by its length; q is overwritten. If its real part is negative, its sign is
+ * changed first, which leaves its rotation unchanged. Otherwise later corrections of the length would have
+ * the wrong sign.
  */
 export function shorten(q) {
   if (q[0] < -1) {

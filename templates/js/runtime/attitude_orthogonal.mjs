@@ -12,7 +12,7 @@ export function normalise(g, carry) {
   }
 }
 
-/** Change an element so that 1 + element, a nearly orthogonal matrix, is nearer to an orthogonal one. */
+/** Correct a matrix so that 1 + element, which is nearly orthogonal, is nearer to an orthogonal matrix. */
 export function makeOrthogonal(element) {
   normalise(identityElement().map((one, i) => one + element[i]), element);
 }

@@ -1,7 +1,7 @@
 import { moveUniformly } from "./attitude_rate_position.mjs";
 import { ELEMENT } from "./model.mjs";
 
-/** The group element of the motion with the constant rate turning for the time t. */
+/** The group element of a motion for the time t with the constant rotation rate turning. */
 export function uniformMotion(turning, t) {
   const element = new Float64Array(ELEMENT);
   const [a, b, c] = turning;

@@ -1,7 +1,7 @@
 import { fromCovector } from "./attitude_exponential.mjs";
 import { COVECTOR, ELEMENT, ROWS } from "./model.mjs";
 
-/** The group element of the motion with the constant rate turning for the time t. */
+/** The group element of a motion for the time t with the constant rate turning, which defines a matrix. */
 export function uniformMotion(turning, t) {
   const element = new Float64Array(ELEMENT);
   const covector = turning.map((value) => t * value);

@@ -1,4 +1,4 @@
-/** Compute the displacement by a rotation and a velocity that are constant for the time t. */
+/** Compute the displacement in element by a rotation rate and a velocity that are constant for the time t. */
 export function moveUniformly(element, turning, t, speed, scale) {
   const [a, b, c, u, v, w] = turning;
   const sine = speed > 0 ? Math.sin(t * speed) / speed : t;

@@ -1,4 +1,4 @@
-/** The change of the position in an element by a rotation, the quaternion (w, q[1], q[2], q[3]). */
+/** The change of the position in element when the quaternion (w, q[1], q[2], q[3]) rotates it. */
 export function rotationAdds(w, q, element) {
   const [v1, v2, v3] = element.subarray(4);
   const x = q[2] * v3 - q[3] * v2;
@@ -11,7 +11,7 @@ export function rotationAdds(w, q, element) {
   ];
 }
 
-/** Compute the position in the product of two elements. */
+/** Compute the position in the product of two group elements. */
 export function multiplyPositions(a, b, product) {
   rotationAdds(a[0], a, b).forEach((change, i) => {
     product[4 + i] = change + a[4 + i] + b[4 + i];

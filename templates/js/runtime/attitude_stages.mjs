@@ -4,7 +4,7 @@ import { ELEMENT } from "./model.mjs";
 
 const factorOfStage = new Float64Array(ELEMENT);
 
-/** Multiply the attitude by the group element of a stage; y is the solution of the stage. */
+/** Multiply the attitude of a solver by the attitude increment of a stage with solution y. */
 export function turnStage(solver, stage, y) {
   factorBy(solver.coef[stage], y, factorOfStage);
   turnBy(solver, factorOfStage);

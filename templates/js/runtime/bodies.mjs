@@ -2,12 +2,12 @@ import { StepError } from "./errors.mjs";
 import { BODY_AXES, MASS, REMAINDER } from "./model.mjs";
 import { bodiesFrom, innerMasses, relativeFrom } from "./bodies_jacobi.mjs";
 
-// ---- Relative coordinates of bodies ----
-// Flows act on relative positions and velocities. The first body has those of the centre of mass instead.
-// Jacobi: those of other bodies are relative to the centre of mass of all bodies before. Democratic
-// heliocentric: positions are relative to the first body, velocities to the centre of mass of all bodies.
+// ---- Relative coordinates of bodies ---- Flows act on relative positions and velocities; the values of the
+// first body are those of the centre of mass of all bodies. In Jacobi coordinates, those of another body are
+// relative to the centre of mass of all bodies before it. In democratic heliocentric coordinates, positions
+// are relative to the first body, and velocities to the centre of mass of all bodies.
 
-/** Compute the central masses of Kepler motions, the total mass, and the last body with mass. */
+/** Store the central masses of the Kepler motions, the total mass, and the last body with mass, in sites. */
 export function weigh(sites) {
   const m = sites.params[MASS];
   sites.mass = m.reduce((sum, mass) => sum + mass, 0);
@@ -28,13 +28,14 @@ export function expectMasses(m) {
   }
 }
 
-/** The values of field k at all sites. */
+/** The values of field k at all sites, as a part of x. */
 export function fieldOf(x, k, sites) {
   return x.subarray(k * sites.count, (k + 1) * sites.count);
 }
 
 /**
- * For the state of a solver and each tangent vector: along each axis, positions with velocities or momenta.
+ * List, for the state of a solver and for each tangent vector, along each axis, the positions of all bodies
+ * with their velocities or momenta.
  */
 function axesOf({ x, vectors = [], sites }) {
   return [x, ...vectors].flatMap((y) => BODY_AXES.map((axis) => axis.map((k) => fieldOf(y, k, sites))));
@@ -48,7 +49,7 @@ export function toRelative(solver) {
   }
 }
 
-/** Transform relative coordinates back. */
+/** Transform the state of a solver, and tangent vectors, from relative to Cartesian coordinates. */
 export function toCartesian(solver) {
   for (const [q, v] of axesOf(solver)) {
     bodiesFrom(q, v, solver.sites);

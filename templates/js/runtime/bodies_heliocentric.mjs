@@ -38,12 +38,14 @@ export function bodiesFrom(q, v, sites) {
   v[0] -= recoil;
 }
 
-/** The state, or a variation, as sums over bodies read it: unchanged. */
+/** The state, or a tangent vector, in the form that sums over pairs of bodies read: unchanged. */
 export function placed(x) {
   return x;
 }
 
-/** Store the velocity (sum of m v over all bodies but the first) / m[0], after the other sums. */
+/**
+ * Store the velocity (sum of m v over all bodies but the first) / m[0] for each axis, after the other sums.
+ */
 export function joinSums(x, sites, first) {
   BODY_AXES.forEach(([, velocity], axis) => {
     const shift = momentOf(fieldOf(x, velocity, sites), sites) / sites.params[MASS][0];

@@ -1,13 +1,13 @@
 import { BODY_AXES, MASS } from "./model.mjs";
 import { fieldOf } from "./bodies.mjs";
 
-/** The central masses of Kepler motions: for each body, its mass and that of all bodies before. */
+/** The central masses of the Kepler motions: for each body, the sum of the masses up to its own. */
 export function innerMasses(m) {
   let sum = 0;
   return m.map((mass) => (sum += mass));
 }
 
-/** Make positions and velocities relative to the centre of mass of all bodies before. */
+/** Make positions and velocities relative to the centre of mass of all bodies before each body. */
 export function relativeFrom(q, v, sites) {
   for (const y of [q, v]) {
     let centre = y[0];
@@ -31,7 +31,7 @@ export function bodiesFrom(q, v, sites) {
   }
 }
 
-/** The state, or a variation, as sums over bodies read it: positions relative to the first body. */
+/** The state, or a tangent vector, as sums over pairs of bodies read it: positions relative to the first. */
 export function placed(x, sites) {
   const m = sites.params[MASS], from = x.slice();
   for (const [position] of BODY_AXES) {
@@ -47,7 +47,9 @@ export function placed(x, sites) {
   return from;
 }
 
-/** Subtract from the acceleration of each body, in the sums, that of the centre of mass of bodies before. */
+/**
+ * Subtract from the acceleration of each body, in the sums, that of the centre of mass of all bodies before.
+ */
 export function joinSums(x, sites, first) {
   const m = sites.params[MASS];
   BODY_AXES.forEach((_, axis) => {

@@ -2,7 +2,9 @@ import { COEFFICIENTS, NEGATIVE, TANGENTS, part1Slope, part2Slope } from "./mode
 import { totalOf } from "./site_level.mjs";
 import { prepareRow } from "./rows_delayed.mjs";
 
-/** Multiply tangent vectors by the derivative of a flow over a time that depends on the state: tau / rate. */
+/**
+ * Multiply tangent vectors by the derivative of a flow over the time tau / rate; rate depends on the state.
+ */
 export function carryVectors({ params, sites, x, vectors }, part, time, rate) {
   const coef = new Float64Array(COEFFICIENTS);
   for (const v of vectors) {

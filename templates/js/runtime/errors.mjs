@@ -31,7 +31,7 @@ export function expectOptions(options, known) {
   throw new StepError("BAD_ARGUMENT", 0, `there is no option ${unknown}; options are ${known.join(", ")}`);
 }
 
-/** Copy values, which must be `length` finite numbers; throws StepError otherwise. */
+/** Copy values, which must be `length` finite numbers; else throw StepError, which names them by `what`. */
 export function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;

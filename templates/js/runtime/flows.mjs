@@ -13,7 +13,7 @@ export function makeStep(solver) {
   const { x, rows, sites } = solver;
   toRelative(solver);
   // #if NOISE
-  // flows of the noise come first and, in reverse order, last
+  // the flows of the noise begin the step, and end it in reverse order
   const back = sites.flows.length - SOURCES.length;
   let number = 0;
   // #endif

@@ -3,9 +3,9 @@ import { CLOSE_CALL, DEGREE, FIRST_REACH, GRIDS, MESH, SAMPLES } from "./gauge_s
 import { REACH_OF_GRID, SAMPLE_LENGTH, SWEEPS } from "./gauge_search.mjs";
 import { DIM, GAUGE, guide, products, vectorField } from "./model.mjs";
 
-// ---- The choice of the gauge: multiples of Casimirs subtracted from H ----
+// ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ----
 
-/** Direction of the motion at a point, a unit vector; 0 at equilibria. */
+/** Direction of the vector field at a point, a unit vector; 0 at equilibria. */
 function direction(params, at) {
   const slope = new Float64Array(DIM);
   vectorField(params, at, slope);
@@ -33,7 +33,9 @@ function sampled(params, x) {
   return states;
 }
 
-/** The sum of |pi grad S_3|^2 over the samples, where S_3 is the leading error of the method. */
+/**
+ * The leading error of the method: the sum of |pi grad S_3|^2 over the samples; S_3 is its first error term.
+ */
 function gaugeError(params, gauge, samples) {
   const error = new Float64Array(DIM);
   let sum = 0;
@@ -44,7 +46,7 @@ function gaugeError(params, gauge, samples) {
   return sum;
 }
 
-/** Value of the error polynomial at centre + t width, by Newton's formula from forward differences. */
+/** Value of the error, a polynomial in one factor, at centre + t width, from its forward differences. */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
   for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + DEGREE / 2 - k) / (k + 1)) * error;
@@ -52,7 +54,7 @@ function errorOnLine(difference, t) {
 }
 
 /**
- * The shift of gauge[c], in units of width, that minimises the error, from its values on successively finer
+ * The shift of gauge[c], in units of width, that minimises the error, by a search on successively finer
  * grids.
  */
 function leastOnLine(params, gauge, c, width, samples) {
@@ -83,9 +85,9 @@ function leastOnLine(params, gauge, c, width, samples) {
 }
 
 /**
- * The multiples that minimise the leading error along a short piece of the trajectory, one after the other,
- * starting from the least-squares solution of grad H = sum of multiples of grad C. Zero where a result is not
- * finite.
+ * The gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from
+ * x. Each is optimised after the other, starting from the least-squares solution of grad H = sum of gauge[c]
+ * grad C_c; 0 where a result is not finite.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x

@@ -1,10 +1,10 @@
 import { GAUGE, products } from "./model.mjs";
 
-// ---- The choice of the gauge: multiples of Casimirs subtracted from H ----
+// ---- The choice of the gauge: factors of Casimirs, whose multiples are subtracted from H ----
 
 /**
- * For each Casimir C the multiple c that minimises |grad H - c grad C| at the initial state; zero where it is
- * not finite.
+ * The gauge: for each Casimir C the factor c that minimises |grad H - c grad C| at x; 0 where it is not
+ * finite.
  *
  * @param {Parameters} params
  * @param {ArrayLike<number>} x

@@ -16,15 +16,15 @@ export function stages() {
   return Array.from({ length: NODES }, () => new Float64Array(UNKNOWNS));
 }
 
-/** Predictor: results of the last step, from which the next one starts. Affects the speed only. */
+/** Predictor: results of the last step, from which the next iteration starts. It affects the speed only. */
 export class History {
   /** Whether a step is stored, and whether the state was changed since that step. */
   stored = false;
   kicked = false;
-  /** Sweeps of the last step, and the factor by which their changes shrink. */
+  /** Number of sweeps of the last step, and the factor by which the changes in a sweep shrink. */
   sweeps = 2;
   rate = 0.5;
-  /** Increments of the stages of the last step, in the frame of its end; size of the last step. */
+  /** Stage increments of the last step, in the frame at its end; size of the last step. */
   increments = stages();
   h = NaN;
 
@@ -33,7 +33,7 @@ export class History {
     this.stored = false;
   }
 
-  /** Kick: increments of the last step still predict those of the next one, but do not lead to the state. */
+  /** Note that the state has changed: increments of the last step predict the next, but do not lead to x. */
   shift() {
     this.kicked = true;
   }
@@ -52,9 +52,9 @@ export function forgetSteps(solver) {
 }
 
 /**
- * Factors f_j with: collocation polynomial at a fraction of a step, minus its value at the end of the step, =
- * sum of f_j times the increment of stage j. These are integrals of Lagrange polynomials from 1 to the
- * fraction, divided by the weights, by sums of Legendre polynomials.
+ * The factors f_j of the stage increments in the collocation polynomial at a fraction of a step, minus its
+ * value at the end of the step. They are the integrals of the Lagrange polynomials from 1 to the fraction,
+ * divided by the weights; they are computed by sums of Legendre polynomials.
  */
 export function factorsAt(fraction) {
   const x = 2 * fraction - 1;
@@ -76,14 +76,14 @@ export function factorsAt(fraction) {
 
 const point = new Float64Array(POINT);
 
-/** The start of a step: the coordinates, and the time if H depends on it. */
+/** Data at the start of a step: the coordinates, and the time if H depends on it. */
 export function startOf({ x, t }) {
   point.set(x);
   if (POINT > DIM) point[DIM] = t;
   return point;
 }
 
-/** The unknowns of all stages: weighted sums of the stage increments. */
+/** Compute the unknowns z of all stages: sums of the stage increments, with weights from the matrix. */
 export function mixed(matrix, increments, z) {
   for (let i = 0; i < NODES; i++) {
     z[i].fill(0);
@@ -104,10 +104,12 @@ function slopes(solver, stage, start, z, increments) {
   }
 }
 
-/** The least normal number: smaller squares count as 0. */
+/** The smallest normal number: smaller squares count as 0. */
 const LEAST_SQUARE = 2 ** -1022;
 
-/** The largest change of an increment at any stage; of plain unknowns relative to |x|, at 0 to increments. */
+/**
+ * Largest change at any stage, of the first PLAIN unknowns relative to |x|, or to the increments if x = 0.
+ */
 function changeOf(start, before, after) {
   let norm = LEAST_SQUARE;
   for (let i = 0; i < DIM; i++) norm += start[i] * start[i];
@@ -126,15 +128,15 @@ function changeOf(start, before, after) {
   return Math.sqrt(largest);
 }
 
-/** Predictor of the stages of a step of the same size, from the increments of the last one. */
+/** Weights of the stage increments of a step in the unknowns at the stages of the next step of equal size. */
 const PREDICTION = PLACES.map((place) => factorsAt(1 + place));
 
 const predicted = stages();
 const mixedIncrements = stages();
 
 /**
- * Solve the equations of a step for increments.now by fixed-point sweeps from the prediction; returns a
- * status.
+ * Solve the equations of a step for the stage increments, increments.now, by fixed-point sweeps from the
+ * prediction; returns a status.
  */
 export function collocate(solver, stage, start, history, increments) {
   let last = Infinity;
@@ -167,7 +169,7 @@ export function collocate(solver, stage, start, history, increments) {
     const slow = rate >= 1 || rate > Math.max(STALLED, 1.5 * history.rate);
     if (rate >= 1 && change <= NEARLY_ROUNDING) rises++;
     if (solved || (slow && change <= ROUNDING) || rises > 1) {
-      // early: there were more sweeps than needed
+      // early: convergence was reached before the first measured change, or soon after it
       const early = sweep === history.sweeps || rate > 2 * history.rate;
       history.sweeps = Math.max(2, early ? history.sweeps - 1 : sweep - 1);
       return "OK";

@@ -66,7 +66,7 @@ export function linearised(coef, x, y, side, sizes, sites) {
   return scaled && scaled.map((v, k) => v * unit(k));
 }
 
-/** Solution y of a stage by Newton's method; null if there is none near x. */
+/** Solution y of a stage by Newton's method from the prediction; null if it finds none near x. */
 export function byNewton(coef, x, prediction, sites) {
   const y = Float64Array.from(prediction);
   const image = new Float64Array(y.length);

@@ -18,7 +18,7 @@ import { makeStep } from "./flows.mjs";
 /** The options of the constructor. */
 // #state lattice_names
 
-/** Compute the coefficients of a step: a row for each of TIMES. */
+/** Compute the coefficients of a step of size h, a row for each entry of TIMES. */
 function prepareStep(params, h, rows) {
   TIMES.forEach((time, k) => prepareRow(params, time, h, rows[k], k));
   return rows;
@@ -80,11 +80,11 @@ export class Solver {
   sites;
   /** Coefficients, functions of parameters and step size: a row for each flow or stage. */
   rows = emptyRows();
-  /** The state before a step. */
+  /** Copy of the state before the present step, which is restored if the step fails. */
   before;
   /** Predictors of steps of one size. */
   past = {};
-  /** Steps and time at the last change of h, from which the time is counted. */
+  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -113,7 +113,7 @@ export class Solver {
     return this.sites.params;
   }
 
-  /** Sites along each axis. */
+  /** Number of sites along each axis. */
   get sizes() {
     return this.sites.sizes;
   }
@@ -198,7 +198,7 @@ export class Solver {
     return march(this, h, count);
   }
 
-  /** The density of the Hamiltonian at each site, at x and its time or at given ones. */
+  /** The density of the Hamiltonian at each site; x and t are the present state and time by default. */
   density(x = this.x, t = this.t) {
     const out = new Float64Array(this.sites.count);
     this.sites.t = t;
@@ -206,13 +206,13 @@ export class Solver {
     return out;
   }
 
-  /** The Hamiltonian, at x and its time or at given ones. */
+  /** The Hamiltonian at a state and a time, by default the present ones. */
   hamiltonian(...at) {
     return sumOf(this.density(...at));
   }
 
   /**
-   * The terms of the Casimirs at each site, one Casimir after the other in the order of CASIMIRS.
+   * The contributions of each site to the Casimirs, one Casimir after the other in the order of CASIMIRS.
    * CASIMIR_KINDS says whether a Casimir is the value at each site ("sites"), their sum, or their product.
    */
   casimirs(x = this.x) {
@@ -223,7 +223,7 @@ export class Solver {
 
   // #members lattice_observed
   // #members lattice_observed_fields
-  /** The right-hand side pi(x) grad H, laid out as x, at x and its time or at given ones. */
+  /** The right-hand side pi(x) grad H, laid out as x; x and t are the present state and time by default. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(x.length);
     this.sites.t = t;

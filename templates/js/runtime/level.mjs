@@ -1,7 +1,7 @@
 import { StepError } from "./errors.mjs";
 import { energy, monitor } from "./model.mjs";
 
-// ---- Physical time, of steps that are equal in tau ----
+// ---- The physical time of steps that are equal in a time tau ----
 
 const one = new Float64Array(1);
 
@@ -11,7 +11,7 @@ export function chooseGauge(params, x) {
   return Float64Array.of(-one[0]);
 }
 
-/** dt/dtau at a state. */
+/** The monitor dt/dtau at the state x. */
 export function rateAt(params, x) {
   monitor(params, x, one);
   return one[0];
@@ -24,7 +24,7 @@ export function expectPassingTime(solver) {
   throw new StepError("BAD_ARGUMENT", 0, `the monitor is ${rate} at x0`);
 }
 
-/** Convert a vector field from physical time to tau. */
+/** Convert a vector field at x from dx/dt, with the physical time t, to dx/dtau. */
 export function makePerTau(params, x, field) {
   const rate = rateAt(params, x);
   for (let i = 0; i < field.length; i++) field[i] *= rate;

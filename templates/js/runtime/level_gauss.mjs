@@ -3,7 +3,7 @@ import { WEIGHTS, elapsed } from "./model.mjs";
 const timeOfNode = new Float64Array(1);
 
 /**
- * Physical time of a step with the unknowns z at its stages; NaN unless it has the sign of the step.
+ * Physical time that passes in a step with the unknowns z at its stages; NaN unless it has the sign of h.
  */
 export function timeOfStep(solver, stage, start, z) {
   let sum = 0;

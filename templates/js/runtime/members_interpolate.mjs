@@ -3,13 +3,13 @@ import { endOf, factorsAt, startOf } from "./gauss.mjs";
 import { DIM } from "./model.mjs";
 import { stageChange } from "./model.mjs";
 
-/** Members of Solver: states inside of the last step. */
+/** Members of Solver: states within the last step. */
 export class Interpolation {
   /**
    * The states at fractions of the last step, 0 at its start and 1 at its end, by the collocation polynomial.
-   * They are far less accurate than steps, and off the symplectic leaf by their error; they serve to find
-   * events. To get the state at an event as accurately as by whole steps, make a step of size (fraction - 1)
-   * h with a copy of the solver. Throws StepError before the first step, and after a change of the state.
+   * They serve to find events, are far less accurate than steps, and lie off the symplectic leaf by their
+   * error. To get the state at an event with the accuracy of steps, make a step of size (fraction - 1) h with
+   * a copy of the solver. Throws StepError before the first step, and after a change of the state.
    *
    * @param {number[]} fractions
    * @returns {Float64Array[]}

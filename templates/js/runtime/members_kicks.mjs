@@ -39,7 +39,7 @@ export class Kicks {
     return this.#place(finite(to, DIM, "the state"), carry);
   }
 
-  /** Replace the state by x with the rounding error carry. */
+  /** Replace the state by x, with carry as the compensation term. */
   #place(x, carry) {
     takeLevel(this, x);
     shiftHistory(this, x);

@@ -3,7 +3,7 @@ import { OBSERVABLES, REDUCTIONS, observables } from "./model.mjs";
 
 /** Members of Solver: the observables. */
 export class Observed {
-  /** The observables, in the order of OBSERVABLES, at x and its time or at given ones. */
+  /** The observables in the order of OBSERVABLES; x and t are the present state and time by default. */
   observables(x = this.x, t = this.t) {
     this.sites.t = t;
     return this.#reduced(x);

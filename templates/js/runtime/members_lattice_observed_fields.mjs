@@ -1,8 +1,8 @@
 import { OBSERVED_FIELDS, observedFields } from "./model.mjs";
 
-/** Members of Solver: the observables of sites. */
+/** Members of Solver: the observables that have a value at each site. */
 export class ObservedFields {
-  /** The observables of sites in the order of OBSERVED_FIELDS, at x and its time or at given ones. */
+  /** Values at all sites of OBSERVED_FIELDS, in this order; x and t are the present ones by default. */
   observedFields(x = this.x, t = this.t) {
     const out = new Float64Array(OBSERVED_FIELDS.length * this.sites.count);
     this.sites.t = t;

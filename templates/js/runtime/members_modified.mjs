@@ -5,7 +5,7 @@ const number = new Float64Array(1);
 /** Members of Solver: the modified Hamiltonian. */
 export class Modified {
   /**
-   * The Hamiltonian whose exact flow is a step of size h, up to O(h^MODIFIED_POWER), at x or a given state.
+   * Value at x of the modified Hamiltonian, whose exact flow is a step of size h up to O(h^MODIFIED_POWER).
    */
   modifiedHamiltonian(h, x = this.x) {
     modified(this.params, h, x, number);

@@ -24,7 +24,7 @@ export class Tangent {
     if (status === "OK") return tangent;
     restoreState(this, before);
     forgetSteps(this);
-    Object.assign(this, { steps, h: NaN }); // coefficients for the time after the step
+    Object.assign(this, { steps, h: NaN }); // NaN: coefficients are computed anew
     throw new StepError(status, steps);
   }
 }

@@ -5,7 +5,7 @@ import { twoNormals, words } from "./philox.mjs";
 
 // ---- Noise ----
 
-/** Compute normal variates of variance 1 for a step, in pairs. */
+/** Compute normal variates of mean 0 and variance 1 for a step. */
 function normals(seed, member, step, values) {
   const [low, high] = words(step);
   for (let k = 0; k < DRAWS; k += 2) {
@@ -15,7 +15,7 @@ function normals(seed, member, step, values) {
 }
 
 /**
- * Set the increments of the noise in the next step to the given ones, else to random ones.
+ * Set the increments of the noise in the next step: to `increments`, or if this is undefined, to random ones.
  *
  * @returns {boolean} false if one is not finite, or some are missing
  */
@@ -26,14 +26,14 @@ function draw(solver, increments) {
     dw.set(increments);
   } else {
     normals(seed, member, BigInt(step0) + BigInt(steps), dw);
-    const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // so that a step of -h inverts one of h
+    const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS); // a step of -h inverts a step of h
     for (let k = 0; k < DRAWS; k++) dw[k] *= size;
     orderDraws(dw, h);
   }
   return dw.every(Number.isFinite);
 }
 
-/** Set the increments of the noise in the next step. Throws StepError if given ones are not admissible. */
+/** Set the increments of the noise in the next step. Throws StepError if `increments` is not admissible. */
 export function drawStep(solver, increments) {
   if (draw(solver, increments)) return;
   throw new StepError("BAD_ARGUMENT", solver.steps, `the increments are ${increments}`);

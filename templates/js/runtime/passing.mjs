@@ -1,4 +1,4 @@
-/** Add the time of a stage or flow to that of a solver, in compensated arithmetic. */
+/** Add the time of a stage or flow to the physical time of a solver, in compensated arithmetic. */
 export function pass(solver, time) {
   const sum = solver.t + time;
   const added = sum - solver.t;

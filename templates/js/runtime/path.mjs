@@ -19,8 +19,8 @@ const end = new Float64Array(DIM);
 const field = new Float64Array(DIM);
 
 /**
- * Whether the slope of an expansion at its end is pi(m) p. If not, the expansion only seems to have
- * converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value.
+ * Whether the slope of the Taylor series of a path at its end m is pi(m) p. If not, the series only seems to
+ * have converged: it has gaps between its terms, as t + t^9, or extends across the kink of an absolute value.
  */
 function holds(coef, p) {
   pathField(coef, p, fixed, end, field);
@@ -33,8 +33,8 @@ function holds(coef, p) {
 }
 
 /**
- * Compute the path m(t) from start, 0 <= t <= 1, by its Taylor series: shift is m(1) - start, mean the mean
- * of m - start. Terms are added until they are negligible. Returns false if TERMS terms do not suffice.
+ * Compute the path dm/dt = pi(m) p from start, 0 <= t <= 1, by its Taylor series: shift is m(1) - start, mean
+ * the mean of m - start. Terms are added until they are negligible. Returns false if TERMS do not suffice.
  */
 function followPiece(coef, p, start, shift, mean) {
   let norm = 0;
@@ -69,8 +69,8 @@ const shift = new Float64Array(DIM);
 const local = new Float64Array(DIM);
 
 /**
- * Compute the whole path from x, in 1, 2, 4, ... pieces until each expansion converges: change is its end
- * minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x.
+ * Compute the whole path from x, in 1, 2, 4, ... pieces until the series of each piece converges: change is
+ * its end minus x, mean its mean minus x. For any p, the end of the path lies on the symplectic leaf of x.
  *
  * @returns {{good: boolean, piecesUsed: number}} good: whether the path is short enough and in the domain;
  *     piecesUsed: number of pieces computed
@@ -119,7 +119,7 @@ const other = new Float64Array(DIM);
 const unused = new Float64Array(DIM * DIM);
 
 /**
- * Compute the Jacobian of the residual by differences, for steps so large that iterations with the
+ * Compute the Jacobian of the residual by differences. It serves for steps so large that iterations with the
  * approximate Jacobian do not converge.
  */
 function differentiate(solver, coef, p, residual, jacobian) {
@@ -144,8 +144,9 @@ const change = new Float64Array(DIM);
 const jacobian = new Float64Array(DIM * DIM);
 
 /**
- * Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path; returns a
- * status. A step that needs more than MOST_PIECES pieces is too large for a meaningful solution.
+ * Solve p = grad S_h(mean of the path from x with covector p), and move x to the end of that path; S_h is the
+ * generating function. Returns a status. A step that needs more than MOST_PIECES pieces is too large for a
+ * meaningful solution.
  */
 function attempt(solver, stage) {
   const coef = solver.coef[stage];

@@ -28,12 +28,12 @@ function philox(counter, key) {
   return [a, b, c, d];
 }
 
-/** A number in [0, 1), from 53 bits of two words. */
+/** A number in [0, 1), from 53 bits of two random words of 32 bits. */
 function unit(high, low) {
   return ((high >>> 5) * 67108864 + (low >>> 6)) * 2 ** -53;
 }
 
-/** The two words of a number of 64 bits. */
+/** The lower and the upper 32 bits of a number of 64 bits. */
 export function words(number) {
   const bits = BigInt.asUintN(64, BigInt(number));
   return [Number(bits & 0xffffffffn), Number(bits >> 32n)];
@@ -48,7 +48,8 @@ export function twoNormals(counter, key) {
 }
 
 /**
- * Seed, member and step0 from the options of a solver. Throws StepError for values that are not admissible.
+ * The values of seed, member and step0, which select random numbers, from the options of a solver. Throws
+ * StepError for values that are not admissible.
  */
 export function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
   for (const [name, value] of Object.entries({ seed, member, step0 })) {

@@ -8,13 +8,13 @@ import { DIM, FRACTIONS } from "./model.mjs";
 // ---- Predictors, and the check of solutions ----
 
 /**
- * Predictor: the last solution and its backward differences, which extrapolate to the next solution. Affects
- * the speed only.
+ * Predictor: the last solution of a stage and its backward differences, which extrapolate to the next
+ * solution. It affects the speed only.
  */
 export class History {
-  /** Number of differences that are known. */
+  /** Number of stored entries: the last solution and its differences. */
   count = 0;
-  /** Number of differences that the extrapolation adds up. */
+  /** Number of entries whose sum is the prediction. */
   order = 0;
   #difference = Array.from({ length: DIFFERENCES }, () => new Float64Array(DIM));
 
@@ -92,8 +92,8 @@ const point = new Float64Array(DIM);
 const value = new Float64Array(1);
 
 /**
- * Whether an increment is plausible: short, or with a small change of energy. If a step is too large, its
- * equation may have solutions far away, at another energy, unrelated to the motion.
+ * Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
+ * is too large may have solutions far away, at another energy, unrelated to the motion.
  *
  * @param {Solver} solver
  * @param {number} stage

@@ -7,7 +7,7 @@ import { DRAWS, MOMENTS, PREPARED, SOURCES } from "./model.mjs";
  */
 export function renew(solver) {
   solver.coef[0].forEach((row, k, rows) => {
-    const late = k - (rows.length - DRAWS); // index in dw, if the flow is one of the noise after those of H
+    const late = k - (rows.length - DRAWS); // index in dw, if flow k of the noise follows those of H
     const dw = [k < SOURCES.length ? solver.dw[k] : late >= SOURCES.length ? solver.dw[late] : 0];
     refreshAt(row, solver.t + MOMENTS[k] * solver.h, dw, row.subarray(PREPARED));
   });

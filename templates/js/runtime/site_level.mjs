@@ -2,7 +2,7 @@ import { StepError } from "./errors.mjs";
 import { NEGATIVE, part1, part2 } from "./model.mjs";
 import { sumOf } from "./sites.mjs";
 
-// ---- Steps equal in tau: those of K = log(A + e) - log(-B), where H = A + B ----
+// ---- Steps equal in a time tau: those of K = log(A + e) - log(-B), where H = A + B ----
 
 /** The sum over all sites of the values that the function density computes. */
 export function totalOf(density, params, sites, ...at) {
@@ -29,7 +29,10 @@ export function beginLevel(solver) {
   throw new StepError("BAD_ARGUMENT", 0, `the part of H that must be negative is ${energy} at x0`);
 }
 
-/** A + e or -B: the flow of a part of K for a time is that of the part of H for the time divided by this. */
+/**
+ * A + e for the part log(A + e) of K, or -B for the part -log(-B). The flow of the part of K over a time
+ * equals the flow of A or B over that time divided by this value.
+ */
 export function rateOf(part, solver) {
   const energy = partEnergy(part, solver);
   return part === NEGATIVE ? -energy : energy + solver.level;

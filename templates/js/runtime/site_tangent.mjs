@@ -7,8 +7,9 @@ import { usual } from "./sweeps.mjs";
 // ---- Tangent vectors of the series ----
 
 /**
- * Multiply a tangent vector v by the derivative of a stage, in place: solve dy = S dy + side, where S is the
- * derivative of a sweep, and add the increment that dy gives. Returns false on failure.
+ * Multiply a tangent vector v by the derivative of a stage with solution y, in place. The change dy of y
+ * solves dy = S dy + side, where S is the derivative of a sweep by y and side its derivative along v; then
+ * the change of the increment due to dy is added to v. Returns false on failure.
  */
 export function carry(coef, x, y, v, sites) {
   const sizes = usual(y);

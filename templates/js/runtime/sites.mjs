@@ -64,7 +64,7 @@ export class Sites {
       return at < near || at >= this.seams[axis] - near;
     }));
     const listed = (wanted) => Int32Array.from(beside.flatMap((own, i) => (wanted(own, i) ? [i] : [])));
-    /** The sites on seams and near them; of the other sites, a list for each colour, and all of them. */
+    /** The sites in boundary seams or near them; and the other sites: a list for each colour, and all. */
     this.beside = listed((own) => own);
     this.inside = this.coloured.map((_, colour) => listed((own, i) => !own && colours[i] === colour));
     this.inside.all = listed((own) => !own);
@@ -84,7 +84,7 @@ export class Sites {
       return Array.from({ length: many ? this.colourCount : 1 }, (_, colour) => [part, colour]);
     });
     // #if TIMED
-    flows.push(null); // the time advances in place of a last flow
+    flows.push(null); // the last flow advances the time only
     // #endif
     const kinds = [flows.slice(0, 1), flows.slice(1, -1), flows.slice(-1), flows.slice(1, -1).reverse()];
     /** The flows of a step, each as [part of H, row of coefficients, colour]. */
@@ -105,7 +105,7 @@ export class Sites {
     if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
     const params = Object.create(null);
     for (const [name, value] of Object.entries({ ...DEFAULT_PARAMETERS, ...overrides })) {
-      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: not an array
+      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: a single number
       // #if GRAPH
       if (AT_BONDS.includes(name)) length = this.bondCount;
       // #endif
@@ -143,7 +143,7 @@ export class Sites {
     }
   }
 
-  /** Position of each site along each axis. */
+  /** Position of a site along each axis. */
   #place(site) {
     const place = [];
     for (let axis = AXES.length - 1; axis >= 0; axis--) {
@@ -169,8 +169,8 @@ export class Sites {
   #begins = new Map();
 
   /**
-   * A number for each site: 1 where the site at an offset has a colour and lies on exactly the seams whose
-   * bits are set in window, else 0. WANTED[number] is the pair of colour and offset.
+   * An array with 1 at sites whose neighbour at an offset has a colour and lies in exactly the boundary seams
+   * whose bits are set in window, else 0. WANTED[number] is the pair of colour and offset.
    */
   begins(number, window) {
     const key = `${number} ${window}`;
@@ -186,7 +186,7 @@ export class Sites {
   }
 
   // #endif
-  /** 1 if all sites from offset low to offset high exist, along each open axis, else 0. */
+  /** 1 if all neighbours of a site from offset low to high exist, along each axis, else 0. */
   #holds(site, bounds) {
     const place = this.#place(site);
     const inside = ([low, high], axis) => place[axis] + low >= 0 && place[axis] + high < this.sizes[axis];
@@ -209,7 +209,7 @@ export class Sites {
     // #if BY_COLOUR
     const before = Array.from({ length: this.count }, () => []);
     this.ends.a.forEach((a, k) => before[Math.max(a, this.ends.b[k])].push(Math.min(a, this.ends.b[k])));
-    /** Greedy colouring: each site takes the first colour that no earlier neighbour has. */
+    /** The colour of each site: the first one that none of its earlier neighbours by bonds has. */
     this.colours = new Int32Array(this.count);
     before.forEach((others, site) => {
       const usedColours = new Set(others.map((other) => this.colours[other]));
@@ -220,9 +220,9 @@ export class Sites {
   }
 
   /**
-   * Lists over bonds with end a or b, or over both ends ("") of all bonds: the site here at that end, the
-   * site there at the other end, and the number of the bond. With chosen = "here" or "there", only bonds
-   * whose site here or there has the colour.
+   * Lists `here`, `there` and `bond` over all bonds, seen from their ends a or b, or from both ends (""): the
+   * site at the end from which a bond is seen, the site at its opposite end, and the number of the bond. With
+   * chosen = "here" or "there", only bonds are listed whose site here or there has the colour.
    */
   bonds(end, chosen, colour) {
     const key = `${end} ${chosen} ${chosen && colour}`;

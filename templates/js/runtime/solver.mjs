@@ -7,7 +7,7 @@ import { restoreState, savedState } from "./saving.mjs";
 import { energyAt, vectorFieldAt } from "./autonomous.mjs";
 import { BEGIN, CASIMIRS, COORDINATES, DEFAULT_PARAMETERS, DIM, END, FRACTIONS } from "./model.mjs";
 import { NAME, ORDER, POSITIVE, SPEC_SHA256, VERSION, casimirs } from "./model.mjs";
-// Parts of some systems only:
+// Modules that only some systems need:
 import { clearHistory } from "./history.mjs";
 import { expectNonnegative } from "./nonnegative.mjs";
 import { drawStep } from "./noise.mjs";
@@ -62,7 +62,7 @@ export class Solver {
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
   // #state fields
-  /** Steps and time at the last change of h, from which the time is counted. */
+  /** Number of steps and time at the last change of h; the time is that time plus (further steps) h. */
   #stepsBefore = 0;
   #timeBefore = 0;
 
@@ -176,7 +176,7 @@ export class Solver {
    * @returns {Solver}
    */
   copy() {
-    const { x: x0, params, gauge, seed, member, step0 } = this; // some may be undefined
+    const { x: x0, params, gauge, seed, member, step0 } = this; // undefined where the solver lacks one
     const twin = new Solver({ x0, params, gauge, seed, member, step0 });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
@@ -206,7 +206,7 @@ export class Solver {
   // #members tangent
   // #members interpolate
   // #members ensemble
-  /** The Hamiltonian, at x and its time or at given ones. */
+  /** The Hamiltonian; x and t are the present state and time by default. */
   hamiltonian(x = this.x, t = this.t) {
     energyAt(this.params, t, x, number);
     return number[0];
@@ -224,7 +224,7 @@ export class Solver {
 
   // #members observed
   // #members noise_fields
-  /** The vector field dx/dt, at x and its time or at given ones. */
+  /** The vector field dx/dt; x and t are the present state and time by default. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorFieldAt(this.params, t, x, out);

@@ -8,7 +8,7 @@ import { carry } from "./site_tangent.mjs";
 
 // ---- The step of the series: stages, each with an equation on the whole lattice ----
 
-/** The largest magnitude among values from index from to index to - 1; NaN if one is NaN. */
+/** The largest magnitude of values[from] ... values[to - 1]; NaN if one is NaN. */
 function most(values, from, to) {
   let largest = 0;
   for (let k = from; k < to; k++) {
@@ -18,7 +18,7 @@ function most(values, from, to) {
   return largest;
 }
 
-/** The largest magnitude of each field of y, plus LEAST_SIZE times that of all fields. */
+/** Size of each field of y: its largest magnitude, plus LEAST_SIZE times the largest of all fields. */
 export function usual(y) {
   const count = y.length / DIM;
   const overall = most(y, 0, y.length);
@@ -58,7 +58,7 @@ function bySweeps(coef, x, prediction, sites) {
   return null;
 }
 
-/** Update backward differences with a new value; returns the number of them that predict best. */
+/** Update backward differences with a new value; returns how many of them to sum for the next prediction. */
 function remember(differences, value) {
   let order = 1;
   let least = Infinity;

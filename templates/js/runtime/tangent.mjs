@@ -21,7 +21,8 @@ export function multiplied(a, b) {
 }
 
 /**
- * The derivative of the step that a solver has just made, row by row: the product of those of its stages.
+ * The derivative of the step that a solver has just made, row by row: the product of the derivatives of its
+ * stages.
  *
  * @param {Solver} solver
  * @param {{x: Float64Array, carry: Float64Array}} at the state before the step; advanced to its end

@@ -9,8 +9,8 @@ import { stageChange, stageChangeJacobian, stageSlopeJacobian } from "./model.mj
 const WIDE = DIM + UNKNOWNS;
 
 /**
- * The derivatives of the stage increments by coordinate j. They solve linear equations, by fixed-point
- * sweeps; null if these do not converge.
+ * The derivatives of the stage increments by coordinate j at the start of the step. They solve linear
+ * equations, by fixed-point sweeps; null if the sweeps do not converge.
  */
 function variedAlong(solver, slopes, j) {
   const [z, increments] = [stages(), stages()];

@@ -7,8 +7,9 @@ import { solvedForAll, tangentSolved } from "./tangent_solve.mjs";
 // ---- The derivative of an implicit stage ----
 
 /**
- * The derivative of a stage, 1 + incrementJacobian Dy with Dy = jacobian^-1 from alpha(y) = x, and its
- * increment as change. The solution y is refined to rounding level, starting from the stored one.
+ * The derivative of a stage, 1 + incrementJacobian Dy, and its increment as change. Dy = jacobian^-1 follows
+ * from the equation alpha(y) = x of the stage, whose solution y is first refined to rounding level, starting
+ * from the stored value.
  */
 export function differentiateStage(solver, stage, at) {
   const y = solver.history[stage].last();

@@ -8,7 +8,7 @@ import { solvedForAll, tangentSolved } from "./tangent_solve.mjs";
 
 // ---- The derivative of a stage along paths ----
 
-/** Whether the slopes of a path and of its variation at a point m are those of their equations. */
+/** Whether the slopes of a path and of its variation at a point m satisfy their differential equations. */
 function tangentHolds(coef, p, f, m, slope) {
   const field = new Float64Array(2 * DIM);
   const scale = [0, 0];
@@ -81,8 +81,9 @@ function varyPath(coef, x, p, seed) {
 }
 
 /**
- * The derivative of a stage, end_x + end_p Dp, and its increment as change. p = grad S_h(mean) gives (1 - H
- * mean_p) Dp = H mean_x, where H is the Hessian of S_h. p is refined to rounding level, starting from the
+ * The derivative of a stage, end_x + end_p Dp, and its increment as change. The stage follows a path whose
+ * covector solves p = grad S_h(mean); so (1 - H mean_p) Dp = H mean_x with the Hessian H of S_h, where end_x
+ * ... mean_p are derivatives of end and mean of the path. p is first refined to rounding level, from the
  * stored mean.
  */
 export function differentiateStage(solver, stage, at) {

@@ -2,7 +2,7 @@ import { solve } from "./linear.mjs";
 import { TANGENT_NEARLY_SOLVED, TANGENT_SHRINKING, TANGENT_SOLVED } from "./tangent_policy.mjs";
 import { DIM } from "./model.mjs";
 
-/** Whether Newton's method has reached rounding level, by the sizes of its last two corrections. */
+/** Whether Newton's method has reached rounding level, judged by the sizes of its last two corrections. */
 export function tangentSolved(size, previous) {
   return size <= TANGENT_SOLVED || (size < TANGENT_NEARLY_SOLVED && size > TANGENT_SHRINKING * previous);
 }
