@@ -42,6 +42,6 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         tuple(displacement),
         increment,
         is_symmetric(alpha, beta, system.coordinates),
-        explanation=f"π is canonical: one-sided chart, α leaves {', '.join(fixed)} alone; explicit for separable H, "
+        explanation=f"π is canonical: one-sided, α does not change {', '.join(fixed)}; explicit for separable H, "
         "not symmetric, so order k takes S_1 … S_k",
     )

@@ -34,5 +34,5 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         tuple(-(half * d) for d in increment),
         increment,
         is_symmetric(alpha, beta, system.coordinates),
-        explanation="π is constant: α = x − ½πp, β = x + ½πp, the midpoint chart; symmetric and global",
+        explanation="π is constant: α = x − ½πp, β = x + ½πp, as for the midpoint rule; symmetric, for all x and p",
     )

@@ -75,7 +75,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         tuple(m.increment for m in motions),
         is_symmetric(alpha, beta, system.coordinates),
         explanation=f"π is constant in other coordinates, π_ij = g_i A_ij g_j with the factors {factors or '1'}: the "
-        "midpoint chart pulled back along the flows of the factors; symmetric",
+        "bi-realisation of the midpoint rule in these coordinates; symmetric",
         reference=f"{PAPER}, the quadratic example, for any factors",
     )
 

@@ -71,7 +71,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         simplified_differences(alpha, x),
         flow if flow_statement.verdict == "proved" else difference,
         symmetric,
-        explanation=f"π is linear: the map τ of the spec with {representation.name}; "
+        explanation=f"π is linear: the map τ that the spec gives, with {representation.name}; "
         + ("symmetric" if symmetric else "not symmetric, so order k takes S_1 … S_k"),
         reference=f"{PAPER}, the proposition on Lie–Poisson structures; τ given in the spec",
     )

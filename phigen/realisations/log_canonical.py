@@ -47,6 +47,6 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         tuple(-(xj * (t * (1 + 1 / (1 + t)))) for xj, t in zip(x, growth, strict=True)),
         is_symmetric(alpha, beta, system.coordinates),
         explanation="π is log-canonical: α_j = x_j exp(u_j/2), β_j = x_j exp(−u_j/2) with u_j = Σ a_ij x_i p_i; "
-        "symmetric and global, signs and zeros of the coordinates are kept",
+        "symmetric, for all x and p; coordinates keep their signs and zeros",
         reference=f"{PAPER}, the quadratic example, with the sign of its Lotka–Volterra scheme",
     )
