@@ -1,4 +1,4 @@
-"""One page of a spec whose texts are attacks, made once for all tests of a session."""
+"""Fixtures: the page of a spec whose texts try to inject HTML and scripts, made once per test session."""
 
 import json
 
@@ -38,7 +38,7 @@ runs:
 
 @pytest.fixture(scope="session")
 def page_path(tmp_path_factory, compiled_solvers):
-    """The path of the page."""
+    """Return the path of the page."""
     folder = tmp_path_factory.mktemp("report")
     (folder / "attack.yaml").write_text(SPEC, encoding="utf-8")
     arguments = ["report", str(folder / "attack.yaml"), "--lyapunov", "--quick", "-o", str(folder / "attack.html")]

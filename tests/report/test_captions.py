@@ -1,4 +1,6 @@
-"""Captions of the live panel, run in Node, compared with the errors of every step, over the corpus."""
+"""Captions of the live panel, executed in Node for the systems of the corpus: they agree with the errors of
+each step.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +18,14 @@ from phigen.report.page import CURVES, FIELDS
 from phigen.resources import bundled_specs, file_of, templates
 from phigen.spec import load
 
-#: Those whose JavaScript takes less than a second to make, of every kind of step; the others are slow.
+#: Systems with every kind of step whose JavaScript is made in less than a second. The other systems are slow.
 QUICK = ("kepler", "lotka_volterra", "rigid_body", "duffing", "landau_lifshitz", "kepler_eccentric", "vortices3")
 QUICK_LATTICES = ("fput", "outer_planets", "point_vortices", "food_web", "heisenberg_plane")
 #: Errors below this are rounding, which the panel does not compare.
 ROUNDING = 1e-13
 
-#: A race of both methods without a browser: the errors of each step, and the sentence about them.
+#: JavaScript that makes steps of phigen and of RK4 without a browser. It returns the errors of each step, and the
+#: caption about them.
 RACE = """
 const inSpace = () => ({}), freshView = () => ({});
 const data = DATA, params = {}, made = {};
@@ -36,11 +39,12 @@ const view = makeView({
   tried: (...given) => start.tried(...given), shortened,
 });
 let start = makeStart({ data, begin, view, shortened, milliseconds: { ours: 60, all: 400 } });
-// How the panel begins in a browser that has no time for trials.
+// The settings with which the panel begins in a browser that has no time for trials.
 const hurry = { ours: 0, all: 0 };
 export const hurried = () => makeStart({ data, begin, view, shortened, milliseconds: hurry }).showing(standard);
 export const lacking = () => Object.keys(data).filter((name) => data[name] === null).sort();
-// With a step and a number of steps of RK4, or as the panel begins: for a given number without limits of time.
+// Make steps with the step size h and `parts` steps of RK4 for each. Without h, begin as the panel does, without limits
+// of time and, unless `parts` is 0, with this number of steps of RK4.
 export const raced = (h, parts, steps) => {
   if (!h && parts) {
     start = makeStart({ data, begin, view, shortened, milliseconds: { ours: 1e4, all: 1e5 }, costOf: () => parts });
@@ -64,7 +68,9 @@ export const raced = (h, parts, steps) => {
 
 @pytest.fixture(scope="module")
 def raced(tmp_path_factory):
-    """Race the methods of a panel: errors by method, and what is said."""
+    """Return a function that makes the steps of phigen and of RK4 in the panel of a run. It returns the errors of each
+    step with the captions, and the text under the panel.
+    """
     folder = tmp_path_factory.mktemp("captions")
 
     def race(compilation, run, share, parts, steps=120):
@@ -95,7 +101,7 @@ def halves(errors, k):
 
 
 def expect_true(race_result, say):
-    """What is said is what the errors are."""
+    """Assert that the captions and the text ``say`` under the panel agree with the errors."""
     sentences = race_result["said"].rstrip(".").split("; ") if race_result["said"] else []
     for k, name in enumerate(race_result["names"]):
         (begin, ours), (rk4_begin, theirs) = halves(race_result["ours"], k), halves(race_result["theirs"], k)
@@ -110,13 +116,13 @@ def expect_true(race_result, say):
             assert ours < 1e-9
     assert len(race_result["ours"]) > 10
     if race_result["names"]:
-        assert race_result["ours"][-1][0] < 1  # the panel is about a motion that phigen follows
+        assert race_result["ours"][-1][0] < 1  # phigen must be able to follow the motion
     else:
         assert "Nothing is conserved" in say
 
 
 @pytest.mark.parametrize("name", slow_but(QUICK))
-@pytest.mark.parametrize(("share", "parts"), [(0, 0), (0.25, 3)])  # 0: as the panel begins
+@pytest.mark.parametrize(("share", "parts"), [(0, 0), (0.25, 3)])  # 0: the settings with which the panel begins
 def test_captions_of_systems_are_not_refuted_by_their_numbers(raced, name, share, parts):
     compilation = compiled(name)
     race_result, say = raced(compilation, first_run(compilation), share, parts)
@@ -132,8 +138,9 @@ def test_captions_of_lattices_are_not_refuted_by_their_numbers(raced, name):
 
 
 def test_panel_begins_where_rk4_is_farther_off(raced):
-    """With the order and the step of the run the errors of both are small; at the start of the panel those of RK4 are
-    large."""
+    """With the order and the step of the run the errors of both methods are small. The panel begins with a larger step,
+    for which the errors of RK4 are large.
+    """
     compilation = compiled("henon_heiles")
     run = first_run(compilation)
     race_result, _ = raced(compilation, run, 1, 3)

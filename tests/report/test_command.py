@@ -1,4 +1,4 @@
-"""phigen report: what it writes, and what it does when something fails."""
+"""``phigen report``: what it writes, and what it does when something fails."""
 
 from pathlib import Path
 
@@ -14,8 +14,8 @@ from phigen.study import verification
 @pytest.fixture
 def phigen(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    # Figures have their own tests, and take their time. What asks is not replaced: modules that are first imported here
-    # would keep what stands in its place.
+    # Figures are slow and have their own tests, so the page is made as if matplotlib were not installed. Only this
+    # look-up is replaced: a module that is first imported during a test would keep any other replaced function.
     monkeypatch.setattr("phigen.report.drawable.find_spec", lambda name: None)
     return lambda *args: CliRunner().invoke(group, ["report", *map(str, args)], prog_name="phigen")
 

@@ -1,4 +1,6 @@
-"""The page in a browser: formulas are drawn, the viewer turns, both themes and paper work, and nothing complains."""
+"""The page in a browser: formulas are drawn, the viewer rotates, the page works in both themes and in print, and the
+browser reports no errors.
+"""
 
 import json
 
@@ -16,7 +18,7 @@ from phigen.report.panel import panel_page
 from phigen.study.classical import rk4
 from phigen.study.lattice_errors import summed
 
-#: A browser takes seconds to start; what the page is made of has tests of its own.
+#: A browser takes seconds to start. The contents of the page have faster tests in test_page.py.
 pytestmark = pytest.mark.slow
 
 
@@ -55,7 +57,7 @@ def test_formulas_are_drawn(browser):
     assert len(sizes) > 20
     assert all(w > 2 and h > 5 for w, h in sizes)
     tall = "document.querySelector('mtable').getBoundingClientRect().height"
-    assert browser.value(tall) > 40  # three rows below one another
+    assert browser.value(tall) > 40  # pixels, at least the height of three rows
 
 
 def view(browser):
@@ -63,7 +65,7 @@ def view(browser):
 
 
 def inked(browser):
-    """How many points of the canvas are drawn upon."""
+    """Return the number of pixels of the viewer that are not transparent."""
     return browser.value(
         "{const c = document.getElementById('viewer-canvas');"
         "c.getContext('2d').getImageData(0, 0, c.width, c.height).data.filter((v, i) => i % 4 === 3 && v > 0).length}"
@@ -103,7 +105,7 @@ SET = "#live&h=0.3&order=2&p.I1=1.5&x.x1=0.25&compare=step"
 
 
 def settled(browser, page_path, fragment=""):
-    """The page of one who asks for less motion: nothing moves by itself."""
+    """Load the page as for a user who prefers reduced motion, so that nothing moves by itself."""
     browser.media(prefers_reduced_motion="reduce")
     browser.load(page_path, fragment)
 
@@ -195,7 +197,7 @@ def test_address_bar_follows_the_settings(browser, page_path):
 
 
 GROWN = [1e-6 * k for k in range(40)]
-#: (errors of phigen, errors of RK4) and what is said of them.
+#: Errors of phigen at each step, those of RK4, and the caption of the panel about them.
 CLOSER = [
     ([1e-3] * 40, GROWN, "energy: RK4 is closer so far, but its error grows while that of phigen does not."),
     ([1e-3] * 40, [1e-6] * 40, "energy: RK4 is closer with these settings."),
@@ -245,7 +247,7 @@ def test_panel_moves_by_itself_unless_less_motion_is_asked_for(browser, page_pat
     assert browser.value(waited) == "100 steps"
     browser.media()
     browser.load(page_path)
-    browser.value("document.getElementById('live-ours').scrollIntoView()")  # out of sight it rests
+    browser.value("document.getElementById('live-ours').scrollIntoView()")  # the panel only moves while it is visible
     moving = "document.getElementById('live-steps').textContent !== '0 steps'"
     assert browser.value(f"new Promise(d => {{ const wait = () => {moving} ? d(1) : setTimeout(wait, 20); wait(); }})")
     click(browser, "play")
@@ -281,7 +283,7 @@ def test_panel_fits_a_telephone(browser, page_path):
 
 # -- the live panel of lattices
 
-#: A chain in a field that turns.
+#: A chain of spins in a rotating field.
 DRIVEN = """\
 phigen: 1
 name: driven
@@ -293,8 +295,7 @@ hamiltonian: "-(x*x[i+1] + y*y[i+1] + z*z[i+1]) - x*cos(2*t) - y*sin(2*t)"
 casimirs: {C: x**2 + y**2 + z**2}
 runs: {r: {sizes: [6], initial: {x: cos(i), y: sin(i), z: 0}, step: 0.1, steps: 10, start: 0.5}}
 """
-#: A chain whose start is a formula, a plane with open ends, a cube, a graph with lists, vortices of both signs.
-#: A ring of named sites with an invariant, and with observables of bonds and of sites.
+#: A ring of sites with names, with an invariant, and with observables of bonds and of sites.
 NAMED = """\
 phigen: 1
 name: named
@@ -312,6 +313,8 @@ runs:
     step: 0.1
     steps: 20
 """
+#: A chain with a formula as start, a plane with open ends, a cube, a graph with lists of values, vortices of both
+#: signs, and the two lattices above.
 LATTICE_PANELS = {n: LATTICES[n] for n in ("fput", "spins_2", "spins_3", "food_web", "vortices")} | {"driven": DRIVEN}
 LATTICE_PANELS["named"] = NAMED
 COLOURS = (
@@ -322,7 +325,7 @@ COLOURS = (
 
 @pytest.fixture(scope="module")
 def panels(tmp_path_factory):
-    """Panels alone, by the name of the lattice."""
+    """Return the paths of pages with a panel alone, by the name of the lattice."""
     folder, pages = tmp_path_factory.mktemp("panels"), {}
     for name in LATTICE_PANELS:
         compilation = compile_spec(spec.loads(LATTICE_PANELS[name]))
@@ -340,13 +343,13 @@ def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name
     t0 = 0.5 if specification.time else None
     solver = phigen.compile(specification, target="numpy")
     begin = np.reshape(told(browser, "ours")["x"], start.state.shape)
-    if "spins" in name:  # they start at random
+    if "spins" in name:  # the panel draws the initial spins at random
         assert np.linalg.norm(begin, axis=0) == pytest.approx(np.ones(start.sizes))
     else:
         assert begin[0] == pytest.approx(start.state[0], rel=1e-14, abs=1e-15)
     click(browser, "step", 4)
 
-    def field(at):  # of the state with the time after it
+    def field(at):  # ``at`` holds the state and, as last number, the time
         time = float(at[-1]) if specification.time else None
         slope = solver.vector_field(at[:-1].reshape(begin.shape), time, parameters=start.arguments)
         return np.append(slope, 1)
@@ -375,7 +378,7 @@ def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name
         assert told(browser, side)["observed"] == pytest.approx(expected, rel=1e-10, abs=1e-12)
     shown = told(browser, "theirs")["errors"]
     assert shown[: len(errors)] == pytest.approx(errors, rel=1e-6, abs=1e-15)
-    # sums over sites of both signs, in another order
+    # The invariants are sums over sites whose terms cancel. Another order of summation changes their rounding errors.
     assert shown[len(errors) :] == pytest.approx([max(changes)] if changes else [], rel=1e-6, abs=1e-13)
     assert browser.value(COLOURS) > 8
     assert browser.complaints == []
@@ -431,7 +434,7 @@ def test_turning_by_itself_respects_reduced_motion(browser):
 
 
 def colours(browser):
-    """Of the page, of a curve in a figure, of the text in a figure."""
+    """Return the colours of the page, of a curve in a figure, and of the text in a figure."""
     return browser.value(
         "[getComputedStyle(document.body).backgroundColor,"
         "getComputedStyle(document.querySelector('svg [stroke=\"var(--series-1)\"]')).stroke,"

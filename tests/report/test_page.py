@@ -1,4 +1,4 @@
-"""The page of a spec: whole, harmless whatever the spec says, readable by everyone."""
+"""The page of a spec: it is complete, safe for any texts of the spec, and accessible."""
 
 import base64
 import hashlib
@@ -39,7 +39,7 @@ def trajectory(x, names=("x", "y", "z")):
 
 
 def bare(compilation, **more):
-    """The page of a system of which nothing was measured."""
+    """Return the page of a system for which nothing was measured."""
     return pages.document(
         Material(Examination(compilation.spec, {}, compilation), compilation, "phigen report", **more)
     )
@@ -252,7 +252,8 @@ def test_viewer_has_the_leaf_around_the_curve():
     points = np.array([p for p in zip(*data["leaf"], strict=True) if None not in p]) / data["steps"]
     assert len(points) > 500
     assert np.linalg.norm(low + (high - low) * points, axis=1) == pytest.approx(2, abs=2e-3)
-    assert np.max(np.abs([low + 2, high - 2])) < 0.1  # all of the sphere, which the curve does not reach
+    # The bounds contain the whole sphere, which is larger than the curve.
+    assert np.max(np.abs([low + 2, high - 2])) < 0.1
     assert viewer_data({"a": curve})["leaf"] is None
 
 

@@ -1,4 +1,6 @@
-"""From orders to terms, the choice of the cheapest form, the budget, and explicit steps."""
+"""Assembly of programs: the number of terms of the series for an order, the choice of the cheapest form, the limit of
+operations, and explicit steps.
+"""
 
 import mpmath
 import pytest
@@ -77,7 +79,7 @@ def test_generating_function_is_the_cheapest_of_its_forms_and_all_are_equal(name
 
 
 def evaluated(form, at):
-    """Gradient and Hessian of a form at a point."""
+    """Return the entries of the gradient and the Hessian of the generating function in one of its forms, at a point."""
     table = values(form.coefficients.values, at)
     known = {**at, **{coefficient(k): v for k, v in enumerate(table)}}
     return values([*form.slope, *(e for row in form.hessian for e in row)], known)

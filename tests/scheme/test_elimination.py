@@ -1,4 +1,4 @@
-"""Unrolled elimination for matrices of a known pattern of zeros."""
+"""Unrolled Gaussian elimination for matrices with a known pattern of zeros."""
 
 import mpmath
 import numpy as np
@@ -13,12 +13,14 @@ from phigen.symbolic.symbols import Symbol
 
 
 def ring(n):
-    """Neighbours on a ring."""
+    """Return the pattern (n, n) of the entries that are not 0 for a ring, in which each index is coupled to its two
+    neighbours.
+    """
     return [[(i - j) % n in (0, 1, n - 1) for j in range(n)] for i in range(n)]
 
 
 def star(n):
-    """All meet the first, and nothing else."""
+    """Return the pattern (n, n) of the entries that are not 0 for a star, in which index 0 is coupled to all others."""
     return [[0 in (i, j) or i == j for j in range(n)] for i in range(n)]
 
 
@@ -88,7 +90,9 @@ def test_operations_are_counted_before_they_are_made(name):
 
 
 def test_the_centre_of_a_star_is_the_last_pivot_and_nothing_fills_in():
-    """In the order of the coordinates the first pivot would couple all others: 56 entries of U and L instead of 14."""
+    """With the centre as first pivot, elimination would couple all other indices, and L and U would have 56 entries
+    instead of 14.
+    """
     factors = factorise(star(8))
     assert pivot_order(star(8))[-2:] in ([0, 7], [7, 0])
     assert len(factors.lower) + len(factors.upper) == 14

@@ -1,4 +1,6 @@
-"""Static factors gathered: the same values, with fewer operations in a step."""
+"""Gathering of static factors, which do not depend on the state: expressions keep their values, and a step needs fewer
+operations.
+"""
 
 import pytest
 
@@ -12,7 +14,7 @@ x, y, h, k = (symbol(n) for n in ("x", "y", "h", "k"))
 HALF, QUARTER = number(1) / 2, number(1) / 4
 POINT = {"x": 0.7, "y": -1.3, "h": 0.11, "k": 2.3}
 
-#: An expression in the states x, y and the static h, k, and the cost of it with gathered coefficients.
+#: Expressions in the states x, y and the static symbols h, k, each with the largest cost allowed after gathering.
 CASES = {
     "a square": ((h * x / 2) ** 2, 2),
     "a sum of squares": (QUARTER * h**2 * x**2 + QUARTER * (h**2 * y**2), 4),

@@ -1,4 +1,6 @@
-"""Lowering keeps values, shares what is shared, and leaves only operations that a target can print."""
+"""Lowering of expressions to assignments: it keeps their values, computes common subexpressions once, and leaves only
+operations that a target can print.
+"""
 
 import re
 from fractions import Fraction
@@ -19,7 +21,7 @@ x, y, a = symbols("x y a")
 
 
 class PlainPrinter(Printer):
-    """Prints numbers as they are, for reading."""
+    """Printer that writes rational numbers as fractions, so that expected lines are readable."""
 
     def literal(self, value):
         return str(value), 3 if value.denominator == 1 and value >= 0 else 2 if value > 0 else 1
@@ -34,7 +36,7 @@ PRINTER = PlainPrinter(
 
 
 def pairs():
-    """Title, source and expected lines of every case of passes.txt."""
+    """Yield the source and the expected lines of each case of passes.txt, with its title as name of the test."""
     text = Path(__file__).with_name("passes.txt").read_text(encoding="utf-8")
     for part in re.split(r"^== ", text, flags=re.MULTILINE)[1:]:
         title, _, rest = part.partition("\n")
@@ -43,7 +45,7 @@ def pairs():
 
 
 def formulas(sources):
-    """Expressions in x and y from their texts."""
+    """Return the expressions in x and y that a spec reads from these texts."""
     definitions = "".join(f"  e{k}: {source.strip()}\n" for k, source in enumerate(sources))
     text = "coordinates: [x, y]\npoisson: {canonical: {q: [x], p: [y]}}\n"
     invariants = "".join(f"  J{k}: e{k}\n" for k in range(len(sources)))
@@ -75,7 +77,7 @@ def test_expanded_powers_are_squares_reciprocals_roots_or_calls():
 
 
 def evaluated(assignments, roots, at):
-    """Values of roots over temporaries, statement by statement."""
+    """Return the values of the roots, after the temporaries are computed one assignment after another."""
     known = dict(at)
     for step in assignments:
         assert set(symbols_of(step.value)) <= set(known), "a temporary is read before it is written"
@@ -85,7 +87,7 @@ def evaluated(assignments, roots, at):
 
 
 def state_and_coefficients(compilation):
-    """Numbers for everything that the kernels of a program read."""
+    """Return a number for each symbol that the kernels of a program read."""
     at = {}
     for kernel in compilation.program.kernels:
         for names in kernel.inputs.values():
@@ -111,7 +113,9 @@ def test_assignments_compute_the_roots(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_step_reads_neither_parameters_nor_step_size(name):
-    """Everything that does not depend on the state is a coefficient, computed by prepare."""
+    """What does not depend on the state is a coefficient, which the kernel ``prepare`` computes before the
+    first step.
+    """
     program = compiled(name).program
     static = {p.name for p in program.parameters} | {STEP}
     for kernel in program.step.kernels:
@@ -128,7 +132,7 @@ def test_hoisting_keeps_values_and_takes_the_largest_static_parts():
         at = {"x": mpmath.mpf(2), "y": mpmath.mpf(3), "a": mpmath.mpf(5)}
         at |= {coefficient(k): v for k, v in enumerate(values(table.values, at))}
         assert values(hoisted, at) == values(roots, at)
-    assert len(table.values) == 4  # a² + 1, √a, a, a + 1; the number 3 stays where it is
+    assert len(table.values) == 4  # a² + 1, √a, a and a + 1; the number 3 is no coefficient
 
 
 def test_hoisting_twice_adds_nothing():

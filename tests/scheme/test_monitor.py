@@ -1,4 +1,6 @@
-"""Equal steps of τ with dt = g dτ: the step of K = g(H + e) is exactly Poisson at fixed e, and tells the time."""
+"""Monitors g with dt = g dτ: a step in τ, that of K = g(H + e), is exactly a Poisson map at fixed e, and computes the
+time t.
+"""
 
 import numpy as np
 import pytest
@@ -50,7 +52,7 @@ def compiled_text(text, order=None):
 
 @pytest.fixture(scope="module")
 def kepler():
-    """The compilation, and its solvers by target."""
+    """Return the compilation of the Kepler motion, and its solvers by target."""
     compilation = compiled_text(KEPLER)
     return compilation, {target: solver_of(compilation, target) for target in ("c", "numpy")}
 
@@ -69,7 +71,7 @@ def test_it_is_the_system_with_the_pair_typed_by_hand(order):
 def test_a_hundred_steps_a_period_keep_the_energy_of_an_eccentric_orbit_without_drift(kepler):
     run = kepler[1]["c"].integrate(START, STEP, 2000)
     errors = np.abs(run.energy + E) / E
-    assert errors.max() < 1e-5  # with steps equal in t these do not even converge
+    assert errors.max() < 1e-5  # the same number of steps of equal size in t does not even converge
     assert errors[-500:].max() < 1.1 * errors[:500].max()
     assert abs(run.t[-1] / 2000 / STEP - run.t[1000] / 1000 / STEP) < 0.02
 
@@ -117,7 +119,9 @@ def test_a_bracket_times_the_monitor_is_no_poisson_bracket():
 
 
 def test_the_time_of_s_1_alone_has_order_2(kepler):
-    """The negative control of `elapsed`: without ∂S_3/∂e the time is of order 2 while the orbit is of order 4."""
+    """The time of a solver includes the term ∂S_3/∂e. In this test the term is left out: the time then has order 2,
+    while the orbit has order 4.
+    """
     module, errors = kepler[1]["numpy"].backend.module, []
     exact = kepler[1]["c"].integrate(START, STEP / 64, 6400)
     for n in (100, 200):
@@ -179,7 +183,7 @@ def test_until_and_at_without_a_monitor(target):
 def test_a_session_goes_on_from_its_bytes_with_its_time_and_its_e(kepler, target):
     backend = kepler[1][target].backend
     whole, first = backend.start(START, {}), backend.start(START, {})
-    whole.advance(STEP, 64)  # in whole blocks: where one ends early, rounding may differ
+    whole.advance(STEP, 64)  # 64 and 32 are whole blocks; a block that ends early may round differently
     first.advance(STEP, 32)
     resumed = backend.restored(first.saved(), {})
     resumed.advance(STEP, 32)
@@ -299,7 +303,7 @@ def test_without_a_monitor_nothing_is_said_of_it():
 
 @pytest.mark.parametrize("forces", ["", "forces: {covector: {x1: x2}, vector: {x3: x1}}\n"])
 def test_sympy_derives_the_same_with_a_monitor(forces):
-    """K has e among its symbols; with forces p is g(∇H + ζ), and no gradient."""
+    """The derivation by sympy treats e as a symbol of K. With forces, p is g(∇H + ζ), which is not a gradient."""
     agreements = list(compare(compile_spec(spec.loads(BODY + forces), order=2)))
     assert all(c.statement.holds for c in agreements if c.term is None)
     assert any(c.statement.name == GRADIENT for c in agreements)

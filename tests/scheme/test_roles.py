@@ -1,4 +1,6 @@
-"""Roles of kernels: each belongs to one group, by which loops over sites choose what they read."""
+"""Roles of kernels: each belongs to one group or stands alone. By the group, loops over sites choose the arrays that
+they read.
+"""
 
 import pytest
 

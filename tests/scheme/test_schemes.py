@@ -10,16 +10,16 @@ from phigen.scheme.program import Program
 from phigen.spec.names import SCHEMES
 from phigen.spec.validate import WITHOUT_SERIES
 
-#: The schemes that are not a choice among others.
+#: The schemes without auto, which chooses among the others.
 NAMED = [scheme for scheme in SCHEMES if scheme != "auto"]
 
-#: A body whose Hamiltonian is no quadratic form, so that no flow is exact.
+#: A body whose Hamiltonian is not quadratic, so that the flow of the whole of H has no closed form.
 BODY = """coordinates: [x1, x2, x3]
 poisson: {lie_algebra: {name: so(3)}}
 hamiltonian: x1**2/2 + x2**2/4 + x3**2/6 + x1**3/9
 casimirs: {C: x1**2 + x2**2 + x3**2}
 """
-#: Options that change the step of the body.
+#: Options of a spec that change the step of the body or are refused.
 OPTIONS = [
     "adjoint: true", "birealisation: spray", "composition: triple-jump", "forces: {covector: {x1: -0.1*x1}}",
     "forces: {vector: {x1: -0.1*x1}}", "gauge: {C: 2}", "modified_hamiltonian: 1", "monitor: 1 + x1**2",
@@ -34,7 +34,7 @@ hamiltonian: p**2/2 + (q[i+1] - q)**2/2 + q**4/4
 
 
 def attempted(text: str, scheme: str) -> Compilation | str:
-    """The compilation of a spec by a scheme, or the error that refuses it."""
+    """Return the compilation of a spec with a scheme, or the message of the error that refuses it."""
     try:
         return compile_text(f"{text}scheme: {scheme}\n")
     except SpecError as error:
@@ -42,7 +42,9 @@ def attempted(text: str, scheme: str) -> Compilation | str:
 
 
 def method(program: Program) -> str:
-    """The parts of a program that make a step, without the description of the system and the options themselves."""
+    """Return the parts of a program that make a step as text, without the description of the system and the options
+    themselves.
+    """
     parts = ("step", "fractions", "monitor", "noise", "modified", "attitude")
     return repr([getattr(program, part) for part in parts])
 

@@ -15,7 +15,7 @@ from phigen.targets.features import FEATURES
 from phigen.targets.js.step_modules import STEP_MODULES
 from phigen.targets.numpy.step_functions import STEP_FUNCTIONS
 
-#: Lattices have emitters of their own.
+#: The kinds of steps of ordinary systems. Lattices have emitters of their own.
 ORDINARY = {name for name, kind in STEP_KINDS.items() if not kind.sites}
 
 
@@ -52,7 +52,7 @@ def test_the_runtime_in_c_includes_the_files_of_each_kind(root, prefix):
 
 
 def included(file: str) -> set[str]:
-    """The files of the runtime in C that a file includes, directly or through others."""
+    """Return the files of the C runtime that a file includes, directly or through others."""
     names, rest = set(), [file]
     while rest:
         text = (resources.templates() / "c" / "runtime" / rest.pop()).read_text("utf-8")

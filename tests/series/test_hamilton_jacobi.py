@@ -1,4 +1,6 @@
-"""The Hamilton–Jacobi series against closed forms, against sympy, and against itself."""
+"""The Hamilton–Jacobi series: closed forms, parity, comparison with sympy, and of two representations with each
+other.
+"""
 
 from fractions import Fraction
 from itertools import product
@@ -23,7 +25,9 @@ ONE_SIDED = (q, p + a)
 
 
 def series(compilation, terms, *, symmetric=True):
-    """S_1 … S_terms of a compilation, parity used or not."""
+    """Return the series S_1 … S_terms of a compilation. With ``symmetric``, the even terms are set to 0 instead of
+    computed.
+    """
     system = compilation.system
     return polynomial_series(
         system.hamiltonian,
@@ -36,18 +40,18 @@ def series(compilation, terms, *, symmetric=True):
 
 
 def planar(hamiltonian, alpha, terms, *, symmetric=False):
-    """The series of a system in one pair (q, p)."""
+    """Return the series of a Hamiltonian of one canonical pair (q, p), with the map α."""
     return polynomial_series(hamiltonian, alpha, ("q", "p"), ("g",), terms, symmetric=symmetric)
 
 
 def same(terms, index, expected):
-    """Whether S_index is the expression, exactly."""
+    """Whether S_index equals the expression exactly."""
     tower = terms.tower
     return tower.is_zero(terms.terms[index - 1] - tower.convert(expected))
 
 
 def tangent_coefficients(count):
-    """Coefficients of t, t³, t⁵, … in 2 tan(t/2)."""
+    """Return the first ``count`` coefficients of t, t³, t⁵, … in 2 tan(t/2)."""
     t = sympy.Symbol("t")
     poly = sympy.series(2 * sympy.tan(t / 2), t, 0, 2 * count).removeO()
     return [Fraction(int(c.p), int(c.q)) for c in (poly.coeff(t, 2 * k + 1) for k in range(count))]
@@ -111,7 +115,9 @@ def test_logarithmic_hamiltonian_of_a_log_canonical_system_is_its_own_series():
 
 @pytest.mark.parametrize("name", [name for name in NAMES if described(name)[2].symmetric])
 def test_even_terms_vanish_in_symmetric_realisations(name):
-    """The parity theorem, with a series computed without using it."""
+    """By the parity theorem, the even terms vanish in a symmetric bi-realisation. This series is computed without the
+    theorem.
+    """
     compilation = compiled(name)
     expansion = series(compilation, 4, symmetric=False)
     assert expansion.tower.is_zero(expansion.terms[1])
@@ -139,7 +145,7 @@ def test_residual_of_a_wrong_series_does_not_vanish():
 
 
 def point_of(compilation):
-    """Numbers for the coordinates (those of the first run, moved a little) and the parameters."""
+    """Return numbers by name for the coordinates, near the start of the first run, and for the parameters."""
     run = next(iter(compilation.spec.runs.values()))
     numbers = {p.name: p.value for p in compilation.spec.parameters} | dict(run.parameters)
     moved = [Fraction(v) + Fraction(k + 3, 97) for k, v in enumerate(run.initial)]
@@ -189,7 +195,7 @@ VALUES = {"q": Fraction(5, 7), "p": Fraction(9, 8), "g": Fraction(4, 3)}
 
 
 def parsed(text):
-    """The text as a Hamiltonian of a spec."""
+    """Return the Hamiltonian of a spec as an expression, from its text."""
     return compile_text(
         f"coordinates: [q, p]\nparameters: {{g: 1.5}}\npoisson: {{canonical: {{q: [q], p: [p]}}}}\n"
         f"hamiltonian: {text}\norder: 2\n"
@@ -197,7 +203,9 @@ def parsed(text):
 
 
 def by_sympy(text, one_sided, terms):
-    """Values of S_1 … S_terms as text, the recursion done by sympy's own calculus."""
+    """Return the values of S_1 … S_terms at `VALUES` as decimal texts, computed from the recursion by sympy's
+    derivatives.
+    """
     names = {n: sympy.Symbol(n, positive=True) for n in ("q", "p", "g", "t")}
     sq, sp, t = names["q"], names["p"], names["t"]
     energy = sympy.sympify(text, locals={**names, "abs": sympy.Abs}, rational=True)
@@ -213,8 +221,8 @@ def by_sympy(text, one_sided, terms):
     return [str(sympy.N(s.subs(at), 32)) for s in series_terms]
 
 
-#: In the one-sided chart every function is differentiated twice already; sympy takes many times longer in the other,
-#: which some of them show as well as all.
+#: Charts and Hamiltonians. The one-sided chart already differentiates each function twice. In the midpoint chart sympy
+#: takes many times longer, so only six functions are tested in it.
 IN_BOTH_CHARTS = [*product(["one-sided"], HAMILTONIANS), *product(["midpoint"], HAMILTONIANS[:6])]
 
 
@@ -247,13 +255,15 @@ FREE_OF_MOMENTUM = [
     (call("tan", q) * PI, lambda x: mpmath.tan(x) * mpmath.pi),
     (call("atan2", q, ONE), lambda x: mpmath.atan2(x, 1)),
     (call("abs", q) * q, lambda x: abs(x) * x),
-    (sqrt(power(symbol("g"), Fraction(2))) * q, lambda x: x),  # g = 1, and no 1/g is needed
+    (sqrt(power(symbol("g"), Fraction(2))) * q, lambda x: x),  # √g² is 1 at g = 1; the result must not contain 1/g
 ]
 
 
 @pytest.mark.parametrize(("function", "exact"), FREE_OF_MOMENTUM, ids=[str(f) for f, _ in FREE_OF_MOMENTUM])
 def test_series_of_a_shift_is_a_taylor_expansion(function, exact):
-    """For H = f(q) + p in the one-sided chart α = (q, p + a): S_t = (F(q + t) − F(q)) + tp, so S_i = f^(i−1)(q)/i!."""
+    """For H = f(q) + p in the one-sided chart α = (q, p + a), S_t = F(q + t) − F(q) + tp with F′ = f. So S_i is
+    f^(i−1)(q)/i!, plus p for i = 1.
+    """
     algebra = planar(function + p, ONE_SIDED, 7)
     with mpmath.workdps(50):
         at = {"q": mpmath.mpf(13) / 11, "p": mpmath.mpf(2), "g": mpmath.mpf(1)}
@@ -269,7 +279,8 @@ def test_series_of_a_shift_is_a_taylor_expansion(function, exact):
 
 def test_order_twelve_of_the_rigid_body_is_quick():
     compilation = compiled("rigid_body")
-    with processor_seconds_below(30):  # a matter of a second; expression trees would take minutes
+    # It takes about a second; with expression trees instead of polynomials it would take minutes.
+    with processor_seconds_below(30):
         expansion = series_of(compilation.system, compilation.realisation, 11)
     assert expansion.terms[10].total_degree() > 0
     assert all(term == 0 for term in expansion.terms[1::2])
@@ -286,7 +297,9 @@ def test_as_many_terms_as_were_asked_for(terms):
 
 
 def test_nested_definitions_are_left_unexpanded():
-    """Expanded, the derivatives of thirteen nested sines have 2^13 terms, and their products take all memory."""
+    """The definitions of the spec are thirteen nested sines. If these were expanded, their derivatives would have 2^13
+    terms, and products of the derivatives would exhaust the memory.
+    """
     lines = [f"  a{k}: a{k - 1} + sin(a{k - 1})" if k else "  a0: q + sin(p)" for k in range(13)]
     canonical = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
     text = canonical + "definitions:\n" + "\n".join(lines) + "\nhamiltonian: p**2/2 + a12\norder: 4\n"

@@ -1,4 +1,6 @@
-"""The modified Hamiltonian: closed forms, the first correction, constancy along trajectories, the paper's theorem."""
+"""The modified Hamiltonian: closed forms, its first correction, its constancy along trajectories, and the
+time-dependent Hamiltonian that generates the steps of all sizes.
+"""
 
 import math
 from dataclasses import replace
@@ -34,7 +36,7 @@ def modified(compilation, power, terms=None):
 
 
 def arctangent(power):
-    """Coefficients of (2/h) arctan(h/2)."""
+    """Return the coefficients of h^0 … h^power in (2/h) arctan(h/2)."""
     return [Fraction((-1) ** (j // 2), (j + 1) * 2**j) if j % 2 == 0 else Fraction(0) for j in range(power + 1)]
 
 
@@ -46,7 +48,9 @@ def test_midpoint_rule_for_the_harmonic_oscillator():
 
 
 def test_symplectic_euler_for_the_harmonic_oscillator():
-    """H̃ = arcsin(h/2)/(h/2)/√(1 − h²/4) (H ∓ h qp/2): the invariant ellipse, run through with the right period."""
+    """The modified Hamiltonian is H̃ = arcsin(h/2)/(h/2)/√(1 − h²/4) (H ∓ h qp/2). Its level sets are the invariant
+    ellipses of the method, and its factor gives the period of the orbits.
+    """
     corrections = modified(compile_text(f"{SWING}order: 1\nbirealisation: canonical-euler\n"), 6)
     h = 0.3
     at = {"q": 0.7, "p": -0.4, FRACTION: 0.0}
@@ -59,7 +63,7 @@ def test_symplectic_euler_for_the_harmonic_oscillator():
 
 
 def test_linear_hamiltonian_with_cayley():
-    """One step of the Cayley method turns by the angle 2 arctan(h|a|/2)."""
+    """For H = a·x, one step of the Cayley method rotates x about a by the angle 2 arctan(h|a|/2)."""
     text = BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1 + 2*x2 + 2*x3")
     corrections = modified(compile_text(f"{text}order: 2\nbirealisation: cayley\n"), 6)
     h = corrections.terms[0]
@@ -91,7 +95,7 @@ def test_first_correction_is_minus_the_first_term_left_out(text, terms):
     ],
 )
 def test_constant_to_higher_order_for_each_term(name, order):
-    """Along a trajectory Σ_{j<m} h^j H_j varies as h^m."""
+    """The truncated modified Hamiltonian Σ_{j<m} h^j H_j varies along a trajectory by O(h^m)."""
     compilation = compile_spec(replace(compiled(name).spec, gauge="none"), order=order)
     at = setting(compilation)
     stride = 2 if compilation.realisation.symmetric else 1
@@ -112,10 +116,11 @@ def test_constant_to_higher_order_for_each_term(name, order):
 
 
 def time_dependent(series, time):
-    """∂_tS_t(y) = Σ i t^(i−1) S_i(y), which is H_t(x) of the paper's theorem at α(y, ∇S_t(y)) = x.
+    """Return ∂_tS_t(y) = Σ i t^(i−1) S_i(y), a function of y and t.
 
-    The steps Φ_t: x ↦ β(y, ∇S_t(y)) of all sizes t are its flow: ∂_tΦ_t(x) = DΦ_t(x) π(x) ∇H_t(x). ``time`` is the name
-    of t, a symbol of the tower; for the untruncated series H_t = H.
+    At the y with α(y, ∇S_t(y)) = x, this is a Hamiltonian H_t(x). It generates the steps Φ_t: x ↦ β(y, ∇S_t(y)) of all
+    sizes t: ∂_tΦ_t(x) = DΦ_t(x) π(x) ∇H_t(x). For the series without truncation, H_t = H. ``time`` is the name of the
+    symbol t in the tower.
     """
     t, tower = series.tower.variable(time), series.tower
     return tower.expression(
@@ -132,7 +137,7 @@ def test_time_dependent_hamiltonian_generates_the_steps_of_all_sizes():
     x = [mpmath.mpf(v) / 10 for v in (3, 9, -4)]
 
     def point(step, state):
-        """y with α(y, ∇S_t(y)) = x."""
+        """Return the solution y of α(y, ∇S_t(y)) = state."""
         y = mpmath.matrix(state)
         for _ in range(12):
             alpha, _, d_alpha, _ = step._stages[0]._linearised(list(y))

@@ -1,4 +1,6 @@
-"""The second derivation by itself: closed forms, Karasev's paths, the axioms, and what its proofs of zero accept."""
+"""The independent derivation of the series by sympy: closed forms, Karasev's paths, the axioms of α and β, and which
+expressions it proves to be 0.
+"""
 
 from itertools import islice
 from math import prod
@@ -23,7 +25,7 @@ def vector(*entries):
 
 
 def so3(m):
-    """The matrix with π(m)p = m × p."""
+    """Return the matrix π(m) with π(m)p = m × p."""
     return Matrix([[0, -m[2], m[1]], [m[2], 0, -m[0]], [-m[1], m[0], 0]])
 
 
@@ -43,7 +45,7 @@ def series(hamiltonian, source, coordinates, terms):
 
 
 def tangents(terms):
-    """Coefficients of 2 tan(t/2)."""
+    """Return the coefficients of t … t^terms in 2 tan(t/2)."""
     t = sympy.Symbol("t")
     return [(2 * tan(t / 2)).series(t, 0, terms + 1).removeO().coeff(t, i) for i in range(1, terms + 1)]
 
@@ -76,7 +78,7 @@ def test_log_canonical_series_of_a_sum():
 
 @pytest.mark.parametrize("f", [exp, log, sqrt, lambda q: 1 / q, lambda q: tan(q) * pi, lambda q: Abs(q) * q])
 def test_series_of_a_shift_is_a_taylor_expansion(f):
-    """H = f(q) + u and α = (q, u + a): S_t = F(q + t) − F(q) + tu."""
+    """For H = f(q) + u and α = (q, u + a), S_t = F(q + t) − F(q) + tu with F′ = f."""
     (q, u), (a, b) = x[:2], p[:2]
     expansion = series(f(q) + u, closed_form([q, u + a], (a, b)), (q, u), 5)
     g = f(sympy.Symbol("g", positive=True))
@@ -97,7 +99,9 @@ def test_taylor_reaches_each_multi_index_once():
 
 
 def test_paths_of_linear_tensors_are_bernoulli_polynomials():
-    """m(s) = Σ B_k(s)/k! M^k x with Mx = π(x)p."""
+    """For a linear tensor π, Karasev's path is m(s) = Σ B_k(s)/k! M^k x with the Bernoulli polynomials B_k and Mx =
+    π(x)p.
+    """
     M = so3([-c for c in p])
     for k, part in enumerate(islice(paths(so3(x), x, p, s), 5), 1):
         expected = sympy.bernoulli(k, s) / sympy.factorial(k) * M**k * vector(*x)
@@ -184,7 +188,9 @@ def test_the_sign_has_no_derivative():
 
 
 def test_terms_of_even_index_are_zero_as_they_are_written():
-    """Not only after relations are used: else they would grow into all that follows."""
+    """The even terms are the number 0 before any relations between functions are used. Otherwise they would be large
+    expressions equal to 0, which would enter all later terms.
+    """
     (q, w), (a, b) = x[:2], p[:2]
     energy = w**2 / (1 + sqrt(q**2 + 1) ** 3) + Abs(q) * tan(w)
     expansion = series(energy, closed_form([q - b / 2, w + a / 2], (a, b)), (q, w), 4)

@@ -1,4 +1,4 @@
-"""Averages with standard errors by blocks."""
+"""Averages of observables along a run, with standard errors from the means of blocks of rows."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,9 @@ from phigen.study.averages import Averages
 
 
 def autoregressive(rng, count, a):
-    """A process with the correlation a^k over k rows and the variance 1."""
+    """Return ``count`` values of a random process with variance 1, in which values k rows apart have the correlation
+    a^k.
+    """
     noise = rng.normal(size=count) * np.sqrt(1 - a**2)
     values = np.empty(count)
     values[0] = rng.normal()
@@ -41,7 +43,9 @@ def test_moments_are_those_of_the_rows_however_they_come():
 
 @pytest.mark.parametrize("a", [0.0, 0.9])
 def test_standard_errors_are_the_spread_of_means(a):
-    """The mean of n rows has the variance (1 + a)/(1 − a)/n, and blocks must tell it within what 20 blocks can."""
+    """The mean of n rows has the variance (1 + a)/(1 − a)/n. The squares of the standard errors by blocks agree with
+    this on average.
+    """
     rng = np.random.default_rng(2)
     count, standard_errors = 4000, []
     for _ in range(60):
@@ -49,7 +53,8 @@ def test_standard_errors_are_the_spread_of_means(a):
         standard_errors.append((average.error**2, average.correlation_time))
     error, time = np.mean(standard_errors, axis=0)
     ratio = (1 + a) / (1 - a)
-    assert error == pytest.approx(ratio / count, rel=0.15)  # 60 estimates of relative spread √(2/19…39)
+    # The mean of 60 estimates; each has a relative spread of at most √(2/19), since it uses 20 blocks or more.
+    assert error == pytest.approx(ratio / count, rel=0.15)
     assert time == pytest.approx(ratio / 2, rel=0.15)
 
 
@@ -98,7 +103,9 @@ def test_averages_from_a_time_after_the_end_are_refused(end, message):
 
 @pytest.mark.parametrize(("a", "resolved"), [(0.0, True), (0.9, True), (0.999, False)])
 def test_blocks_tell_whether_they_are_longer_than_the_correlation_time(a, resolved):
-    """The integrated correlation times are 0.5, 9.5 and 1000 rows, the blocks 128."""
+    """A block of 128 rows is longer than the integrated correlation times of 0.5 and 9.5 rows, and shorter than the one
+    of 1000 rows.
+    """
     (average,) = averages(autoregressive(np.random.default_rng(5), 4000, a)).results()
     assert average.resolved is resolved
 

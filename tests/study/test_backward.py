@@ -1,4 +1,6 @@
-"""The modified Hamiltonian is as constant as its truncation allows, and that is measured where it can be seen."""
+"""The modified Hamiltonian along a trajectory: each correction makes it more constant, which is measured where
+round-off does not hide it.
+"""
 
 from dataclasses import replace
 
@@ -17,7 +19,9 @@ from phigen.study.verification import gauge_at
 
 
 def subject(name):
-    """The modified Hamiltonian, method and start of the first run of a system of the corpus."""
+    """Return the modified Hamiltonian, the method, the start and the step size of the first run of a system of the
+    corpus.
+    """
     compilation = compiled(name)
     run = next(iter(compilation.spec.runs.values()))
     values = compilation.spec.parameters_of(run)

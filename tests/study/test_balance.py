@@ -41,7 +41,7 @@ def test_powers_are_derivatives_along_the_motion():
     assert len(powers(system)) == 4
     t = np.arange(0, 4.0, 0.25)
     free = "time: t\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - q*t"
-    x = np.stack([t**3 / 6, t**2 / 2], axis=1)  # q¨ = t, and the power is −q
+    x = np.stack([t**3 / 6, t**2 / 2], axis=1)  # the solution of q¨ = t from rest at 0, along which ∂H/∂t is −q
     summary = summarise("exact", system_from_spec(loads(f"phigen: 1\nname: t\n{free}\n")), None, {}, t, x)
     assert summary.energy.error < 1e-14
     assert summary.off < 1e-14

@@ -1,4 +1,4 @@
-"""Gradients as `phigen verify` measures them: wrong ones are found, whichever part of them is wrong."""
+"""The checks of gradients in `phigen verify`: each part of a gradient that is wrong makes a check fail."""
 
 import json
 from functools import cache
@@ -44,7 +44,9 @@ def compiled(text, **options):
 
 
 def checked(text, change=None, target="numpy", **options):
-    """The checks of gradients by name: whether they are passed. A ``change`` is made to what the back end gives."""
+    """Return for each check of gradients, by name, whether it passes. ``change`` modifies the results of the
+    back end.
+    """
     compilation = compiled(text, adjoint=True, **options)
     run = next(iter(compilation.spec.runs.values()))
     solver = (lattice_solver_of if compilation.spec.lattice else solver_of)(compilation, target)
@@ -55,7 +57,7 @@ def checked(text, change=None, target="numpy", **options):
 
 
 def checks(compilation, solver, run):
-    """The checks of gradients of one solver on a run."""
+    """Return the checks of gradients for one solver and one run."""
     h = float(run.step)
     if compilation.spec.lattice:
         subject = lattice_verification._Subject(
@@ -98,7 +100,9 @@ def test_wrong_gradients_are_found(change, failed):
 
 
 def test_the_energy_of_a_monitor_must_be_followed():
-    """What the start and the parameters change of e = −H(x₀) is left out: the tangent maps, at one e, do not see it."""
+    """The wrong gradient here keeps the energy level e = −H(x₀) fixed when the start or the parameters change. The
+    tangent maps also keep e fixed and agree with it, but differences of runs do not.
+    """
     text = SWING + "monitor: 1/(1 + g*q**2)\n"
     compilation = compiled(text, adjoint=True)
     solver = solver_of(compilation, "numpy")
@@ -125,7 +129,9 @@ def test_gradients_of_lattices_are_checked_on_few_sites_and_on_those_of_the_run(
 
 
 def test_positive_parameters_of_sites_may_differ_by_powers_of_ten():
-    """Masses of a sun and of planets: differences along them must not leave any negative."""
+    """The parameters are like the masses of a sun and of planets. The differences of runs must use steps so small that
+    no mass becomes negative.
+    """
     masses = "{value: 1, at: sites, positive: true}"
     text = SPINS.replace("{value: 0.8, at: sites}", masses).replace("B*z**2/2", "log(B)*z/8")
     text = text.replace("z: cos(2*i)/2}", "z: cos(2*i)/2}, parameters: {B: 10**(-i/2)}")
@@ -146,7 +152,7 @@ def test_rows_have_meanings_which_the_documentation_gives(name):
 
 @pytest.fixture
 def only_gradients(monkeypatch):
-    """Measure no more than is told here, which takes a tenth of the time."""
+    """Omit all checks of ``verify`` except those of gradients, which take a tenth of the time."""
     monkeypatch.setattr(verification, "_measured", lambda name, groups: tuple(groups["gradients"]()))
 
 

@@ -1,4 +1,4 @@
-"""Lyapunov exponents against systems whose exponents are known."""
+"""Lyapunov exponents of systems whose exponents are known."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,8 @@ def solver(source, target="c", order=None):
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_a_linear_saddle_has_its_eigenvalues(target):
     exponents = spectrum(solver(spec.loads(SADDLE), target), [0, 0, 0, 0, 1], 0.05, 2000)
-    # The frame that starts along the axes is the exact one; the order of the method is all there is.
+    # The initial tangent vectors along the axes are eigenvectors of the flow, so the only error is that of the method
+    # of order 10.
     assert np.max(np.abs(exponents.exponents - [1.5, 0.25, 0, -0.25, -1.5])) < 1e-12
     assert exponents.t == 100
 
@@ -38,7 +39,9 @@ def test_backwards_in_time_growth_and_decay_change_places():
 
 
 def test_strongly_unstable_steps_lose_no_direction():
-    """A step multiplies lengths by e^4 and e^-4: without a new frame in time the small ones drown in rounding."""
+    """A step multiplies lengths by e^4 and e^-4. Unless the tangent vectors are made orthogonal often enough, rounding
+    errors hide the small exponents.
+    """
     exponents = spectrum(solver(spec.loads(SADDLE)), [0, 0, 0, 0, 1], 0.4, 400, {"a": 10.0, "b": 0.1})
     assert np.max(np.abs(exponents.exponents[[1, 2, 3]] - [0.1, 0, -0.1])) < 1e-10
     assert abs(exponents.pairing) < 1e-10
@@ -66,7 +69,9 @@ def test_a_chaotic_orbit_has_a_positive_exponent_and_its_mirror_image():
 @pytest.mark.slow
 @pytest.mark.parametrize(("target", "steps"), [("c", 400), ("numpy", 100)])
 def test_directions_across_the_leaves_add_zeros(target, steps):
-    """Two Casimirs of the top: their differentials are carried along unchanged, so two exponents vanish like 1/t."""
+    """The top has two Casimirs. The tangent maps leave the differentials of Casimirs unchanged, so two exponents vanish
+    like 1/t.
+    """
     exponents = spectrum(solver(compiled("lagrange_top").spec, target), [0.2, -0.1, 3.0, 0.6, 0.0, 0.8], 0.05, steps)
     middle = np.sort(np.abs(exponents.exponents))[:2]
     assert np.all(middle < 0.3 / exponents.t)
@@ -74,7 +79,9 @@ def test_directions_across_the_leaves_add_zeros(target, steps):
 
 
 def test_growth_is_followed_along_the_trajectory_that_is_integrated():
-    """The gauge is chosen once, rounding errors are carried along: the tangents are those of `integrate`."""
+    """`tangents` follows the trajectory of `integrate` bit for bit, with the same gauge and the same compensation of
+    rounding errors.
+    """
     body = solver(compiled("rigid_body").spec)
     states = [x for x, _ in body.tangents([0.01, 1, 0.01], 0.1, 50)]
     assert np.array(states).tolist() == body.integrate([0.01, 1, 0.01], 0.1, 50).x[1:].tolist()
@@ -100,7 +107,8 @@ order: 6
 def test_a_lattice_has_the_exponents_of_its_waves():
     exponents = lattice_spectrum(solver(spec.loads(UPSIDE_DOWN), "numpy"), np.zeros((2, 6)), 0.25, 400, 4)
     grown = exponents.history * exponents.times[:, np.newaxis]
-    late = np.flatnonzero(exponents.times > 60)[0]  # by then the frame has turned
+    # By this time the tangent vectors have turned into the directions of growth.
+    late = np.flatnonzero(exponents.times > 60)[0]
     rates = (grown[-1] - grown[late]) / (exponents.t - exponents.times[late])
     assert np.max(np.abs(rates - np.sqrt([1, 0.8, 0.8, 0.4]))) < 1e-4
     with pytest.raises(ValueError, match="1 to 12 exponents, not 13"):

@@ -1,4 +1,6 @@
-"""Errors and times compared with classical methods: the same arithmetic in C, stated orders, rounding floors."""
+"""Comparison of errors and times with classical methods: methods in C and in Python agree, have their stated orders,
+and are limited by rounding.
+"""
 
 import math
 
@@ -27,7 +29,7 @@ def test_times_of_the_solver_do_not_contain_its_set_up(body):
     start = START.copy()
     methods = race.compiled(body, ["rk4"], start, PARAMETERS)
     of_phigen, rk4 = (methods.runners[name](0.05, 10, 1) for name in (race.OWN, "rk4"))
-    start *= 2  # what is set up for each measurement would begin here
+    start *= 2  # RK4 reads the start in each measurement, but the solver was set up before
     assert (methods.runners[race.OWN](0.05, 10, 1) == of_phigen).all()
     assert not np.allclose(methods.runners["rk4"](0.05, 10, 1), rk4)
 
@@ -46,7 +48,7 @@ def test_solver_in_the_race_is_the_solver(body, in_c):
 
 @pytest.mark.parametrize("make", ["c", "python"])
 def test_with_a_monitor_all_methods_make_their_steps_in_tau(make):
-    """So that they end where the solver does."""
+    """RK4 also makes steps of equal size in τ, so that it ends at the same state as the solver."""
     compilation = compiled("kepler_eccentric", 8)
     start, at = np.array([0.3, 0.0, 0.0, 2.3]), {"oblateness": 1e-3}
     methods = race.compiled(compilation, ["rk4"], start, at) if make == "c" else race.interpreted(
@@ -63,7 +65,8 @@ def test_a_step_that_cannot_be_made_has_no_result(in_c):
 @pytest.mark.slow
 @pytest.mark.parametrize("make", ["c", "python"])
 def test_orders_of_a_study_are_the_stated_ones(body, in_c, make, monkeypatch):
-    monkeypatch.setattr(precision, "MOST_SECONDS", math.inf)  # a busy machine would measure larger steps only
+    # A busy machine would reach this limit before the small steps.
+    monkeypatch.setattr(precision, "MOST_SECONDS", math.inf)
     methods = ["rk4", "dop853"]
     other = race.interpreted(solver(body, "numpy"), methods, START, PARAMETERS)
     measured = precision.study(in_c if make == "c" else other, 4, 0.4, 3, rounds=1)

@@ -1,4 +1,4 @@
-"""Classical methods, evaluation on trajectories, drift, readable formulas."""
+"""Classical methods, expressions evaluated along trajectories, energy drift, and readable formulas."""
 
 import math
 from fractions import Fraction
@@ -82,7 +82,7 @@ def oscillator():
 
 
 def drift_of(energies, t):
-    """The drift of the energy along an oscillation with these energies."""
+    """Return the energy drift for states of the harmonic oscillator that have these energies at the times t."""
     system, parameters = oscillator()
     x = np.sqrt(2 * energies)[:, None] * np.column_stack([np.cos(t), -np.sin(t)])
     return summary.summarise("a", system, None, parameters, t, x).energy
@@ -137,7 +137,9 @@ def test_errors_are_relative_to_the_value_at_the_start_or_to_the_terms_that_canc
 
 @pytest.mark.parametrize("constant", [0, 5])
 def test_energy_that_is_zero_at_the_start_is_measured_in_its_terms_whatever_constant_it_has(constant):
-    """H = p²/2 − cos q, from q = π/2 at rest."""
+    """H = p²/2 − cos q + constant at q = π/2, p = 0. Without the constant H is 0 there, and errors are relative to the
+    size of its terms. With the constant they are relative to H.
+    """
     q, p = symbol("q"), symbol("p")
     h = p**2 / 2 - call("cos", q) + constant
     (unit,) = conservation.units([h], ["q", "p"], {}, np.array([math.pi / 2, 0.0]))
@@ -190,7 +192,7 @@ def test_fewer_parentheses_do_not_change_the_value(formula):
     values = {"x": 1.3, "y": 0.7, "z": 2.1}
     functions = {"exp": math.exp, "sqrt": math.sqrt}
     assert eval(readable.infix(e), {**functions, **values}) == pytest.approx(evaluate([e], values)[0], rel=1e-14)
-    assert "**(-" not in readable.infix(e)  # denominators are written as such
+    assert "**(-" not in readable.infix(e)  # negative powers are written as quotients
 
 
 def test_starter_spec_summary_agrees_with_the_solver():

@@ -1,4 +1,4 @@
-"""Verification passes what is right, and names what is wrong with solvers that were sabotaged."""
+"""`verify` passes correct solvers, and names the checks that fail for solvers with deliberate errors."""
 
 import json
 from dataclasses import replace
@@ -41,7 +41,7 @@ def compilation_of(text=TEXT):
 
 
 def from_source(compilation, change=lambda source: source):
-    """A solver of the NumPy target, from its source after a change."""
+    """Return a NumPy solver from the generated source, which ``change`` modifies."""
     source = emit(compilation.program, "numpy", "phigen build")["t.py"]
     names = Interface("t", compilation.system.coordinates, compilation.program.order, {}, frozenset(), ("C",))
     return Solver(NumpySolver(change(source), names), names)
@@ -56,7 +56,9 @@ def failed(checks):
 
 
 def test_rounding_is_seen_as_such_where_all_terms_of_a_casimir_vanish():
-    """A pendulum that swings through its lowest point, where m1 g1 + m2 g2 + m3 g3 is a sum of zeros."""
+    """A pendulum starts at its lowest point, where all terms of the Casimir m1 g1 + m2 g2 + m3 g3 are 0. Its rounding
+    errors must still pass as round-off.
+    """
     casimirs = "{G: g1**2 + g2**2 + g3**2, L: m1*g1 + m2*g2 + m3*g3}"
     text = f"""phigen: 1
 name: t
@@ -120,12 +122,12 @@ def test_rk4_posing_as_the_step_is_found_out():
     assert "tangent map against differences" in failed(verification)
     alone = verified(compilation, {"numpy": from_source(compilation, change)})
     assert "Casimir C: largest error" in failed(alone)
-    assert "observed order" not in failed(alone)  # it is a fine method of order 4
+    assert "observed order" not in failed(alone)  # RK4 does have order 4
     assert any(f.startswith("Casimir C: largest error: changed by") for f in alone.failures)
 
 
 def test_a_wrong_sign_of_the_quadratic_term_is_found_out():
-    """α of the exponential bi-realisation, its terms of even degree in p with the other sign."""
+    """The solver uses α of the exponential bi-realisation with the opposite sign of the terms of even degree in p."""
     compilation = compilation_of()
     names = {momentum(c): -symbol(momentum(c)) for c in compilation.system.coordinates}
     wrong = tuple(-e for e in substitute(compilation.realisation.displacement, names))
@@ -161,7 +163,9 @@ def test_targets_that_disagree_are_found_out():
 
 
 def test_energy_drift_of_dissipative_methods_is_judged():
-    """Whatever is judged must tell RK4 from a good method."""
+    """The limit for the growth of the energy error lies between the growth for a Poisson integrator and that
+    for RK4.
+    """
     compilation = compilation_of()
     solver = solver_of(compilation, "c")
     rk4 = of_classical("rk4", solver, {}).rows(START, 0.4, 2000, 1)
@@ -270,7 +274,9 @@ def test_command_draws_the_modified_hamiltonian_of_one_spec(tmp_path):
 
 
 def test_derivatives_are_compared_near_a_singularity_too():
-    """Differences at two thousandths of the largest coordinate would lead to the other side of the sun."""
+    """The start is close to the sun. Difference quotients with a step of two thousandths of the largest coordinate
+    would reach across the sun, so the step must be smaller.
+    """
     text = (
         "coordinates: [q1, q2, p1, p2]\npoisson: {canonical: {q: [q1, q2], p: [p1, p2]}}\nscheme: splitting\norder: 2\n"
     )
@@ -283,7 +289,9 @@ def test_derivatives_are_compared_near_a_singularity_too():
 
 
 def test_a_bracket_that_nearly_vanishes_is_kept_to_the_rounding_of_the_state():
-    """Of {u, v} = v + u² rounding of u and v leaves 12 digits here; an error of the map is seen all the same."""
+    """Near its zeros the bracket {u, v} = v + u² only has 12 correct digits, because u and v are rounded. The check
+    must pass, and still detect a relative error of 1e-8 in the tangent map.
+    """
     text = "coordinates: [u, v]\npoisson: {pullback: {of: {lie_algebra: {name: aff(1)}}, map: {y1: u, y2: v + u**2}}}\n"
     text += "hamiltonian: (u**2 + v**2)/2 + v\norder: 2\ntangent: true\n"
     compilation = compilation_of(f"phigen: 1\nname: t\n{text}")
