@@ -1,4 +1,6 @@
-"""A benchmark with a broken peer is worthless: the peers have their stated orders, and the harness runs."""
+"""The benchmarks are valid: the classical methods to compare with (peers) have their stated orders, and the programs
+that measure run.
+"""
 
 import math
 from dataclasses import replace
@@ -36,7 +38,7 @@ def body_after(horizon: float, chunks: int) -> np.ndarray:
 
 
 def observed_order(method: Method) -> float:
-    # Coarse enough for methods of order 8 to stay above round-off.
+    # Steps are large enough for errors of order 8 to exceed round-off.
     h, chunks = (0.5, 4) if method.order > 4 else (0.1, 4)
     exact = body_after(16 * h, chunks)
     coarse, fine = (method.run(BODY.start, h / k, 4 * k, chunks, math.inf) for k in (1, 2))
@@ -87,7 +89,9 @@ def test_exact_flows_are_known_and_left_out():
 
 
 def test_kernels_of_lattices_by_hand_make_the_steps_of_the_generated_ones():
-    """Another order of the parts, a wrong sign or angle: the comparison would mean nothing."""
+    """Kernels written by hand make the same steps as generated ones. A different order of the parts, a wrong sign or
+    angle would make the comparison meaningless.
+    """
     for sites, size in ((lattices.XXZ, 16), (lattices.CUBE, 4)):
         by_hand = lattices.Kernel(sites, size, True).method(0)
         lattices.expect_same(lattices.ours(sites.solver(2)), by_hand, sites.start(size))
@@ -103,7 +107,7 @@ def test_peers_of_lattices_have_their_orders(sites):
         assert math.log2(coarse / fine) > order - 0.7
 
 
-# Gauss methods in lanes ---------------------------------------------------------------------------------------------
+# Gauss methods with stages in SIMD lanes ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -121,7 +125,9 @@ def test_gauss_in_lanes_has_its_order(order, h):
 
 
 def test_gauss_in_lanes_keeps_quadratic_invariants_without_a_drift():
-    """With a_ij rounded, in place of mu_ij + mu_ji = 1, the energy drifts in proportion to the time."""
+    """Energy and Casimir do not drift. If the a_ij were rounded one by one, so that μ_ij + μ_ji = 1 fails, the energy
+    would drift in proportion to time.
+    """
     measured = lanes_method(BODY, 16).run(BODY.start, 0.5, 2000, 100, math.inf)
     errors = Judge(BODY).errors(measured.states)
     assert measured.status == "ok"
@@ -130,7 +136,9 @@ def test_gauss_in_lanes_keeps_quadratic_invariants_without_a_drift():
 
 @pytest.mark.slow
 def test_sine_in_lanes_is_right_to_rounding():
-    """The pendulum is the only peer with a sine: its orbit, over many turns, is that of the reference."""
+    """The sine in SIMD lanes is exact to rounding: over many rotations of the pendulum, the only problem with a sine,
+    the orbit agrees with the reference.
+    """
     spinning = (0.3, 40.0, 0.0)
     fast = replace(PENDULUM, start=spinning, typical=0.002)
     exact, _ = reference(fast, 4.0, 2)
@@ -155,11 +163,11 @@ def test_a_predictor_reproduces_slow_signals():
     assert np.abs(guess - np.cos(0.5 * np.array(nodes))).max() < 1e-8
 
 
-# grids ---------------------------------------------------------------------------------------------------------------
+# grids of step sizes -------------------------------------------------------------------------------------------------
 
 
 def pretending(best: float) -> Method:
-    """A method that is always accurate enough, and the cheaper the nearer its step is to ``best``."""
+    """Return a fictitious method that is always accurate enough and cheapest at the step ``best``."""
 
     def run(start, h, chunk, chunks, limit):
         return Run(np.tile(start, (chunks, 1)), 1e-3 + abs(math.log(h / best)), chunk * chunks, 0, "ok")
@@ -220,7 +228,9 @@ def test_dop853_in_vectors_makes_the_steps_of_dop853():
 
 @pytest.mark.slow
 def test_all_rows_of_the_eccentric_orbit_cover_the_same_physical_time():
-    """Steps of monitors are equal in another time, of which a period takes more or less: rows once ended half way."""
+    """Steps with a monitor are equal in fictitious time, so a period takes a varying number of steps; each row must
+    still cover the same physical time.
+    """
     periods = 3
     end = periods * eccentric.PERIOD
     trials = [
@@ -245,7 +255,7 @@ def test_heyoka_covers_the_same_physical_time():
     assert row.worst < 1e-6
 
 
-# the document --------------------------------------------------------------------------------------------------------
+# tables in the page --------------------------------------------------------------------------------------------------
 
 
 def test_a_table_replaces_what_stands_between_its_markers():
@@ -266,7 +276,9 @@ def test_the_document_has_a_place_for_every_table():
 
 @pytest.mark.slow
 def test_all_methods_follow_the_same_planets(monkeypatch):
-    """After ten years, from the same state: peers too where they are installed."""
+    """Ten years after the same start, all methods agree on the positions of the planets, including those of other
+    packages if they are installed.
+    """
     monkeypatch.setattr(planets, "PHIGEN", [m for m in planets.PHIGEN if m[1].startswith("aba") and m[3] == 10])
     masses, q, v, gm = planets.planets()
     contestants = [*planets.phigen_methods(masses, q, v), *planets.rebound_methods(masses, q, v, gm, print)]

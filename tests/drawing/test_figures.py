@@ -43,7 +43,7 @@ runs: {a: {initial: [1, 0], step: 0.1, steps: 100}}
 
 
 def spiral(rows=50, names=("x1", "x2", "x3"), broken=None):
-    """A curve on the unit sphere, with errors that oscillate; NaN from row ``broken`` on."""
+    """Return a trajectory on the unit sphere with oscillating errors. The states are NaN from row ``broken`` on."""
     t = np.linspace(0, 3, rows)
     circle = np.column_stack([np.cos(5 * t) * np.sin(t), np.sin(5 * t) * np.sin(t), np.cos(t)])
     x = np.resize(circle.T, (len(names), rows)).T.copy()
@@ -61,7 +61,7 @@ def test_trajectories_of_every_dimension_are_drawn(dimension):
 
 
 def lettered(axes):
-    """All names and ticks of axes in space, as boxes."""
+    """Return the labels of three-dimensional axes and of their ticks, each as text with its bounding box."""
     every = (axes.xaxis, axes.yaxis, axes.zaxis)
     texts = [axis.label for axis in every] + [tick.label1 for axis in every for tick in axis.get_major_ticks()]
     return [(text.get_text(), text.get_window_extent()) for text in texts]
@@ -90,7 +90,7 @@ def test_names_and_ticks_in_space_do_not_meet_and_are_in_the_figure(dimension, s
 def test_a_run_is_drawn_on_one_page():
     sections = {"x3 = 0": spiral().x}
     figure = run_figure({"a": spiral(), "b": spiral(broken=20)}, CASIMIR, sections, "title")
-    assert [len(row.subfigs) for row in figure.subfigs] == [2, 1]  # the section beside the only panel of the trajectory
+    assert [len(row.subfigs) for row in figure.subfigs] == [2, 1]  # first row: trajectory and section
     spectrum = Spectrum(np.array([0.1, -0.1]), np.array([1.0, 2.0]), np.array([[0.3, -0.3], [0.1, -0.1]]))
     assert len(list(run_figure({"a": spiral()}, CASIMIR, spectrum=spectrum).subfigs)) == 3
     assert len(lyapunov_figure(spectrum).axes[0].lines) == 3

@@ -1,4 +1,4 @@
-"""Colours of fields: on both sides of 0 where the sign changes, else over the range of the values."""
+"""Colour maps of fields: symmetric about 0 if values have both signs, otherwise over the range of the values."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from phigen.symbolic.symbols import Symbol
 
 
 def text(function: ir.Function) -> str:
-    """The function, one statement on each line."""
+    """Return a function of the loop IR as text, one statement on each line."""
     head = f"{function.name}({', '.join(function.parameters)})"
     return "\n".join([head, *_lines(function.body, "  ")])
 

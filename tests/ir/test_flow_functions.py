@@ -1,4 +1,4 @@
-"""The functions of splittings: their flows, the order of these in a step, and the reverse pass."""
+"""Functions of splittings in the loop IR: the flows, their order in a step, and the reverse pass."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from phigen.targets.c.loops import commented
 PROGRAM = as_given("duffing").program
 NAME = PROGRAM.name
 
-#: Kick, then three times drift and kick, with a row of coefficients each.
+#: A schedule of flows: a kick, then three times a drift and a kick, each with its row of coefficients.
 SCHEDULE = Schedule((0.1, *[0.3, 0.3] * 3), 3, ((1, 0), (0, 1)))
 
 

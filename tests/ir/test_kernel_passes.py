@@ -1,4 +1,4 @@
-"""The functions of kernels and the passes for them, by the text of a function before and after."""
+"""Functions of kernels and the passes over them; tests compare the text of a function before and after a pass."""
 
 from textwrap import dedent
 

@@ -1,4 +1,4 @@
-"""Each pass of the loop IR, by the text of a function before and after it."""
+"""Passes of the loop IR; tests compare the text of a function before and after a pass."""
 
 from textwrap import dedent
 

@@ -1,4 +1,4 @@
-"""The functions of paths: recurrences of Taylor series, and the sums over orders in SIMD lanes."""
+"""Functions of paths in the loop IR: recurrences of Taylor coefficients, and the sums over orders in SIMD lanes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ COORDINATES, NAME = PROGRAM.coordinates, PROGRAM.name
 
 
 def path():
-    """ṁ₁ = m₁ m₂, ṁ₂ = −3 m₁, ṁ₃ = m₁."""
+    """Return the path with the equations ṁ₁ = m₁ m₂, ṁ₂ = −3 m₁, ṁ₃ = m₁."""
     first, second, _ = map(symbol, COORDINATES)
     return path_of(COORDINATES, [first * second, -3 * first, first])
 

@@ -1,4 +1,4 @@
-"""Imports that the loop IR and the targets may have."""
+"""The loop IR and the targets import only the modules that they may import."""
 
 import ast
 from pathlib import Path

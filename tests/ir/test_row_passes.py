@@ -1,4 +1,4 @@
-"""The lowering by rows, by the text of a function before and after it."""
+"""The lowering of loops to rows; tests compare the text of a function before and after the pass."""
 
 from dataclasses import replace
 from textwrap import dedent

@@ -1,4 +1,4 @@
-"""The lowering to lanes: what is computed at several points at once."""
+"""The SIMD lowering, which chooses the functions that are evaluated at several points at once."""
 
 import pytest
 from support import BODY, compile_text, compiled

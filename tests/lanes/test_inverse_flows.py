@@ -1,4 +1,6 @@
-"""Flows of members are undone on the way back, with the functions that their transposes read."""
+"""The reverse pass of an ensemble recomputes states by inverse flows, with the functions that the transposes of the
+flows call anyway.
+"""
 
 from collections import Counter
 from fractions import Fraction
@@ -37,8 +39,10 @@ def made(name):
 
 
 @pytest.mark.parametrize("name", ["spin_chain5", "lagrange_top", "kepler", "lotka_volterra"])
-def test_transposes_at_the_end_of_a_flow_are_those_at_its_start_which_they_find(name):
-    """The coefficients are those of some time; cotangents are any."""
+def test_transposes_that_recompute_the_start_of_a_flow_agree_with_those_from_the_start(name):
+    """A transpose that starts at the end of a flow recomputes the start, and returns the same cotangents as one that
+    starts there. The step size and the cotangents are arbitrary.
+    """
     program, rng = made(name), np.random.default_rng(5)
     step, n = program.step, program.dimension
     transposes = recomputing_transposes(program, step)
@@ -59,7 +63,7 @@ def test_transposes_at_the_end_of_a_flow_are_those_at_its_start_which_they_find(
 
 
 @pytest.mark.parametrize("name", ["spin_chain5", "lagrange_top", "pendulum"])
-def test_flows_are_undone_with_the_functions_that_their_transposes_call(name):
+def test_inverse_flows_call_only_functions_that_flows_and_transposes_call(name):
     def calls(kernel):
         return {e for e in topological(kernel.roots) if e.op in FUNCTIONS}
 
@@ -70,7 +74,7 @@ def test_flows_are_undone_with_the_functions_that_their_transposes_call(name):
         assert Counter(e.op for e in calls(undone)) <= Counter(e.op for e in calls(flow) | calls(back))
 
 
-def test_monitored_flows_move_more_than_the_state_and_are_in_no_packs():
+def test_monitored_flows_are_not_batched_as_they_also_update_the_time():
     assert made("kepler_eccentric").monitor
     assert in_lanes(made("kepler_eccentric")) is None
 
@@ -85,7 +89,7 @@ def test_products_with_one_number_share_it():
     assert with_numbers_shared([half * (a * b) + a * b]) == [half * (a * b) + a * b]
 
 
-def test_flows_that_damp_are_not_undone():
+def test_damped_flows_are_not_recomputed_by_inverse_flows():
     program = compile_text(TOP).program
     assert len(recomputing_transposes(program, program.step)) == 2
     program = compile_text(f"{TOP}damping: 1/9\n").program

@@ -1,4 +1,6 @@
-"""Karasev's construction compared with closed forms: both exact, of the same order; exponential for linear brackets."""
+"""Karasev's construction by paths compared with closed forms: both have the same order and keep Casimirs. For linear
+brackets paths give the exponential map.
+"""
 
 from dataclasses import replace
 from itertools import product
@@ -19,7 +21,7 @@ poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/2 - cos(q)
 """
 
-#: Spec, start, step, Casimir.
+#: Spec, start, step size, and Casimir as a function of the state.
 BOTH = {
     "so(3)": (BODY, (0.4, -0.9, 0.6), 0.1, lambda x: x @ x),
     "log-canonical": (SPECIES.replace("x1 + x2 + x3", "x1 + x2*x3 + x3**2"), (0.4, 0.9, 0.6), 0.1, None),
@@ -40,10 +42,10 @@ def test_paths_and_closed_form_converge_to_the_same_flow(name, order):
     for count in (5, 10):
         ends = [solver(c, "c").integrate(start, h=5 * h / count, steps=count).x[-1] for c in (closed, paths)]
         gaps.append(np.max(np.abs(ends[0] - ends[1])))
-    if name == "log-canonical":  # different maps, whose difference is of the order of the methods
+    if name == "log-canonical":  # different maps that differ by O(h^order)
         assert gaps[1] > 1e-12
         assert abs(np.log2(gaps[0] / gaps[1]) - order) < 0.3
-    else:  # the same one: the exponential, and the midpoint rule
+    else:  # equal maps: the exponential for so(3), the midpoint rule for constant brackets
         assert gaps[0] < 1e-14
 
 

@@ -1,4 +1,6 @@
-"""Every function that a bracket may contain has a recurrence: the step against one in many digits."""
+"""Every function that a bracket may contain has a Taylor recurrence along paths: steps agree with steps in many
+digits.
+"""
 
 import re
 
@@ -48,12 +50,14 @@ BRACKETS = [
 
 
 def plane(bracket):
-    """A system with {x, y} = bracket and parameter a: Poisson in two dimensions, whatever the bracket."""
+    """Return a spec with {x, y} = ``bracket`` and a parameter a. In two dimensions every bracket is Poisson."""
     return planes([bracket]).replace("x0", "x").replace("y0", "y")
 
 
 def planes(brackets):
-    """Several of these side by side, in the coordinates x0, y0, x1, y1, … and compiled as one."""
+    """Return a spec that combines several planar systems with the given brackets, in coordinates x0, y0, x1, y1, …, so
+    that they are compiled together.
+    """
     pairs = [(f"x{k}", f"y{k}") for k in range(len(brackets))]
     rows = []
     for (x, y), bracket in zip(pairs, brackets, strict=True):
@@ -87,7 +91,7 @@ def test_path_of_each_function_is_followed_to_roundoff(first):
         image, tangent = step.solve(START)
         with mpmath.workdps(PATH_DIGITS):
             assert relative_defect(tangent, step.poisson(START), step.poisson(image)) < 1e-20
-        # The covector is rounded, too: a few units of rounding of the longest of x and its change.
+        # The covector is rounded as well as the state, so a few rounding errors of the largest value are allowed.
         bound = 6 * EPS * max(1, *(abs(float(v)) for v in image))
         for end in (state_of(raw), numpy):
             error = max(abs(a - b) for a, b in zip(end[2 * k : 2 * k + 2], image, strict=True))
@@ -107,7 +111,8 @@ def test_parameters_of_the_bracket_reach_the_path():
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("power", slow_but([4, 9], [4, 6, 8, 9]))
 def test_expansion_with_a_gap_is_not_taken_for_a_finished_one(power, target):
-    # From y = 0 on, z(t) = -(4 h t)^(power+1)/(power+1) + …, with nothing before.
+    # For y(0) = 0 the first term of the Taylor series is z(t) = -(4 h t)^(power+1)/(power+1) + …, and all terms of
+    # lower order vanish.
     text = f"""coordinates: [x, y, z]
 poisson: {{brackets: {{x: {{y: 1, z: y**{power}}}}}}}
 hamiltonian: 4*x + y**2/2 + 2*z

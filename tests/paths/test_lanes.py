@@ -1,4 +1,4 @@
-"""Blocks of steps and groups of members on paths: what one lane cannot do is done by single steps."""
+"""Blocks of steps and batches of members on paths in SIMD lanes. Where a lane fails, single steps replace it."""
 
 import ctypes
 from functools import cache
@@ -18,25 +18,28 @@ ROOT = "coordinates: [x, y, z]\npoisson: {nambu: [z - sqrt(x)]}\nhamiltonian: y*
 KINK = "coordinates: [x, y]\npoisson: {brackets: {x: {y: 1 + abs(x)}}}\nhamiltonian: y + x*y/4\n"
 TURNING = BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1 + x2*x3/50")
 
-#: Text, start, step size, steps; and how far starts of members are apart.
+#: Systems by name: spec, start, step size, number of steps, and the difference between the starts of successive
+#: members.
 SYSTEMS = {
-    "pole": (POLE, (0.3, 0.2), 0.05, 48, (0.1, 0.1)),  # some members reach the pole of x' = x², most do not
+    "pole": (POLE, (0.3, 0.2), 0.05, 48, (0.1, 0.1)),  # some members reach the pole of x' = x²
     "logarithm": (LOGARITHM, (0.9, 0.1), 0.05, 60, (-0.12, 0.05)),  # the last members start at x < 0
     "root": (ROOT, (0.9, -0.5, 0.3), 0.05, 24, (-0.07, 0.02, 0.0)),  # x runs into 0
-    "kink": (KINK, (-0.8, 0.3), 0.05, 60, (0.1, 0.0)),  # paths across x = 0, where their series does not converge
-    "turning": (TURNING, (0.2, 0.5, -0.7), 6.0, 40, (0.0, 0.01, 0.0)),  # a turn in each step: more than one piece
-    "turned": (TURNING, (0.2, 0.5, -0.7), 2.5, 60, (0.0, 0.01, 0.0)),  # more terms than an expansion has in lanes
+    "kink": (KINK, (-0.8, 0.3), 0.05, 60, (0.1, 0.0)),  # paths cross x = 0, where their series diverges
+    "turning": (TURNING, (0.2, 0.5, -0.7), 6.0, 40, (0.0, 0.01, 0.0)),  # one rotation in a step: its path is split
+    "turned": (TURNING, (0.2, 0.5, -0.7), 2.5, 60, (0.0, 0.01, 0.0)),  # needs more terms than lanes have
 }
 
 
 @cache
 def system(name):
-    """The compilation of one of these systems."""
+    """Compile a system of `SYSTEMS` with paths, at order 4."""
     return compile_paths(SYSTEMS[name][0], 4)
 
 
 def alone(compilation, start, h, steps):
-    """By single steps: the state after those that can be made, their number, and the status of the last."""
+    """Make single steps until one fails. Return the last state, the number of steps made, and the status of the last
+    step.
+    """
     raw, status = RawC(compilation), 0
     assert raw.init(start) == 0
     while status == 0 and raw.counters[0] < steps:
@@ -81,7 +84,7 @@ def test_members_that_fail_leave_their_group_as_they_would_alone(name, members):
     expected = [alone(compilation, row, h, steps) for row in starts]
     assert list(status) == [s for _, _, s in expected]
     assert worst == next((s for _, _, s in expected if s), 0)
-    near = 1e-9 if name == "pole" else 1e-12  # near the pole round-off grows
+    near = 1e-9 if name == "pole" else 1e-12  # round-off grows near the pole
     np.testing.assert_allclose(x.T, [row for row, _, _ in expected], rtol=near, atol=1e-13)
     if members > 1 and name in ("pole", "logarithm", "root"):
         assert 0 < np.count_nonzero(status) < members
@@ -107,5 +110,5 @@ def test_blocks_of_steps_on_paths_keep_casimirs_to_roundoff():
     raw = RawC(compilation)
     raw.init((0.1, 1.0, 0.1))
     assert raw.integrate(0.1, 20_000) == 0
-    assert raw.counters[1] < 2.2 * raw.counters[0]  # passes over blocks, no longer solves step by step
+    assert raw.counters[1] < 2.2 * raw.counters[0]  # a block takes few passes, single steps would take more
     assert abs(raw.x @ raw.x - 1.02) < 2e-15

@@ -1,4 +1,4 @@
-"""Paths too long for one expansion, and those that cannot be followed."""
+"""Paths that are too long for one Taylor expansion, and paths that leave the domain or reach infinity."""
 
 import mpmath
 import numpy as np
@@ -10,7 +10,8 @@ from phigen import StepError
 
 EPS = np.finfo(float).eps
 
-#: Linear H: p = h ∇H is known, and a step is the exact flow however long its path.
+#: Systems with linear H, by coordinates, bracket, H, start and step size. Then p = h ∇H is constant, and a step is the
+#: exact flow for any length of the path.
 LONG = [
     ("[x, y, z]", "{matrix: [[0, -z, y], [z, 0, -x], [-y, x, 0]]}", "3*x - y + 2*z", (0.3, -0.8, 0.5), 9.0),
     ("[x, y]", "{brackets: {x: {y: x*y}}}", "x - 2*y", (0.4, 0.3), 9.0),
@@ -72,7 +73,7 @@ hamiltonian: y
 
 
 def test_path_to_infinity_is_reported_and_the_state_kept():
-    # x' = x², and x(h) = x/(1 - h x) is at infinity for h = 1/x.
+    # The solution x(h) = x/(1 - h x) of x' = x² becomes infinite at h = 1/x.
     compilation, start = compile_paths(POLE, 2), (0.5, 0.25)
     raw = RawC(compilation)
     raw.init(start)
@@ -144,7 +145,9 @@ def test_steps_too_large_for_the_equation_fail_cleanly():
 
 @pytest.mark.parametrize("target", slow_but(["c"], TARGETS))
 def test_steps_where_the_approximate_matrix_gains_little_are_solved_in_time(target):
-    """It is right up to O(h²): at these h an iteration with it gains less than a digit."""
+    """The approximate Newton matrix is exact up to O(h²). With these step sizes an iteration with it gains less than a
+    digit, and the solver must still converge.
+    """
     solve = solver(by_paths("rigid_body", 4), target)
     for h in (0.95, 1.0, 1.05, 1.1):
         x = solve.integrate((0.1, 1.0, 0.1), h=h, steps=20).x

@@ -1,4 +1,4 @@
-"""The step that follows paths is an exact Poisson map in many digits, and the generated code is it to round-off."""
+"""In many digits a step that follows paths is a Poisson map, and the generated code agrees with it to round-off."""
 
 import mpmath
 import numpy as np
@@ -10,7 +10,7 @@ from phigen.scheme.composition import COMPOSITIONS
 
 pytestmark = pytest.mark.usefixtures("as_users_compile")
 
-#: Systems of the corpus without a closed form, and some that have one.
+#: Systems of the corpus: most have no bi-realisation in closed form, some have one.
 NAMES = (
     "ablowitz_ladik3",
     "charged_particle",
@@ -31,19 +31,19 @@ EPS = np.finfo(float).eps
 
 
 def steady(name):
-    """State, step size and parameters of the long run of a system, else of the reference."""
+    """Return state, step size and parameters of the run "long" of a system, or else of the run "reference"."""
     compilation = by_paths(name)
     return numbers(compilation, "long" if "long" in compilation.spec.runs else "reference")
 
 
-#: One for each kind of function along the path, and one with a closed form.
+#: Systems for quick tests: one for each kind of function that occurs along paths, and one with a closed form.
 FEW = ("charged_particle", "engel_geodesics", "maxwell_bloch", "nambu_pendulum", "sir_epidemic", "toda3_quadratic")
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("name", slow_but(FEW, NAMES))
 def test_step_is_a_poisson_map_and_the_generated_one(name):
-    # Order 2, one stage, where order 4 is a composition.
+    # Where order 4 is a composition, order 2 is used, which has one stage.
     compilation, at = by_paths(name, 2 if name in ("ablowitz_ladik3", "guiding_centre") else 4), steady(name)
     assert compilation.realisation.kind == "karasev"
     step = PrecisePathStep(compilation, at.parameters, at.h)
@@ -68,7 +68,7 @@ def test_the_defect_of_a_map_that_is_not_poisson_is_seen():
         assert relative_defect(tangent, step.poisson(at.x), step.poisson(image)) > 1e-11
 
 
-#: Of those that follow paths anyway tests/generated/test_conservation.py says the same.
+#: For systems that follow paths by their specs, tests/generated/test_conservation.py checks this too.
 @pytest.mark.thin(1)
 @pytest.mark.parametrize("name", slow_but(["engel_geodesics", "maxwell_bloch"], WITH_CASIMIRS))
 def test_casimirs_do_not_drift_in_100_000_steps(name):
@@ -88,7 +88,8 @@ def test_casimirs_do_not_drift_in_100_000_steps(name):
 
 @pytest.mark.parametrize("h", [0.5, 2.0, 5.0])
 def test_no_path_crosses_the_boundary_of_its_leaf(h):
-    # S I = 0 on the faces of the simplex: no step can make a fraction negative, not even a coarse one.
+    # Paths cannot cross the faces S I = 0 of the simplex, so no step makes a fraction negative, however large the step
+    # is.
     compilation, at = by_paths("sir_epidemic"), steady("sir_epidemic")
     trajectory = solver(compilation, "c").integrate((0.99, 0.01, 0.0), h=h, steps=400, parameters=at.parameters)
     assert np.min(trajectory.x[:, :2]) > 0
@@ -107,7 +108,7 @@ def test_step_back_undoes_step(name, target):
     assert np.max(np.abs(back - at.x)) < 1e-13 * count**0.5
 
 
-@pytest.mark.slow  # the same there
+@pytest.mark.slow  # tests/generated/test_conservation.py is similar
 @pytest.mark.parametrize("name", ["charged_particle", "sklyanin_gyrostat", "guiding_centre"])
 def test_energy_error_does_not_grow(name):
     compilation, at = by_paths(name), steady(name)
@@ -115,7 +116,7 @@ def test_energy_error_does_not_grow(name):
     error = np.abs(trajectory.energy - trajectory.energy[0])
     windows = [np.max(part) for part in np.array_split(error, 8)]
     assert max(windows) / min(windows) < 1.5
-    assert max(windows) > 1e-12  # else this shows round-off only
+    assert max(windows) > 1e-12  # errors are above round-off
 
 
 @pytest.mark.parametrize("name", slow_but(["charged_particle", "sir_epidemic"], [*BACK[:3], "maxwell_bloch"]))
@@ -160,7 +161,7 @@ def test_observed_order_is_the_stated_one(name, order):
 
 @pytest.mark.parametrize("composition", COMPOSITIONS, ids=lambda c: f"{c.name}-{c.order}")
 def test_fractions_of_a_composition_satisfy_the_order_conditions_to_roundoff(composition):
-    # Of all conditions those on power sums: Σγ = 1, Σγ³ = 0, Σγ⁵ = 0, …; the fractions are read the same backwards.
+    # The conditions checked are those on power sums: Σγ = 1, Σγ³ = 0, Σγ⁵ = 0, …. The fractions are a palindrome.
     fractions = composition.fractions
     assert fractions == fractions[::-1]
     assert abs(sum(fractions) - 1) < 4 * EPS
@@ -189,7 +190,9 @@ runs: {reference: {initial: [0.5, 1, 0.25], step: 0.5, steps: 8}}
 
 
 def _errors(compilation, at, time, counts):
-    """Errors in the maximum norm at a time, of steps of several lengths, against the flow in many digits."""
+    """Return the errors at ``time`` in the maximum norm, for each number of steps in ``counts``, compared with the flow
+    in many digits.
+    """
     expected = np.array([float(v) for v in _flow(compilation, at, time)])
     solve = solver(compilation, "c")
     ends = [solve.integrate(at.x, h=time / n, steps=n, parameters=at.parameters).x[-1] for n in counts]

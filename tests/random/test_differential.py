@@ -1,8 +1,9 @@
-"""Random systems and lattices against independent equations, differences, and all targets.
+"""Random systems and lattices, compared with independently derived equations of motion, with finite differences, and
+across all targets.
 
-`--random N` draws N of each kind, from the seed `--seed S` on: `pytest tests/random -k lattice --random 1 --seed 17` is
-one lattice. A failure prints the smallest spec that still fails, and a script that shows both sides. In tests/,
-`python -m differential lattice 0:1000` goes through many without pytest.
+`--random N` draws N systems of each kind, with seeds from that of `--seed S` on. For example, `pytest tests/random -k
+lattice --random 1 --seed 17` tests one lattice. A failure prints the smallest spec that still fails, and a script that
+shows both results. In tests/, `python -m differential lattice 0:1000` tests a thousand lattices without pytest.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from differential.suites import SUITES
 from phigen.runtime.gradients import Pullback
 from phigen.runtime.solver import Solver
 
-#: How many of each kind `make test-all` draws.
+#: Number of systems of each kind in `make test-all`.
 ALL = 50
-#: Those of `make test`, which take half a second or so each: steps by Newton's method, by flows, and two by Gauss
-#: collocation; of lattices the second has one part, and the third is a series.
+#: Seeds in `make test`; each system takes about half a second. Ordinary systems: steps by Newton's method, by
+#: splitting, and two by Gauss collocation. The second lattice has one part, and the third has the scheme series.
 QUICK = {"ordinary": (0, 7, 12, 80), "lattice": (4, 7, 5)}
 
 

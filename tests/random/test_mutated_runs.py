@@ -1,6 +1,6 @@
-"""Mutants of specs that are accepted are checked and run: whatever they say, there is no internal error.
+"""Mutants of specs that phigen accepts are checked and run: no mutant causes an internal error.
 
-PHIGEN_RANDOM_SEEDS sets how many samples of mutants are drawn with --all.
+PHIGEN_RANDOM_SEEDS sets the number of samples of mutants that --all draws.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from phigen.spec import loads
 
 SEEDS = int(os.environ.get("PHIGEN_RANDOM_SEEDS", "1"))
 SAMPLE, MOST_RUNS = 150, 5
-#: What only texts and names consist of, so that there is nothing to run.
+#: Top-level keys that contain only texts and names; their mutants are not run.
 TEXTS = {"title", "description", "references", "license", "name", "phigen", "targets", "sweeps"}
 
 Path_ = tuple[Any, ...]
 
 
 def accepted(base: str, seed: int) -> list[tuple[Path_, str, str]]:
-    """Mutants that are specs: the place, the value, and the spec."""
+    """Return mutants that are valid specs: the path of the replaced value, the new value, and the text of the spec."""
     tree, accepted_changes = tree_of(BASES[base]), []
     for path, value in mutants(base, random.Random(f"{base} {seed}"), SAMPLE):
         if path[0] in TEXTS or path[-1] == "description" or len(accepted_changes) == MOST_RUNS:
@@ -44,7 +44,9 @@ def accepted(base: str, seed: int) -> list[tuple[Path_, str, str]]:
 
 
 def complaint(path: Path_, text: str) -> str:
-    """What is wrong with how a command ends; "" if nothing is."""
+    """Run `phigen check` and `phigen run` on a mutant. Return a description of an unexpected result, or "" if there is
+    none.
+    """
     Path("s.yaml").write_text(text, encoding="utf-8")
     chosen = ["--run", str(path[1])] if path[0] == "runs" and len(path) > 1 else []
     for command in ([] if chosen else [["check", "s.yaml"]]) + [["run", "s.yaml", "-t", "numpy", *chosen]]:

@@ -1,6 +1,6 @@
-"""Random Poisson structures and Hamiltonians: everything that holds for the corpus holds for these.
+"""Random Poisson structures and Hamiltonians have the properties that tests check for the corpus.
 
-PHIGEN_RANDOM_SEEDS sets how many seeds of each kind are drawn with --all; without, it is one.
+PHIGEN_RANDOM_SEEDS sets the number of seeds of each kind with --all; otherwise there is one seed.
 """
 
 import os
@@ -27,14 +27,14 @@ DRAWS = slow_but(product(KINDS, [0]), product(KINDS, range(SEEDS)))
 
 @cache
 def system_of(kind, seed, order):
-    """The compilation of a drawn system, and the draw."""
+    """Return the compilation of a random system, and the draw."""
     drawn = draw(kind, seed)
     return compile_text(drawn.text, order), drawn
 
 
 @cache
 def scale_of(kind, seed):
-    """A step that is short beside the shortest time scale of the field at the start."""
+    """Return a step size that is small compared with the shortest time scale of the vector field at the start."""
     compilation, drawn = system_of(kind, seed, 2)
     system = PreciseSystem(compilation, {})
     field = compilation.system.vector_field()
@@ -88,7 +88,7 @@ def test_observed_order_is_the_stated_one(kind, seed, order):
     solve = solver(compilation, "c")
     ends = [solve.integrate(drawn.start, h=8 * h / n, steps=n).x[-1] for n in counts]
     errors = np.array([np.max(np.abs(end - expected)) for end in ends])
-    if errors[-1] < 1e-13:  # some orders are beyond what double precision shows
+    if errors[-1] < 1e-13:  # errors of high order vanish in round-off
         assert errors[0] < 1e-10
         return
     assert abs(np.log2(errors[1] / errors[2]) - order) < 0.25
@@ -105,7 +105,7 @@ def test_casimirs_are_constant_to_roundoff(kind, seed):
         before, largest = values(casimirs, system.at(drawn.start)), 0.0
         for _ in range(40):
             if raw.integrate(h, 5):
-                break  # some of these solutions reach infinity in finite time
+                break  # some solutions become infinite in finite time
             largest = max(largest, float(np.max(np.abs(raw.x))))
             for a, b in zip(values(casimirs, system.at(state_of(raw))), before, strict=True):
                 assert abs(a - b) < 1e-13 * max(1, largest**3, abs(b))

@@ -1,4 +1,4 @@
-"""Observables that sweeps keep."""
+"""Observables and their statistics, stored by sweeps."""
 
 import re
 from pathlib import Path
@@ -61,7 +61,7 @@ def test_statistics_are_over_the_stored_rows_of_a_run():
 
 
 def curves(data, names, logarithmic=frozenset()):
-    """Error bars (x, low, high) of each curve of the panels of a figure, and the axes."""
+    """Return the error bars (x, low, high) of each curve in each panel of a figure, and the axes of the panels."""
     from phigen.drawing.sweep_map import _figure
 
     drawn = _figure(data, names, logarithmic, frozenset()).get_axes()

@@ -1,4 +1,6 @@
-"""Sweeps: every member is what a single run is, whatever happens to those who make it. One cluster serves all tests."""
+"""Sweeps over parameters: every member agrees with a single run, even if workers are killed or the disk is full. All
+tests share one cluster of workers.
+"""
 
 import os
 import resource
@@ -56,7 +58,7 @@ def spec():
 
 @pytest.fixture(scope="module")
 def cluster(request):
-    """Workers take seconds to start; that several do the work is tested with --all."""
+    """Start a cluster with one worker, or with two if --all is given, as workers take seconds to start."""
     several = request.config.option.all
     with distributed.LocalCluster(
         n_workers=1 + several, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
@@ -67,7 +69,7 @@ def cluster(request):
 
 @pytest.fixture(autouse=True)
 def compiled_once(monkeypatch):
-    """What is compiled is not what is tested here."""
+    """Compile each spec once for all tests, since these tests do not concern compilation."""
 
     def once(spec, **options):
         key = spec.source.partition("sweeps:")[0], options["tangent"]
@@ -80,7 +82,7 @@ def compiled_once(monkeypatch):
 
 @pytest.fixture
 def small_chunks(monkeypatch):
-    """As if members took so long that 40 of them fill a chunk."""
+    """Divide sweeps into chunks of 40 members, as if members took long."""
     monkeypatch.setattr(sweeping, "_seconds_of_a_member", lambda job: sweeping._SECONDS / 40)
 
 
@@ -118,7 +120,9 @@ def test_draws_do_not_depend_on_chunks(members):
 
 @pytest.mark.slow
 def test_what_is_kept_of_members_is_that_of_single_runs(spec, cluster, tmp_path, small_chunks):
-    """The state, the largest errors, how often the section was crossed, the exponent, frames; and by the shell."""
+    """A sweep from the command line stores for each member what a single run gives: the final state, the largest
+    errors, the number of crossings, the Lyapunov exponent, and frames.
+    """
     (tmp_path / "s.yaml").write_text(BODY + "sweeps: {one: {over: {I2: [1.5, 2.5], x1: [0.1, 0.2, 0.3]}, frames: 25, "
         "keep: [final, energy_error, casimir_error, lyapunov, crossings]}}\n")  # fmt: skip
     from phigen.cli import group
@@ -236,7 +240,7 @@ def test_names_that_the_store_needs_are_not_varied(tmp_path, name):
 
 @pytest.mark.slow
 def test_killed_workers_cost_no_member(spec, cluster, tmp_path, small_chunks):
-    """Workers are killed at random while they are at work; the result is that of one ensemble."""
+    """Workers are killed at random during a sweep, and the result is still that of one ensemble."""
     stop, killed, random = threading.Event(), [], np.random.default_rng(1)
 
     def kill():
@@ -285,7 +289,9 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped_and_another_is_refused(sp
 
 @pytest.mark.slow
 def test_a_full_disk_is_told_and_nothing_is_lost(spec, cluster, tmp_path, small_chunks):
-    """Files of workers cannot grow, after the second chunk."""
+    """After two chunks workers cannot write files larger than 64 bytes: the sweep reports a full disk, and can be
+    continued later.
+    """
     options = {"over": OVER, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
     chunks_made = []
     with distributed.Client(cluster) as client:
@@ -421,7 +427,9 @@ runs: {go: {sizes: [4], initial: {q: "i", p: 0}, step: 0.1, steps: 20}}
 
 
 def test_only_what_determines_results_makes_another_sweep(cluster, tmp_path):
-    """Texts and targets of the spec do not, and equations, sections, starts of lattices and listed members do."""
+    """A stored sweep can be continued with other titles or targets in the spec, but not with other equations, sections,
+    starts of lattices or listed members.
+    """
     setting = {"output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
 
     def sweep(text, **more):
@@ -507,7 +515,9 @@ def test_a_target_that_is_unknown_or_unavailable_is_refused_at_its_place(tmp_pat
 
 @pytest.mark.parametrize("varied", [(), ("I2",), ("step",)])
 def test_numbers_common_to_all_members_are_passed_once(spec, varied):
-    """Devices share the coefficients of steps between members that have the same parameters and step."""
+    """Parameters, steps and start times that all members share are passed as numbers, so that devices compute the
+    coefficients of steps once.
+    """
     passed = []
     solver = phigen.compile(spec, "numpy")
     plan = Plan("p", spec.coordinates, (0.01, 1.0, 0.01), 0.1, 0.0, solver.interface.parameters, 10)
@@ -555,7 +565,7 @@ sweeps:
 
 @pytest.mark.slow
 def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path, monkeypatch):
-    """A draw moves the seeds of the run: of the state and of the parameter at sites."""
+    """Each draw adds its number to the seeds of the run, for the state and for the parameter at sites."""
     from phigen.lattice.states import start_of
 
     spec = specs.loads(CHAIN)
@@ -607,7 +617,9 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
 
 @pytest.mark.parametrize("noise", ["", "noise: {kick: {hamiltonian: x, amplitude: 0.3}}\n"], ids=["quiet", "noisy"])
 def test_exponents_of_lattices_are_the_growth_of_a_vector(noise):
-    """Whatever length it gets on its way, along the whole path of a noise."""
+    """The Lyapunov exponent of a member is the growth rate of a tangent vector, although the vector is rescaled during
+    the run; with noise, along the path with that noise.
+    """
     from phigen.runtime.interface import FIRST_DRAWS, Draws
     from phigen.sweeping.lattice_members import exponent
 
@@ -639,7 +651,7 @@ sweeps:
 
 
 def drawn(store, monkeypatch, shown=None):
-    """The axes of the figure of a store."""
+    """Draw the figure of a stored sweep and return its axes."""
     from phigen.drawing import sweep_map
 
     figures = []
@@ -649,7 +661,7 @@ def drawn(store, monkeypatch, shown=None):
 
 
 def test_interfaces_come_back_from_a_store():
-    """With the launches of the kernels of devices, which are records within records."""
+    """An interface is equal after storing and loading, also its nested record of launches of device kernels."""
     for source in (BODY, SPRINGS):
         about = interface_of(compilation_of(specs.loads(source)).program)
         stored = store.solver_data(about, {}, "", "")["interface"]

@@ -1,4 +1,6 @@
-"""cos √s, sin(√s)/√s, (e^s − 1)/s and derivatives: values, derivatives, and the relations that the ring knows."""
+"""The functions cos √s, sin(√s)/√s, (e^s − 1)/s and their derivatives: values, derivatives, and relations that the
+differential ring knows.
+"""
 
 import math
 from fractions import Fraction

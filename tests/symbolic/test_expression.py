@@ -1,4 +1,4 @@
-"""Derivatives and sums of large systems, which pass over what is 0: the same expressions as those that do not."""
+"""Derivatives and sums of large systems: algorithms that skip zeros give the same expressions as those that do not."""
 
 import pytest
 
@@ -42,7 +42,9 @@ def test_equal_formulas_are_one_node_which_is_forgotten_with_its_last_use():
 
 
 def test_order_of_terms_is_that_of_their_contents_whichever_is_made_first():
-    """What is as deep is told apart by a hash of the content, found when it is asked for."""
+    """The order of terms in a sum depends only on their contents. Terms of equal depth are ordered by a hash of the
+    content, which is computed on demand.
+    """
     texts = {}
     for turn in (1, -1):
         terms = {n: symbol("x") ** n * symbol("y") for n in (2, 3, 4, 5)[::turn]}

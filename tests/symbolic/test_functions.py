@@ -1,4 +1,4 @@
-"""The facts in the record of a function agree with its value."""
+"""The record of each function agrees with its values: derivatives, parity, inverse, domain, value at 0."""
 
 from fractions import Fraction
 
@@ -14,12 +14,12 @@ DIGITS = 40
 
 
 def names(fact):
-    """The functions whose record has a fact."""
-    return [f.name for f in FUNCTIONS.values() if getattr(f, fact) and f.arity < 3]  # others: test_kepler, test_euler
+    """Return the names of the functions whose record has a value in the field ``fact``."""
+    return [f.name for f in FUNCTIONS.values() if getattr(f, fact) and f.arity < 3]  # more: test_kepler, test_euler
 
 
 def points(name):
-    """Points in the domain of a function."""
+    """Return points (x, y) in the domain of a function."""
     if name == "acosh":
         return [(Fraction(5, 4), Fraction(1)), (Fraction(3), Fraction(1))]
     inside = [(Fraction(3, 8), Fraction(2, 3)), (Fraction(1, 7), Fraction(-5, 4))]
@@ -27,7 +27,7 @@ def points(name):
 
 
 def of(name):
-    """The function of x, and of y if it has two arguments."""
+    """Return the expression f(x), or f(x, y) for a function of two arguments."""
     return call(name, *[X, Y][: FUNCTIONS[name].arity])
 
 
@@ -74,7 +74,7 @@ def test_inverses_undo_functions(name):
 @pytest.mark.parametrize("name", [f.name for f in FUNCTIONS.values() if f.arity == 1])
 def test_values_at_zero_are_folded_where_they_are_rational(name):
     known = FUNCTIONS[name].at_zero
-    if known is None:  # irrational, or not defined
+    if known is None:  # the value is irrational or undefined
         assert not call(name, ZERO).is_number
     else:
         assert call(name, ZERO) is number(known)

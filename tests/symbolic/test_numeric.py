@@ -1,4 +1,4 @@
-"""Evaluation in floats, fractions and many digits."""
+"""Evaluation of expressions in floats, fractions and many digits."""
 
 import math
 from fractions import Fraction

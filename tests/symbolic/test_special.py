@@ -1,4 +1,4 @@
-"""φ(s) = (1 − w cot w)/s, w = √s/2, and its derivatives: series, values, derivatives in rings."""
+"""The function φ(s) = (1 − w cot w)/s with w = √s/2, and its derivatives: series, values, and derivatives in rings."""
 
 import math
 from fractions import Fraction
@@ -19,7 +19,7 @@ s = symbol("s")
 
 
 def reference(order, at):
-    """The derivative of the closed form in 60 digits."""
+    """Return the derivative of φ of the given order, from the closed form in 60 digits."""
     with mpmath.workdps(60):
 
         def phi(z):
@@ -77,7 +77,7 @@ def test_the_ring_knows_the_riccati_equation():
 
 @pytest.mark.parametrize("order", [0, 1])
 def test_composition_with_series(order):
-    # φ^(order)(t²(x + t)) in powers of t.
+    # Expand φ^(order)(t²(x + t)) in powers of t.
     x, t = symbol("x"), symbol("t")
     target = call(SPECIAL[order], t**2 * (x + t))
     a = [coefficient(order, n) for n in range(4)]

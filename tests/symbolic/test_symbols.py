@@ -1,4 +1,4 @@
-"""Symbols that phigen makes: their kinds, and no clashes with names of the user."""
+"""Symbols that phigen creates: their kinds, and no clashes with names in specs."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""The differential ring: what it refuses to multiply, and how it cancels."""
+"""The differential ring: it refuses products that exceed the memory, and cancels reciprocals."""
 
 from fractions import Fraction
 
@@ -33,7 +33,9 @@ def test_a_variable_and_its_reciprocal_cancel(up, down, left):
 
 
 def test_a_root_found_after_the_reciprocal_of_its_square_stands_for_it():
-    """Where that is in another reciprocal, the ring needs one more."""
+    """If a root appears after the reciprocal of its square, the ring uses the root for both, also where that reciprocal
+    occurs inside another reciprocal. The value stays the same.
+    """
     x, y = symbol("x"), symbol("y")
     q = 1 + x**2
     e = 1 / (power(q, Fraction(1, 2)) + 2 * (y / q)) * (1 + y * (power(q, Fraction(-3, 2)) * (x * (1 + q))))

@@ -1,4 +1,4 @@
-"""Statements: what is proved, refuted or only checked, and at which points."""
+"""Statements are proved, refuted or checked numerically, the last at sample points."""
 
 import subprocess
 import sys
@@ -103,7 +103,7 @@ def test_sample_points_are_moderate_rationals(index):
 
 
 def test_covectors_are_sampled_near_zero():
-    # A bi-realisation lives near p = 0; far from it a root may be on its other branch.
+    # A bi-realisation is defined near p = 0; at large p a root may be on another branch.
     covector = [momentum("x"), momentum("y")]
     assert all(abs(v) <= Fraction(1, 8) for k in range(9) for v in sample_point(covector, [], k).values())
 

@@ -1,4 +1,4 @@
-"""Lattices as problems of `phigen tune`: the same searches, on flat states."""
+"""Lattices in `phigen tune`: the searches are the same as for other systems, on states as vectors."""
 
 import time
 from dataclasses import replace
@@ -118,7 +118,9 @@ def test_settings_of_lattices_mean_what_is_built():
 
 
 def test_of_a_budget_that_is_used_up_only_the_setting_of_the_spec_is_left(monkeypatch):
-    """It is scanned at one step, confirmed and timed once; no candidate and no classical method is measured."""
+    """If the time budget is used up, the setting of the spec is measured at one step, confirmed and timed once. No
+    other candidate and no classical method is measured.
+    """
     clock, timed, lattice_run = TimeBudget(1.0, time.perf_counter() - 100.0), [], problem()
 
     def counted(method, h, steps):

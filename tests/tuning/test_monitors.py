@@ -1,4 +1,6 @@
-"""Monitors that tune proposes: where H is singular, measured by steps for the same error of the energy."""
+"""Monitors that `phigen tune` proposes where H is singular. Settings with and without monitors are compared at the same
+energy error.
+"""
 
 import re
 import time
@@ -55,7 +57,7 @@ def test_distances_are_found_where_h_has_them(states):
 
 
 def test_monitors_of_many_bodies_are_short_and_about_the_closest_encounter():
-    """Every formula that is proposed can be pasted into the spec."""
+    """For many bodies the proposed monitors are short, concern the closest pair, and can be pasted into the spec."""
     bodies, axes = range(6), "xyz"
     names = [f"{a}_{k}" for a in axes for k in bodies]
     pairs = [(i, j) for i in bodies for j in range(i)]

@@ -1,4 +1,6 @@
-"""The choice of `phigen tune`: on synthetic measurements, and that its words mean the code that was measured."""
+"""The choice that `phigen tune` makes, for synthetic measurements; and the lines that it prints compile to the code
+that was measured.
+"""
 
 import math
 import multiprocessing
@@ -32,7 +34,9 @@ SPECS = resources.bundled_specs()
 
 
 def method(order, constant=1.0, nanoseconds=100.0, floor=1e-15, most=math.inf, asked=None):
-    """A measure of a method whose error is constant·h^order; ``asked`` collects the steps."""
+    """Return a function that measures a fictitious method with the error constant·h^order. It appends each step size to
+    ``asked``, and returns None for steps larger than ``most``.
+    """
 
     def measure(h):
         if asked is not None:
@@ -47,7 +51,7 @@ def points(order, steps, **constants):
     return tuple(method(order, **constants)(h) for h in steps)
 
 
-# -- which step
+# -- choice of the step size
 
 
 @pytest.mark.parametrize("order", [2, 4, 8])
@@ -118,17 +122,17 @@ def test_proposed_step_has_few_digits_and_is_not_larger(step, short):
     assert search.rounded_down(step) == short
 
 
-# -- which candidates
+# -- choice of the candidates
 
 
 def model(setting):
-    """Cost of a fictitious system: best at order 10 of cayley without gauge."""
+    """Return the cost of a setting for a fictitious system: the best is order 10 of cayley without gauge."""
     base = {"exponential": 3.0, "cayley": 2.0, "karasev": 40.0}[setting.kind] * (1 + 0.08 * (setting.order - 10) ** 2)
     return base * (0.7 if setting.gauge == "none" else 1.0) * (1 if setting.composition == "none" else 6)
 
 
 def searched(start, refusing=lambda setting: False):
-    """All that a search tries, by the costs of `model`."""
+    """Return the settings that a search tries with the costs of `model`, and those that are refused."""
     tried, refused = {}, []
     while start:
         for s in start:
@@ -146,7 +150,7 @@ def test_search_climbs_to_the_best_order_and_tries_it_without_gauge():
     tried, _ = searched([Setting(kind, 4) for kind in ("exponential", "cayley", "karasev")])
     assert min(tried, key=model) == Setting("cayley", 10, gauge="none")
     assert len(tried) < 24
-    assert [s.order for s in tried if s.kind == "karasev"] == [4]  # far behind, so not followed
+    assert [s.order for s in tried if s.kind == "karasev"] == [4]  # much slower, so higher orders are not tried
     assert {s.composition for s in tried} > {"none"}
 
 
@@ -199,7 +203,9 @@ def test_of_equally_cheap_methods_the_lowest_order_comes_first():
 
 
 def tuner_of(grows, budget=1e6):
-    """A search that has ended, for one method: of order 4, its error over the horizon a multiple of that of a scan."""
+    """Return the result of a search with one method of order 4, and a tuner. Over the horizon, the error of the method
+    is ``grows`` times that in a scan.
+    """
     curve = Curve("a", 4, points(4, [0.5**k for k in range(8)]), Setting("a", 4))
 
     def measure(method, h, span):
@@ -244,11 +250,11 @@ def test_run_that_the_budget_does_not_allow_is_confirmed_over_a_part():
     assert 100.0 <= confirmed(tuner, curve).time < 1e4
 
 
-# -- what errors mean for longer runs
+# -- errors for longer runs
 
 
 class Drifting:
-    """States whose first coordinate is 1 + rate·t + wobble."""
+    """Fictitious method: the first coordinate of the state is 1 + rate·t + wobble·sin²t."""
 
     def __init__(self, rate=0.0, wobble=0.0):
         self.rate, self.wobble = rate, wobble
@@ -293,7 +299,9 @@ def test_orbit_error_is_extrapolated_linearly():
 
 
 class Learning:
-    """Steps of 100 ns; of 25 ns after 96 of them, if a call has 1000 to go; a call takes 2 µs."""
+    """Fictitious method with steps of 100 ns. After 96 steps, calls of at least 1000 steps change to steps of 25 ns.
+    Each call takes 2 µs in addition.
+    """
 
     def __init__(self, clock):
         self.clock = clock
@@ -348,11 +356,11 @@ def test_references_that_disagree_are_no_reference():
         agreed(Drifting(), Drifting(rate=1e-10), 0.1, 100.0, 1e-8, 1.0)
 
 
-# -- settings and their lines
+# -- settings and their lines in a spec
 
 
 def pasted(source, lines):
-    """A spec with lines instead of those of the same keys."""
+    """Return the text of a spec in which ``lines`` replace the lines with the same keys."""
     keys = "|".join(["terms", *(line.split(":")[0] for line in lines)])
     return re.sub(rf"(?m)^({keys}):.*\n(?:[ \t]+.*\n)*", "", source) + "\n".join(lines) + "\n"
 
@@ -386,7 +394,7 @@ def test_lines_of_a_setting_compile_to_what_was_measured(name, setting):
 
 
 def code_of(files):
-    """The code without headers, and without the hash of the spec."""
+    """Return the generated code without the headers of files and without the hash of the spec."""
     return [re.sub(r"[0-9a-f]{64}", "", split(text)[1]) for _, text in sorted(files.items())]
 
 
@@ -434,7 +442,7 @@ def test_variants_compose_symmetric_methods_only():
     assert variants(Setting("canonical-euler", 2), False, False) == []
 
 
-# -- building
+# -- building candidates
 
 
 def test_what_does_not_apply_is_told_and_what_takes_too_long_is_ended():
