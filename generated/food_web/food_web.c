@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: c0c34d05780f4dc1ec5a53bd6ca0598ac80bb4402c8ae69399530b3c53ddea1b
+ * body-sha256: bb48c254dbb1541862106af9033f6672778071f74ece22969123f864c15a0c5f
  */
 #include "food_web.h"
 #include <limits.h>
@@ -136,7 +136,7 @@ static inline double food_web_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + food_web_ROUNDER, k = shifted - food_web_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* of shifted, whose last bits are k */
+    uint64_t bits; /* those of shifted; the last of them are k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;

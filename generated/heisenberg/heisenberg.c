@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: ffd91172e66969b30c06c4f350b7b066930c89f8d01a8b33b39eab48672d6c2a
+ * body-sha256: cb4be610787024ee321106eed2c08dcee89ec7855c27b2eb63d680011ac3b39a
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -184,7 +184,7 @@ static inline double heisenberg_sin_lane(double u)
     const double shifted = u * 0.3183098861837907 + heisenberg_ROUNDER, k = shifted - heisenberg_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* bits of shifted, whose last one is the parity of k */
+    uint64_t parity, bits; /* bits of shifted; the last bit is the parity of k */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;

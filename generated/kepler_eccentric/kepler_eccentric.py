@@ -7,7 +7,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 9732307be1ee9a35048a880689ef02e9732b07d4bc64b9345b97297061d148f7
+# body-sha256: b8cec3b9c07cb531cdaa34d79faf01a04f7daea6bcc082d3b52defafc557b052
 import numpy as np
 
 VERSION = "0.1.0"
@@ -184,7 +184,7 @@ def _prepare(parameters, gauge, h):
 
 
 def _choose_gauge(parameters, x):
-    """Return the energy levels e = -H at x, (members, 1): K = g (H + e) is zero along trajectories from x."""
+    """Return the energy levels e = -H(x), (members, 1), a constant of each trajectory from x."""
     return -_energy(parameters, x)
 
 

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: ac047caf0c3c8b902b5c5b8d9e16247e43a5bfea8bcf0ec83a75413d9699bb7a
+ * body-sha256: a09c363a99acca0dc35990a1146059157d5fae0c5e4ef6825f720ccf8c52ee0f
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -812,8 +812,8 @@ static double rigid_body_least_on_line(const rigid_body_params *params, const do
 }
 
 /* Compute the gauge: factors of Casimirs C that minimise the leading error along a short piece of the
-   trajectory from x. Each is optimised after the other, starting from the least-squares solution of grad H =
-   sum of gauge[c] grad C_c; 0 where a result is not finite. */
+   trajectory from x. They are optimised one after the other, starting from the least-squares solution of grad
+   H = sum of gauge[c] grad C_c; 0 where a result is not finite. */
 static void rigid_body_choose_gauge(const rigid_body_params *params, const double x[rigid_body_DIM],
     double gauge[rigid_body_GAUGES])
 {

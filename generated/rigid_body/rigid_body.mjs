@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b5ac073c708443feac1ad0801b123870371e9f406f84da0fee2d18ee92cc297d
+ * body-sha256: 5c1781e0cbca9e120b70ca5acbea11e233ffc6a27b0d3965e47f99c09d294863
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -1147,7 +1147,7 @@ function leastOnLine(params, gauge, c, width, samples) {
 
 /**
  * The gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from
- * x. Each is optimised after the other, starting from the least-squares solution of grad H = sum of gauge[c]
+ * x. They are optimised one by one, starting from the least-squares solution of grad H = sum of gauge[c]
  * grad C_c; 0 where a result is not finite.
  *
  * @param {Parameters} params

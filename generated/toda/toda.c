@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: 890687747c3cd476126a99603892e397c8187904a33c460193a66d69d7d4eca2
+ * body-sha256: e9393b629893f953ec5c45aa44054b71f82d26b01d2a287c1681495740ada6e3
  */
 #include "toda.h"
 #include <math.h>
@@ -128,7 +128,7 @@ static inline double toda_exp_parts(double u, double *power)
 {
     const double shifted = u * 1.4426950408889634 + toda_ROUNDER, k = shifted - toda_ROUNDER;
     const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* of shifted, whose last bits are k */
+    uint64_t bits; /* those of shifted; the last of them are k */
     double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
     memcpy(&bits, &shifted, sizeof bits);
     bits = (bits + 1023) << 52;

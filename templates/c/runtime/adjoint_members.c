@@ -25,7 +25,7 @@ static phi_status phi_pull_begin(const phi_pulled *all, size_t m, phi_solver *s)
 
 #include "adjoint_members_level.c"
 
-/* Reverse pass of one member by itself. */
+/* Make the steps of member m and their reverse pass, outside of batches. */
 static phi_status phi_pull_member(const phi_pulled *all, size_t m)
 {
     const double *rows_bar = all->rows_bar + m * all->each;

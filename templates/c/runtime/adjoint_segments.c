@@ -6,13 +6,14 @@
 #include "adjoint_batches.c"
 #include "model.h"
 
-/* The reverse pass of splittings goes from segment to segment. The tape holds the states at the starts of segments. */
+/* The reverse pass of splittings divides a run into segments of PHI_SEGMENT steps. The tape holds the states at the starts
+   of the segments. */
 #include "adjoint_flows_lanes.h"
 
 #include "adjoint_segments_far.c"
 #include "adjoint_segments_near.c"
 
-/* Make all steps and write the states at the starts of segments, except the first, to the tape. */
+/* Make all steps, and write the states at the starts of all segments but the first to the tape. */
 static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {
     double *tape = all->tape;
@@ -37,7 +38,7 @@ static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, si
     return 1;
 }
 
-/* Start of a segment on the tape: states, then compensation terms. */
+/* The address on the tape of the states, then compensation terms, of batch k at the start of the segment at step begin. */
 static const double *phi_pull_left(const phi_group *group, int k, const phi_pulled *all, size_t begin)
 {
     return all->tape + ((begin / PHI_SEGMENT - 1) * (size_t)group->packs + (size_t)k) * 2 * PHI_DIM * PHI_LANES;

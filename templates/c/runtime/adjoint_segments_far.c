@@ -16,8 +16,8 @@ static int phi_pull_finite(const phi_group *group)
     return phi_finite(sum, PHI_LANES);
 }
 
-/* Make steps. If values are not finite, restore the initial state, select the full-range versions of functions from
-   there on, and return 0. */
+/* Make steps. If values become not finite, restore the initial states, select functions for arguments of any size for all
+   further steps, and return 0. */
 static int phi_pull_steps(phi_group *group, int steps, const phi_back_group *bar)
 {
     if (group->far) phi_steps_far_lanes(group, steps);

@@ -32,7 +32,7 @@ static void phi_pull_arrive(phi_group *group, const phi_pulled *all, size_t begi
     }
 }
 
-/* Reverse pass of all steps, which adds the cotangents of rows on its way. */
+/* Pull the cotangents of all members back through all steps, and add those of output rows. */
 static void phi_pull_back(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {
     for (size_t end = all->steps; end > 0;) {

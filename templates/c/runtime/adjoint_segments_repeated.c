@@ -4,7 +4,7 @@
 
 #include "adjoint_segments.c"
 
-/* Repeat the steps of a segment, and store the states before each flow. */
+/* Repeat the steps of a segment, and write the state before each flow to the tape. */
 static void phi_pull_again(phi_group *group, int steps, phi_back_group *bar)
 {
     for (int step = 0; step < steps; ++step) {
@@ -15,7 +15,7 @@ static void phi_pull_again(phi_group *group, int steps, phi_back_group *bar)
     }
 }
 
-/* Reverse pass of all steps, which adds the cotangents of rows on its way. */
+/* Pull the cotangents of all members back through all steps, and add those of output rows. */
 static void phi_pull_back(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {
     for (size_t end = all->steps; end > 0;) {

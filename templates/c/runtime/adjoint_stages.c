@@ -2,7 +2,7 @@
 #define PHI_FILE_ADJOINT_STAGES
 #include "adjoint_stage.c"
 
-/* The reverse pass of a step from its tape. */
+/* Pull the cotangent *bar back through a step, by the tape of its stages. */
 static phi_status phi_stages_adjoint(const phi_solver *s, phi_step_tape tape, phi_cotangent *bar)
 {
     phi_status status = PHI_OK;

@@ -85,7 +85,7 @@ static double phi_least_on_line(const phi_params *params, const double gauge[PHI
 }
 
 /* Compute the gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from x.
-   Each is optimised after the other, starting from the least-squares solution of grad H = sum of gauge[c] grad C_c; 0
+   They are optimised one after the other, starting from the least-squares solution of grad H = sum of gauge[c] grad C_c; 0
    where a result is not finite. */
 static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
 {

@@ -6,9 +6,9 @@
 #include "sweeps.h"
 
 /* ---- Relative coordinates of bodies ---- */
-/* Flows act on relative positions and velocities; the first body has those of the centre of mass instead. In Jacobi
-   coordinates, those of each other body are relative to the centre of mass of all bodies before. In democratic
-   heliocentric coordinates, positions are relative to the first body, velocities to the centre of mass of all bodies. */
+/* Flows act on relative positions and velocities; the values of the first body are those of the centre of mass of all
+   bodies. In Jacobi coordinates, the values of another body are relative to the centre of mass of all bodies before it. In
+   democratic heliocentric coordinates, positions are relative to the first body, and velocities to the centre of mass. */
 
 /* Compute the central masses of Kepler motions. Returns 0 if a mass is not admissible: masses must not be negative, their
    sum must be finite, and the first body, and bodies with momenta, must have one. */
@@ -31,7 +31,7 @@ static int phi_weigh(phi_solver *s)
 }
 
 #if PHI_JACOBI
-/* Transform positions, or velocities, to relative ones. */
+/* Transform the positions, or the velocities, of all bodies along one axis to relative ones. */
 static void phi_make_relative(const phi_solver *s, double *q)
 {
     const double *m = s->x[PHI_MASS], *inner = s->x[PHI_INNER];
@@ -43,7 +43,7 @@ static void phi_make_relative(const phi_solver *s, double *q)
     q[0] = centre;
 }
 
-/* Transform relative positions, or velocities, to those of the bodies. */
+/* Transform relative positions, or relative velocities, along one axis to those of the bodies. */
 static void phi_make_cartesian(const phi_solver *s, double *q)
 {
     const double *m = s->x[PHI_MASS], *inner = s->x[PHI_INNER];
@@ -55,7 +55,7 @@ static void phi_make_cartesian(const phi_solver *s, double *q)
     q[0] = centre;
 }
 
-/* Compute the positions of all bodies from the first one. */
+/* Compute the positions of all bodies relative to the first body. */
 static void phi_place_bodies(const phi_solver *s, double *const *x, double *const *placed)
 {
     const double *m = s->x[PHI_MASS], *inner = s->x[PHI_INNER];
@@ -94,7 +94,7 @@ static double phi_moment(const phi_solver *s, const double *q)
     return sum;
 }
 
-/* Add a value to that of each body but the first. */
+/* Add a value to the coordinate of each body but the first. */
 static void phi_shift_bodies(const phi_solver *s, double *q, double value)
 {
     for (ptrdiff_t i = 1; i < s->length; ++i) q[i] += value;
@@ -110,7 +110,7 @@ static void phi_join_shifts(const phi_solver *s, double *const *x, int first)
 }
 #endif
 
-/* Transform a state, or a variation, to relative coordinates. */
+/* Transform a state, or a tangent vector, from Cartesian to relative coordinates. */
 static void phi_to_relative(const phi_solver *s, double *const *x)
 {
     for (int axis = 0; axis < PHI_BODY_AXES; ++axis) {
@@ -135,7 +135,7 @@ static void phi_to_relative(const phi_solver *s, double *const *x)
 /* Clear the compensation terms, which belong to other coordinates. */
 static void phi_clear_other_carry(phi_solver *s) { phi_clear_carry(s); }
 
-/* Transform relative coordinates back. */
+/* Transform a state, or a tangent vector, from relative to Cartesian coordinates. */
 static void phi_to_cartesian(const phi_solver *s, double *const *x)
 {
     for (int axis = 0; axis < PHI_BODY_AXES; ++axis) {
@@ -157,7 +157,7 @@ static void phi_to_cartesian(const phi_solver *s, double *const *x)
 }
 
 #if PHI_SHARED
-/* Compute what the part B of H reads of other bodies, by all threads. */
+/* Compute the sums over other bodies that the part B of H reads; called by all threads together. */
 static void phi_gather_pulls(const phi_solver *s, const double *coef, size_t first, size_t end)
 {
 #if PHI_JACOBI
@@ -171,7 +171,7 @@ static void phi_gather_pulls(const phi_solver *s, const double *coef, size_t fir
     phi_wait();
 }
 #else
-/* Compute what the part B of H reads of other bodies. */
+/* Compute the sums over other bodies that the part B of H reads. */
 static void phi_gather_pulls(const phi_solver *s, const double *coef)
 {
     phi_place_bodies(s, s->x, s->placed);
@@ -182,7 +182,7 @@ static void phi_gather_pulls(const phi_solver *s, const double *coef)
 #endif
 
 #if PHI_TANGENT
-/* Compute the derivatives of these sums along a tangent vector v; called by all threads together. */
+/* Compute the derivatives along a tangent vector v of the sums over other bodies; called by all threads together. */
 static void phi_gather_varied_pulls(const phi_solver *s, const double *coef, double *const *v, size_t first, size_t end)
 {
     phi_wait(); /* until all threads have read the former sums */
@@ -201,7 +201,7 @@ static void phi_gather_varied_pulls(const phi_solver *s, const double *coef, dou
 }
 #endif
 
-/* Move the centre of mass at its constant velocity for a time. */
+/* Move the centre of mass at its constant velocity for a time; x are relative coordinates. */
 static void phi_move_centre(double *const *x, double time)
 {
     for (int axis = 0; axis < PHI_BODY_AXES; ++axis)

@@ -86,7 +86,7 @@ function leastOnLine(params, gauge, c, width, samples) {
 
 /**
  * The gauge: factors of Casimirs C that minimise the leading error along a short piece of the trajectory from
- * x. Each is optimised after the other, starting from the least-squares solution of grad H = sum of gauge[c]
+ * x. They are optimised one by one, starting from the least-squares solution of grad H = sum of gauge[c]
  * grad C_c; 0 where a result is not finite.
  *
  * @param {Parameters} params
