@@ -1,4 +1,6 @@
-"""Attitudes: proved, and measured against Jacobi's elliptic functions and against the equations of the whole motion."""
+"""Attitudes: statements that are proved, and comparison with Jacobi's elliptic functions and with solutions of the
+equations for state, attitude and position together.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -57,7 +59,7 @@ scheme: splitting
 
 
 def algebra(name, sign, n, *more):
-    """A body with different moments on the dual of a Lie algebra."""
+    """Return the text of a body with different moments of inertia, on the dual of a Lie algebra."""
     names = [f"x{i}" for i in range(1, n + 1)]
     energy = " + ".join(f"{x}**2/{i + 1}" for i, x in enumerate(names, 1))
     lines = [f"coordinates: [{', '.join(names)}]", f"poisson: {{lie_algebra: {{name: {name}, sign: {sign}}}}}"]
@@ -107,42 +109,42 @@ pytestmark = pytest.mark.few(
 )
 
 
-#: A composition for each order, with which a body is split in rotations: otherwise it has one exact flow.
+#: A composition for each order, with which the body is split into rotations. Without it the body has one exact flow.
 COMPOSITIONS = {2: "none", 4: "suzuki", 6: "yoshida"}
 
 
 @cache
 def made(case, order=2):
-    """The compilation of a case."""
+    """Return the compilation of a case of `CASES`."""
     composition = f"composition: {COMPOSITIONS[order]}\n" if case == "body, split" else ""
     return compile_spec(spec_of(CASES[case] + composition), order=order)
 
 
 def spec_of(text):
-    """A spec named by its place, with what all specs need."""
+    """Return the spec with this text, to which the first keys of every spec are added."""
     return specs.loads(f"phigen: 1\nname: t\n{text}")
 
 
 def compiled_text(text):
-    """The compilation of a spec without its first keys."""
+    """Return the compilation of a spec, from a text without its first keys."""
     return compile_spec(spec_of(text))
 
 
 @cache
 def solver(case, target="numpy", order=2) -> Solver:
-    """The solver of a case."""
+    """Return the solver of a case of `CASES`."""
     return solver_of(made(case, order), target)
 
 
 def rotation(q):
-    """The matrices of quaternions (…, 4)."""
+    """Return the rotation matrices (…, 3, 3) of unit quaternions (…, 4)."""
     w, u = q[..., :1], q[..., 1:]
     columns = [v + 2 * (w * np.cross(u, v) + np.cross(u, np.cross(u, v))) for v in np.eye(3)]
     return np.stack(columns, axis=-1)
 
 
 def statements(compilation):
-    """What is stated of its attitude."""
+    """Return the statements about the attitude of a compilation, with their verdicts."""
     return list(proofs.check(compilation))
 
 
@@ -150,7 +152,8 @@ def statements(compilation):
 def test_elements_leave_the_other_momentum_as_it_is_and_turn_as_h_says(case):
     verdicts = statements(made(case))
     assert verdicts
-    if "split" in case:  # flows in sines, elements in those of half the angle: at points
+    # These statements relate sines of an angle to those of half the angle, and are only checked at points.
+    if "split" in case:
         assert all(s.holds for s in verdicts)
         assert [s.verdict for s in verdicts].count(PROVED) >= 2
     else:
@@ -174,7 +177,7 @@ def test_a_flow_and_its_element_take_each_function_of_an_angle_once():
 
 
 def altered(case, **changes):
-    """The compilation with another attitude."""
+    """Return the compilation of a case, with these changes of its attitude."""
     compilation_of_case = made(case)
     attitude = replace(compilation_of_case.program.attitude, **changes)
     return replace(compilation_of_case, program=replace(compilation_of_case.program, attitude=attitude))
@@ -212,10 +215,11 @@ def test_check_shows_the_statements():
 
 
 def elliptic_motion(t, m0):
-    """The free body with 2H I2 < |m|², in closed form: the momentum, and the rotation that turns body into space.
+    """Return the motion of the free rigid body with 2H I2 < |m|² in closed form: momenta m (rows, 3), and rotation
+    matrices (rows, 3, 3) from the body to space.
 
-    The spatial momentum is along the third axis; angles are those of Euler, zxz. m0 has no second component, so that
-    the motion starts where m = a (cn, sn, dn).
+    The spatial momentum points along the third axis. The rotations have Euler angles in the convention zxz. The second
+    component of m0 must be 0, so that the motion m = (a₁ cn, a₂ sn, a₃ dn) starts at m0.
     """
     i1, i2, i3 = INERTIA
     total, energy = m0 @ m0, (m0**2 / INERTIA).sum()
@@ -235,7 +239,7 @@ def elliptic_motion(t, m0):
 
 
 def about(axis, angles):
-    """Rotations about a coordinate axis."""
+    """Return the rotation matrices about a coordinate axis by these angles."""
     half = np.zeros((len(angles), 4))
     half[:, 0], half[:, 1 + axis] = np.cos(angles / 2), np.sin(angles / 2)
     return rotation(half)
@@ -255,7 +259,9 @@ def test_the_closed_form_is_a_solution():
 
 
 def errors(case, order, counts, gauge=None):
-    """The errors of the attitude after so many steps, against the closed form."""
+    """Return the errors of the final attitude, compared with the closed form, for each number of steps in
+    ``counts``.
+    """
     exact = elliptic_motion(TIMES, START)[1]
     norms = []
     for steps in counts:
@@ -300,7 +306,9 @@ def test_other_elements_have_the_order_too(case):
 
 
 def whole_motion(x0, gradient, t):
-    """Momentum, force direction, quaternion and position of a body on se(3)*, by DOP853."""
+    """Return the state (momentum and direction of the force), the quaternion and the position at time t of a body on
+    se(3)*, integrated by DOP853.
+    """
 
     def slope(_, u):
         p, g, q = u[:3], u[3:6], u[6:10]
@@ -361,7 +369,9 @@ def test_a_split_top_moves_as_by_the_series():
 
 
 def conserved(case, x, g):
-    """The momenta in the other frame as matrices or vectors: of a body of so(n), by its attitudes (rows, n, n)."""
+    """Return the momenta in the frame in which they are conserved, as matrices (rows, n, n), for states x (rows, DIM)
+    and attitudes g (rows, n, n).
+    """
     group = made(case).program.attitude.group
     basis = np.array([[[float(e.value) for e in row] for row in m] for m in group.matrices])
     norms = (basis**2).sum(axis=(1, 2))
@@ -420,7 +430,9 @@ def test_so4_has_the_attitude_of_the_whole_motion():
 
 
 def test_what_casimirs_turn_keeps_a_matrix_orthogonal_for_a_long_time():
-    """A uniform motion over all of it, by doubling a short one: so is what rounding takes from orthogonality."""
+    """The rotation by the Casimirs over a long time is computed by repeated doubling of a short one. The doubling must
+    not also double the deviation of the matrix from orthogonality that rounding causes.
+    """
 
     def excess(g):
         return np.abs(g.reshape(-1, 4, 4) @ np.swapaxes(g.reshape(-1, 4, 4), 1, 2) - np.eye(4)).max()
@@ -447,7 +459,9 @@ def test_spatial_momentum_is_constant_to_round_off_for_many_steps(case):
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("h", [0.3, 7.0, 12 * np.pi, 12 * np.pi + 1e-6, -50.0])
 def test_flows_may_turn_by_any_angle(target, h):
-    """12π: the first flow turns by π, where neither a tangent of the half nor a division by 1 + cos will do."""
+    """With h = 12π the first flow is a rotation by π. Formulas with the tangent of half the angle, or with a division
+    by 1 + cos of the angle, would fail there.
+    """
     start = np.array([0.3, 0.2, 1.0])
     run = solver("body, split", target, 2).integrate(start, h, 20)
     assert np.abs(momenta_in_space(run) - start).max() < 3e-14
@@ -457,7 +471,9 @@ def test_flows_may_turn_by_any_angle(target, h):
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("case", ["body", "body, split"])
 def test_after_a_kick_a_body_turns_as_one_that_starts_there(case, target):
-    """By another rate of the Casimirs that are taken from H: an impulse along the momentum too changes it."""
+    """The Casimirs that the gauge subtracts from H rotate the body at a rate that depends on the momentum. A kick along
+    the momentum changes this rate, too.
+    """
     session = solver(case, target, 6).session([0.3, 1.0, 0.2]).step(0.02, 10)
     session.kick(0.5 * session.x)
     fresh = session.solver.session(session.x, attitude0=session.attitude)
@@ -522,14 +538,16 @@ def test_members_are_turned_each_by_itself():
 
 @cache
 def small_top() -> Solver:
-    """The C of the profile small, which has no members with numbers of their own elsewhere."""
+    """Return the solver of the heavy top in C with the profile small."""
     return solver_of(compile_spec(spec_of(TOP), order=2, profile="small"), "c")
 
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("target", ["c", "numpy", "small"])
 def test_members_of_ensembles_have_attitudes_and_positions(target):
-    """Each begins with its own and has the bits of a run of it alone, in rows and without, in any number of threads."""
+    """Members have their own initial attitudes and positions. Their stored rows have the bits of single runs, with any
+    number of threads. Final attitudes without stored rows agree to round-off.
+    """
     top, rng = small_top() if target == "small" else solver("top", target), np.random.default_rng(2)
     x0, attitude0, position0 = rng.normal(size=(40, 6)), rng.normal(size=(40, 4)), rng.normal(size=(40, 3))
     frames = top.attitudes(x0, 0.05, 10, 4, attitude0=attitude0, position0=position0)

@@ -1,4 +1,4 @@
-"""Attitudes with forces, noise and monitors, compared with the integral of q̇ = ½ q ∇H."""
+"""Attitudes with forces, noise and monitors, compared with numerical solutions of q̇ = ½ q ∇H for the quaternion q."""
 
 from functools import cache
 
@@ -34,7 +34,7 @@ CASES = {
     "shaken": BODY + NOISE,
 }
 pytestmark = pytest.mark.few("pushed", "damped, along paths", "monitored by log", "shaken", "split in time", of=CASES)
-#: Those of which order 4 is measured too.
+#: Cases for which the order is also measured with a method of order 4.
 HIGHER = ("pushed", "pushed and monitored", "monitored", "monitored by log", "split in time")
 START, SPAN = [0.5, 0.8, -0.4], 2.0
 DRAWN = np.random.default_rng(3).normal(size=(8, 2)) * np.sqrt(SPAN / 8)
@@ -46,7 +46,7 @@ def made(case, order=2):
 
 
 def product(a, b):
-    """The product of two quaternions."""
+    """Return the product of two quaternions."""
     return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
 
 
@@ -60,7 +60,9 @@ def slope(case, t, x):
 
 @cache
 def reference(case, end):
-    """The motion of x and of the quaternion by DOP853, in pieces where the noise is constant."""
+    """Return x and the quaternion at the time ``end``, integrated by DOP853. With noise, the integration has eight
+    pieces, in each of which the noise is constant.
+    """
     integrator, state = solver(made(case), "numpy"), np.array([*START, 1.0, 0, 0, 0])
 
     def moving(t, y, push):
@@ -81,12 +83,14 @@ def reference(case, end):
 
 
 def along(n, parts):
-    """The increments of n steps that go along the path in straight lines."""
+    """Return the increments of the noise for n steps along a path that is a straight line in each eighth of the time. A
+    step uses ``parts`` equal increments of each source.
+    """
     return np.tile(np.repeat(DRAWN, n // 8, axis=0) / (n // 8) / parts, parts)
 
 
 def final(case, n, order=2, target="numpy"):
-    """The last state and attitude of n steps, and the time."""
+    """Return the last state and attitude of n steps as one array, and the time."""
     about = {"increments": along(n, len(CASES[case].split("scheme")))} if "shaken" in case else {}
     run = solver(made(case, order), target).integrate(START, SPAN / n, n, n, **about)
     return np.array([*run.x[-1], *run.attitude[-1]]), run.t[-1]
@@ -95,7 +99,9 @@ def final(case, n, order=2, target="numpy"):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("case", "order"), [(c, k) for c in CASES for k in (2, 4) if k == 2 or c in HIGHER])
 def test_momentum_and_attitude_have_the_order(case, order):
-    """With hζ in the element, or without it in the momentum, a body that is damped turns wrongly at order 0."""
+    """With the force term hζ in the element of the attitude, or without it in the momentum, the attitude of a damped
+    body would have an error of order 0.
+    """
     errors = []
     for n in (16, 32):
         state, t = final(case, n, order)
@@ -108,7 +114,7 @@ def test_momentum_and_attitude_have_the_order(case, order):
 def test_c_and_javascript_agree_with_numpy(case):
     expected = final(case, 16)[0]
     assert final(case, 16, 2, "c")[0] == pytest.approx(expected, abs=1e-13)
-    if "shaken" not in case:  # of these the increments are given
+    if "shaken" not in case:  # the noise of the cases "shaken" is given by increments
         run = javascript(made(case), f"x0: {START}", f"s.integrate({SPAN / 16}, 16)", "[...s.x, ...s.attitude]")
         assert run == pytest.approx(expected, abs=1e-13)
 
@@ -127,7 +133,9 @@ def test_the_attitude_is_that_of_the_state_where_an_increment_is_refused():
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("case", CASES)
 def test_members_have_the_bits_of_runs_alone(case, target):
-    """With a step, a time, a path of the noise and an attitude of each; to the frames, and after the last of them."""
+    """Each member has its own step size, start time, path of the noise and attitude. Stored rows have the bits of
+    single runs, and the last attitude agrees to round-off without stored rows.
+    """
     integrator, count = solver(made(case), target), 3
     rng = np.random.default_rng(1)
     x0, q0, h = rng.normal(size=(count, 3)), rng.normal(size=(count, 4)), np.array([0.1, 0.07, 0.11])
@@ -146,7 +154,9 @@ def test_members_have_the_bits_of_runs_alone(case, target):
 
 @pytest.mark.parametrize("case", ["monitored", "monitored by log", "shaken", "split and shaken"])
 def test_the_momentum_in_space_is_constant(case):
-    """Monitor and noise are Hamiltonian, so their elements belong to the momentum."""
+    """A monitor and noise enter the step by Hamiltonians, so the attitude moves with the momentum, and the momentum in
+    space is constant.
+    """
     run = solver(made(case), "c").integrate(START, 0.1, 2000, 50)
     w, u = run.attitude[:, :1], run.attitude[:, 1:]
     in_space = run.x + 2 * (w * np.cross(u, run.x) + np.cross(u, np.cross(u, run.x)))

@@ -1,4 +1,4 @@
-/* What the gateways need of MATLAB's header, declared for a check of types. */
+/* Declarations of MATLAB's mex.h that the gateways use, so that a compiler can check their types without MATLAB. */
 #include <stddef.h>
 typedef struct mxArray mxArray;
 typedef enum { mxREAL, mxCOMPLEX } mxComplexity;

@@ -1,4 +1,4 @@
-"""Bindings: the programs of docs/bindings.md, and systems with all that a binding may have."""
+"""Bindings: the programs of docs/bindings.md run, and the bindings of systems with all features compile."""
 
 import re
 import sys
@@ -19,7 +19,8 @@ from phigen.compiler import compile_proved, emit
 ROOT = Path(__file__).parents[2]
 MEX = Path(__file__).parent
 
-#: Name of a libc function; names that languages keep, or cannot tell apart; a time, observables, kicks; no Casimirs.
+#: A spec with awkward names: its name is that of a libc function, and its parameters are keywords of languages, or only
+#: differ in case. It has a time and an observable, but no Casimirs.
 AWKWARD = """phigen: 1
 name: div
 title: "a title, */ and <b>"
@@ -35,7 +36,7 @@ profile: small
 
 @pytest.fixture(scope="module")
 def tumbler(tmp_path_factory):
-    """A folder with all bindings of the README's body."""
+    """Return a folder with all bindings of the body in README.md."""
     folder = tmp_path_factory.mktemp("tumbler")
     text = (ROOT / "README.md").read_text(encoding="utf-8").split("```yaml\n")[1].split("```")[0]
     (folder / "tumbler.yaml").write_text(text, encoding="utf-8")
@@ -48,18 +49,18 @@ def tumbler(tmp_path_factory):
 
 
 def example(language):
-    """The program of the page in a language."""
+    """Return the program in this language from docs/bindings.md."""
     return (ROOT / "docs/bindings.md").read_text(encoding="utf-8").split(f"```{language}\n")[1].split("```")[0]
 
 
 def commands(after):
-    """The commands under the program."""
+    """Return the shell commands under the program in this language in docs/bindings.md, as lists of words."""
     text = (ROOT / "docs/bindings.md").read_text(encoding="utf-8").split(f"```{after}\n")[1]
     return [line.split() for line in text.split("```sh\n")[1].split("```")[0].splitlines()]
 
 
 def expected(folder):
-    """What the NumPy beside it gives."""
+    """Return the output that a program must print, computed by the NumPy solver in the same folder."""
     code = "import tumbler as b; x = b.integrate([0.01, 1, 0.01], 0.1, 300)[-1]"
     code += "; print(f'{x[0]:.6f} {b.casimirs(x)[0]:.12f}')"
     return run([sys.executable, "-c", code], folder / "generated/tumbler")
@@ -90,7 +91,7 @@ def test_program_in_rust_runs(tumbler):
 
 
 def cell(language):
-    """The code in the table of parameters, in a language."""
+    """Return the pieces of code for a language in the table of parameters of docs/bindings.md."""
     row = re.search(
         rf"^\| {re.escape(language)} \| (.*) \|$", (ROOT / "docs/bindings.md").read_text("utf-8"), re.MULTILINE
     )
@@ -99,7 +100,7 @@ def cell(language):
 
 @pytest.mark.slow
 def test_parameters_are_set_as_the_page_says(tumbler):
-    """In C++, Fortran and Rust, by programs of the page with the lines of the table in them."""
+    """The code of the table of parameters works in the C++ and Fortran programs of the page, and compiles in Rust."""
     run([tool("cc"), "-std=c99", "-c", "generated/tumbler/tumbler.c"], tumbler)
     declare, assign, start = cell("Fortran")
     fortran = re.sub(r"  call body%init.*", f"  {assign}\n  {start}", example("fortran"))
@@ -124,7 +125,8 @@ def test_parameters_are_set_as_the_page_says(tumbler):
     run([tool("cargo"), "check", "--quiet", "--offline"], folder)
 
 
-#: Calls of the gateway, and what Octave prints: the states of the page, outputs left out, and arguments refused.
+#: Calls of the MEX gateway: the states of the page, omitted outputs, and refused arguments. `ANSWERS` is what Octave
+#: prints.
 GATEWAY = """format long
 [x, H, C] = tumbler_mex([0.01 1 0.01], 0.1, 300, 10);
 printf("%d %d %d %d\\n", size(x), size(H, 2), size(C, 2));
@@ -214,7 +216,7 @@ def test_bindings_compile_for_systems_of_all_kinds(source, tmp_path):
     assert symbols <= set(re.findall(rf"\b{name}_\w+", (tmp_path / f"{name}.h").read_text(encoding="utf-8")))
 
 
-#: A body in a fluid, with an attitude and a position behind it.
+#: A body in a fluid, whose attitude is a quaternion followed by a position.
 FLUID = """phigen: 1
 name: hull
 coordinates: [m1, m2, m3, p1, p2, p3]
@@ -224,7 +226,7 @@ order: 2
 profile: small
 reconstruct: quaternion
 """
-#: Programs that set an attitude and a position, print what they read, and whether a quaternion of 0 is refused.
+#: Programs by language that set an attitude and a position, print them, and print whether a quaternion of 0 is refused.
 SETTERS = {
     "cpp": """#include <cstdio>
 #include "hull.hpp"
@@ -260,7 +262,9 @@ fn main() {
 
 
 def written(source, programs, folder):
-    """Write the C and bindings of a system; compile programs by language to ``by_LANGUAGE``. Return its compilation."""
+    """Write the C and the bindings of a system, compile a program for each language to ``by_LANGUAGE``, and return the
+    compilation.
+    """
     compilation = compile_proved(specs.loads(source)).including("parameters")
     name = compilation.spec.name
     for file, text in emit(compilation.program, "c", "x").items():
@@ -296,7 +300,8 @@ scheme: gauss
 order: 4
 profile: small
 """
-#: Programs that change a parameter of a running solver, interpolate, and print whether mistakes are refused.
+#: Programs by language that change a parameter of a running solver, interpolate, and print whether wrong calls are
+#: refused.
 CHANGES = {
     "cpp": """#include <cstdio>
 #include "swing.hpp"
@@ -402,7 +407,9 @@ def test_bindings_are_refused_without_the_function_that_they_call(tmp_path):
 
 
 def test_check_is_about_bindings_and_the_function_that_they_call(tmp_path):
-    """The C of the profile small has set_parameters for a binding; the command in its header says so."""
+    """With --binding, the C of the profile small has set_parameters, and its header names the command with this option.
+    So --check must be called with the same option.
+    """
     (tmp_path / "swing.yaml").write_text(SWING, encoding="utf-8")
     words = ["build", str(tmp_path / "swing.yaml"), "-o", str(tmp_path)]
 

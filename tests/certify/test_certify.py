@@ -1,4 +1,6 @@
-"""Certificates of steps: they hold for the compiled C, say something, and are refused where they were tampered with."""
+"""Certificates of steps: their bounds hold for the compiled C and are not far too large, and changed certificates are
+refused.
+"""
 
 from __future__ import annotations
 
@@ -52,8 +54,8 @@ from phigen.runtime import cache as compiled
 from phigen.spec import loads
 from phigen.spec.model import Spec
 
-#: Systems of different kinds, with changes of the default problem: by a formula, by Newton's method for four kinds of
-#: brackets, with the time, with a Casimir gauge, by flows, with a monitor, along paths.
+#: Systems for each kind of step, with changes of the default problem: an explicit step, Newton's method for four kinds
+#: of brackets, a time, a Casimir gauge, a splitting, a monitor, and paths.
 SYSTEMS: dict[str, dict[str, Any]] = {
     "pendulum_euler": {},
     "pendulum": {"domain": [[-1, 1], [-1.5, 1.5]]},
@@ -72,19 +74,23 @@ SYSTEMS: dict[str, dict[str, Any]] = {
     "charged_particle": {},
 }
 
-#: Largest ratio of the bound to the error that was observed, in the coordinate where it is least: a bound beyond says
-#: nothing. Of many terms that cancel the sizes are added up.
+#: The largest accepted ratio of the bound to the observed error, in the coordinate where the ratio is smallest;
+#: elsewhere 12. The ratio is large if many terms cancel, because the bound adds their absolute values.
 VACUOUS = {"kepler_eccentric": 40}
 
 
 def problem(name: str) -> tuple[StepProblem, dict[str, str]]:
-    """The problem of a system of the corpus, and its C."""
+    """Return the problem of a certificate for a system of the corpus, with the changes in `SYSTEMS`, and the C
+    files.
+    """
     stated, files = problem_of_spec(spec_of(name))
     return dataclasses.replace(stated, **SYSTEMS.get(name, {})), files
 
 
 def problem_of_spec(spec: Spec) -> tuple[StepProblem, dict[str, str]]:
-    """The problem of a spec, in boxes of 1 % around the start of its first run, and its C."""
+    """Return the problem of a certificate for a spec, and the C files. The domain is a box of ±1 % around the start of
+    the first run.
+    """
     compilation = compile_spec(spec, profile="small")
     files = emit(compilation.program, "c", "phigen certify")
     run = next(iter(spec.runs.values()))
@@ -135,10 +141,12 @@ def test_steps_of_the_compiled_c_are_within_the_bound(name: str) -> None:
 
 
 def test_predicted_starts_of_newtons_method_are_covered() -> None:
-    """The steps of a trajectory, whose iterations start with what is extrapolated, stay within the bound."""
+    """Later steps of a trajectory start Newton's method from an extrapolation of earlier steps. They stay within the
+    bound, too.
+    """
     c, files = certificate("pendulum")
     start = copy.deepcopy(c)
-    for k in range(1, 12):  # the predictor has differences of order 9 after ten steps
+    for k in range(1, 12):  # after ten steps the predictor uses differences of order 9
         state = _after(start, library(files), [0.4, 0.2], k)
         exact = ExactMap(exact_map("pendulum"))([arb(a) + arb(b) for a, b in zip(*state[0], strict=True)], 0.0)
         errors = [float(abs(arb(a) + arb(b) - e)) for a, b, e in zip(*state[1], exact, strict=True)]
@@ -146,7 +154,7 @@ def test_predicted_starts_of_newtons_method_are_covered() -> None:
 
 
 def _after(c: dict[str, Any], lib: Any, x: list[float], steps: int) -> list[tuple[list[float], list[float]]]:
-    """State and compensation after some steps of one solver, and after one more."""
+    """Return the state and the compensation terms after ``steps`` steps of a solver, and those after one more step."""
     n, name = len(x), c["name"]
     size = getattr(lib, f"{name}_solver_size")
     size.restype = ctypes.c_size_t
@@ -162,7 +170,9 @@ def _after(c: dict[str, Any], lib: Any, x: list[float], steps: int) -> list[tupl
 
 @pytest.mark.parametrize("name", ["pendulum", "predator_prey"])
 def test_the_exact_map_is_that_of_the_formulas(name: str) -> None:
-    """The map of the certificate, read from the C, is that of α, β and S_h, which share nothing with the C."""
+    """The exact map that is read from the C agrees with the map computed from α, β and S_h in many digits, without the
+    C.
+    """
     c, _ = certificate(name)
     precise_step = PreciseStep(compile_spec(spec_of(name)), c["parameters"], c["step"])
     x = [(a + 2 * b) / 3 for a, b in c["domain"]]
@@ -171,12 +181,13 @@ def test_the_exact_map_is_that_of_the_formulas(name: str) -> None:
         differences = [
             abs(a - mpmath.mpf(b.mid().str(45, radius=False))) for a, b in zip(expected, reached, strict=True)
         ]
-    # numbers such as 1/10 are written as doubles in the parameters of both; S_h has rational numbers only
+    # Parameters such as 1/10 are the same doubles in both computations, and other numbers are rational, so the maps
+    # agree to many more digits than doubles have.
     assert max(differences) < 1e-38
 
 
 def leaves(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """The paths of all values in a certificate."""
+    """Return the paths (keys and indices) to all values in a certificate."""
     if isinstance(value, dict | list):
         pairs = value.items() if isinstance(value, dict) else enumerate(value)
         return [leaf for key, below in pairs for leaf in leaves(below, (*path, key))]
@@ -184,7 +195,7 @@ def leaves(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 def test_a_certificate_in_which_any_value_was_changed_is_refused() -> None:
-    """One value of each field, wherever it stands in lists."""
+    """In each field one value is changed, in lists one of the entries. The digest of the certificate no longer fits."""
     whole, files = certificate("pendulum")
     fields = {tuple(key for key in path if isinstance(key, str)): path for path in leaves(whole)}
     for path in fields.values():
@@ -276,7 +287,7 @@ def polynomial_of(c: dict[str, Any]) -> Any:
 
 
 def shortened(c: dict[str, Any]) -> None:
-    """Leave out the linear coefficient."""
+    """Set the linear coefficient of the polynomial to 0."""
     numbers = [op for op in polynomial_of(c)["operations"] if op[0] == "number"]
     sorted(numbers, key=lambda op: -abs(op[1]))[1][1] = 0.0
 
@@ -296,7 +307,9 @@ def test_the_checker_needs_nothing_of_phigen(tmp_path: Path) -> None:
 
 
 def code_lines(text: str) -> dict[str, int]:
-    """Numbers of lines with code, neither comments nor docstrings, by top-level functions; "" for other lines."""
+    """Return the number of lines with code, without comments and docstrings, by top-level function or class. The key ""
+    stands for all other lines.
+    """
     tree, numbers = ast.parse(text), set[int]()
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type not in (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT):
@@ -323,7 +336,9 @@ def test_the_page_says_what_the_lines_of_the_checker_are_for() -> None:
 
 
 def test_a_jacobian_that_is_not_the_derivative_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The last correction counts to first order, so a wrong Jacobian would be as large an error."""
+    """The bound relies on Newton's last correction being right to first order. A wrong Jacobian would make an error of
+    this order, so it is refused.
+    """
     stated, _ = problem("pendulum")
     text = stated.text.replace("increment_jacobian[0] = ", "increment_jacobian[0] = 1e-9 + ")
     with pytest.raises(RefusedError, match="Jacobian is not the derivative"):
@@ -377,7 +392,8 @@ def test_coefficients_of_series_fall_as_the_rest_assumes() -> None:
     for name in SERIES:
         sizes = [abs(float(c)) for c in COEFFICIENTS[name]]
         assert all(size <= 2.0 ** (1 - n) for n, size in enumerate(sizes)), name
-        if not name.startswith("phi"):  # the factorials go on falling; phi has its nearest pole at 4 pi^2
+        # Coefficients with factorials decrease further; those of phi do not, since its nearest pole is 4π².
+        if not name.startswith("phi"):
             assert sizes[TERMS - 2] + sizes[TERMS - 1] < 2.0**-TERMS
 
 
@@ -390,7 +406,7 @@ def test_functions_and_derivatives_of_libm(name: str) -> None:
 
 
 def test_bounds_of_random_expressions_hold_for_every_value() -> None:
-    """Straight lines of random operations: computed with doubles, they stay within the bound, and near it."""
+    """Random sequences of operations in double precision: the errors stay within the bound, and some come near it."""
     draw, most = random.Random(7), 0.0
     apply: dict[str, Callable[..., float]] = {
         "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
@@ -421,7 +437,7 @@ def test_bounds_of_random_expressions_hold_for_every_value() -> None:
 
 
 def test_derivatives_are_limits_of_differences() -> None:
-    """Of each operation, by each operand."""
+    """The derivatives of each operation by each of its operands agree with difference quotients."""
     operations = [["u", 0], ["u", 1], ["mul", 0, 1], ["div", 0, 1], ["sub", 2, 3], ["mul", 0, 0], ["neg", 5],
                   ["add", 4, 6], ["exp", 7], ["add", 1, 0], ["div", 8, 9]]  # fmt: skip
 
@@ -439,7 +455,9 @@ def test_derivatives_are_limits_of_differences() -> None:
 @pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("name", ["pendulum_euler", "satellite_wheels"])
 def test_the_list_of_operations_in_doubles_is_the_c_bit_for_bit(name: str) -> None:
-    """For steps without iterations, of C that is compiled without fused operations."""
+    """Double precision arithmetic along the list of operations gives the state of the C, for steps without iterations,
+    if the C is compiled without fused multiply-add.
+    """
     c, files = certificate(name)
     (only,) = c["stages"]
     n, middle = len(c["domain"]), [(a + b) / 2 for a, b in c["domain"]]
@@ -481,7 +499,7 @@ def polynomial_value(series: dict[str, Any], s: float) -> float:
 
 
 def test_truncation_of_a_polynomial_counts() -> None:
-    """cos(sqrt(s)) by two terms is wrong by the third."""
+    """If cos(√s) is replaced by two terms of its series, the bound contains the third term, and little more."""
     polynomial = {
         "name": "cosroot", "radius": 1.0, "beyond": False,
         "operations": [["s", 0], ["number", -0.5], ["mul", 1, 0], ["number", 1.0], ["add", 3, 2]],
@@ -494,7 +512,9 @@ def test_truncation_of_a_polynomial_counts() -> None:
 
 
 def test_kernels_that_read_the_state_without_its_carry_are_wrong_by_it() -> None:
-    """The increment x - 1 has no rounding near 1, but the C computes it from x, and the map of x + carry differs."""
+    """The kernel computes the increment x − 1 without rounding error for x near 1. But it reads x without the
+    compensation term (carry), while the exact map is taken at x + carry; the bound must contain this difference.
+    """
     operations = [["x", 0], ["number", 1.0], ["sub", 0, 1]]
     c = {"series": {}, "ulps": 1.0, "carry": 1.01, "step": 1.0, "stages": [{"operations": operations, "change": [2]}]}
     with precise():
@@ -503,7 +523,9 @@ def test_kernels_that_read_the_state_without_its_carry_are_wrong_by_it() -> None
 
 
 def test_errors_of_a_stage_reach_flows_of_the_next_that_read_what_flows_before_them_moved() -> None:
-    """A coordinate q with a large error, then a drift q += p and a kick p -= 4q, which reads start + displacement."""
+    """The first stage gives q a large error. In the second stage a drift q += p is followed by a kick p −= 4q, which
+    reads q as start + displacement. So the error of p must be four times that of q.
+    """
     first = [["x", 0], ["number", 1e6], ["add", 0, 1], ["sub", 2, 1], ["number", 0.0]]
     drift = [["x", 1], ["carry", 0], ["add", 1, 0], ["start", 0], ["add", 3, 2]]
     kick = [["number", -4.0], ["mul", 4, 5], ["carry", 1], ["add", 7, 6]]
@@ -516,7 +538,9 @@ def test_errors_of_a_stage_reach_flows_of_the_next_that_read_what_flows_before_t
 
 
 def test_functions_of_libm_beyond_their_polynomials_are_covered() -> None:
-    """A pendulum at an angle around 1, where the C changes from a polynomial to the function of libm."""
+    """The domain of the pendulum contains the angle 1, at which the C changes from a polynomial to the function of
+    libm.
+    """
     stated, files = problem("pendulum_euler")
     stated = dataclasses.replace(stated, domain=[[0.9, 1.3], [-0.1, 0.1]])
     c = json.loads(json.dumps(certified(stated, 4)))
@@ -567,7 +591,7 @@ runs: {one: {initial: [0.3, 0.2], step: 0.1, steps: 10}}
 
 
 def test_splittings_that_depend_on_the_time_are_within_the_bound() -> None:
-    """The C has two functions called sin: that of libm, of the time, and one of its own, of q."""
+    """The C calls two functions that compute a sine: that of libm for the time, and a polynomial for q."""
     stated, files = problem_of_spec(loads(DRIVEN))
     c = json.loads(json.dumps(certified(stated, 4)))
     operations = {op for op, *_ in c["stages"][0]["operations"]}
@@ -579,7 +603,7 @@ def test_splittings_that_depend_on_the_time_are_within_the_bound() -> None:
 
 @pytest.mark.parametrize("seed", slow_but([12], of=(2, 12, 15)))
 def test_steps_of_random_systems_are_within_the_bound(seed: int) -> None:
-    """Flows, Gauss collocation and Newton's method for systems that nobody chose."""
+    """Random systems with splittings, Gauss collocation and Newton's method."""
     stated, files = random_problem(seed)
     c = json.loads(json.dumps(certified(stated, 4)))
     worst = observed(c, described(stated, exact=True), library(files), 4)
@@ -637,7 +661,9 @@ def test_schedules_of_endless_loops_are_refused() -> None:
 
 
 def test_the_runtime_is_the_one_that_the_theorems_are_about() -> None:
-    """Functions of the runtime that docs/certify.md proves things about. After a change read that page again."""
+    """docs/certify.md proves properties of these functions of the C runtime. If this test fails after a change, the
+    proofs on that page must be checked again.
+    """
     expect_phrases(
         "pendulum",
         {

@@ -1,4 +1,6 @@
-"""FMUs: valid descriptions, the bits of the C, any communication steps, states, events, and what is refused."""
+"""Functional mock-up units (FMUs): valid descriptions, the same bits as the C, any communication steps, states, events,
+and what is refused.
+"""
 
 import os
 import re
@@ -25,7 +27,7 @@ HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
 def body_spec(name, more="", *, title="a body", inputs="[torque]"):
-    """A rigid body with a torque as its input."""
+    """Return the text of a spec of a rigid body with a torque as input."""
     return f"""phigen: 1
 name: {name}
 title: '{title}'
@@ -80,7 +82,9 @@ MORE = ["satellite", "seasonal_predator_prey", "kepler_eccentric", "thermal_spin
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("source", [FREE, NASTY, *(pytest.param(s, marks=pytest.mark.slow) for s in MORE)])
 def test_descriptions_and_declarations_are_those_of_the_standard(source, tmp_path):
-    """The schema and rules of fmpy; the C compiles without warnings, after the headers of the standard too."""
+    """The descriptions are valid for fmpy. The C compiles without warnings, and also after the headers of the FMI
+    standard.
+    """
     compilation, files = unit(source)
     for version in (2, 3):
         path = tmp_path / f"{version}.fmu"
@@ -98,7 +102,7 @@ def test_descriptions_and_declarations_are_those_of_the_standard(source, tmp_pat
 
 
 def test_functions_of_fmi_are_short():
-    """The functions of both versions, comments included."""
+    """The templates for both versions of FMI have fewer than 600 lines that are not blank, comments included."""
     texts = [path.read_text(encoding="utf-8") for path in (resources.templates() / "c/runtime").glob("fmu*.c")]
     assert len(texts) == 3
     assert sum(line.strip() != "" for text in texts for line in text.split("\n")) < 600
@@ -116,9 +120,12 @@ BACKWARD = "back: {initial: [9, 9, 9], step: -0.1, steps: 10}"
 
 
 def test_description_takes_a_run_that_goes_forward_and_leaves_out_blank_units():
-    """The first run of the spec goes backward, and no communication step does."""
+    """The default experiment is the first run with a positive step, because communication steps go forward in time.
+    Units and descriptions without visible characters are omitted.
+    """
     text = body_spec("body").replace("runs: {r:", f"runs: {{{BACKWARD}, r:")
-    blank = 'unit: "\u0378", description: "\u0378"}'  # of no character, so that nothing is left in the XML
+    # U+0378 is not assigned to a character, so nothing of it is left in the XML.
+    blank = 'unit: "\u0378", description: "\u0378"}'
     text = text.replace("unit: kg.m2}", blank).replace("title: 'a body'", "title: ' '")
     _, files = unit(text)
     for description in files.descriptions.values():
@@ -138,7 +145,9 @@ def test_spec_with_backward_runs_only_is_refused_at_the_step():
 
 
 def states_of_c(steps, folder):
-    """The states of the generated C of the free body by itself after steps of each size, compiled as the FMU is."""
+    """Return the states of the free body after each pair (step size, number of steps), computed by the generated C
+    without an FMU, compiled with the flags of the FMU.
+    """
     calls = "".join(
         f"if (free_integrate(&s, {h!r}, {n}) != free_OK) return 1;"
         'for (int i = 0; i < free_DIM; i++) printf("%a ", s.x[i]);'
@@ -157,7 +166,7 @@ def states_of_c(steps, folder):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("version", [2, 3])
 def test_bits_are_those_of_the_c(free, version, tmp_path):
-    """For whole steps; and for a part of a step behind them, which is a step of that size."""
+    """The communication steps consist of whole steps, and the last one also of a shorter step, as in the C."""
     with running(free[1][version], tmp_path) as instance:
         by_unit = []
         for k in range(3):
@@ -172,7 +181,9 @@ def test_bits_are_those_of_the_c(free, version, tmp_path):
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_communication_steps_that_do_not_divide_leave_the_grid_alone(free, version, tmp_path):
-    """At the next common point nothing is left of parts of steps; between, Casimir and attitude are kept too."""
+    """Communication points may lie between two steps. At a later common point the state is the same as without these
+    points. Casimir and norm of the quaternion are constant at all points.
+    """
     with running(free[1][version], tmp_path / "a") as even, running(free[1][version], tmp_path / "b") as odd:
         even.step(0.0, 1.0)
         t = 0.0
@@ -219,13 +230,13 @@ def test_a_step_that_fails_is_discarded_and_leaves_the_state(free, version, tmp_
         with pytest.raises(Exception, match=r"status 2|\(discard\)"):
             instance.step(0.0, 80.0)
         assert instance.get("m1", "m2", "m3", "time") == before
-        instance.step(0.0, 0.02)  # a part that is short enough
+        instance.step(0.0, 0.02)  # a shorter step, for which the iteration converges
         assert instance.get("time") == [0.02]
 
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_steps_beyond_the_stop_time_are_errors_and_leave_the_state(free, version, tmp_path):
-    """The standard asks for it; a step to the stop time may be off by rounding."""
+    """The FMI standard requires this error. A step that passes the stop time only by rounding is accepted."""
     with running(free[1][version], tmp_path, start=1.0, stop=1.3) as instance:
         for k in range(2):
             instance.step(1.0 + 0.1 * k, 0.1)
@@ -257,7 +268,7 @@ def test_states_can_be_copied_and_serialised(free, version, tmp_path):
 
 
 def test_environment_in_c_under_sanitizers(tmp_path):
-    """Modes, early return, states, corrupted bytes and refused values, in one program with the FMU."""
+    """A C program that includes the FMU tests modes, early return, states, corrupted bytes and refused values."""
     _, files = unit(body_spec("body"))
     for file, text in files.sources.items():
         (tmp_path / file).write_text(text, encoding="utf-8")

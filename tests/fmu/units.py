@@ -1,4 +1,4 @@
-"""FMUs for tests: compiled by the C compiler of the machine, opened by fmpy."""
+"""FMUs for tests: compiled for this machine, and opened by fmpy."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
 
 
 def unit(source, **options):
-    """The compilation of a spec by its name or text, and its FMU without binaries."""
+    """Return the compilation of a spec, given by name or text, and the files of its FMU without binaries."""
     spec = specs.loads(source) if "\n" in source else specs.load(resources.file_of(source))
     compilation = compile_proved(spec, **options).including("parameters")
     return compilation, unit_of(compilation, emit(compilation.program, "c", "phigen build"))
 
 
 def compiled(files, folder, flags=("-O1",)):
-    """The bytes of the library of an FMU for this machine."""
+    """Compile an FMU for this machine, and return the bytes of its shared library."""
     for file, text in files.sources.items():
         (folder / file).write_text(text, encoding="utf-8")
     output = folder / "unit.so"
@@ -37,7 +37,7 @@ def compiled(files, folder, flags=("-O1",)):
 
 
 def written(source, folder, versions=(3, 2), **options):
-    """The compilation, and the paths of the FMU by version."""
+    """Write the FMU of a spec for each version of FMI, and return the compilation and the paths by version."""
     compilation, files = unit(source, **options)
     library = {host().folder: compiled(files, folder)}
     paths = {v: folder / f"fmi{v}.fmu" for v in versions}
@@ -47,7 +47,7 @@ def written(source, folder, versions=(3, 2), **options):
 
 
 class Instance:
-    """An instance of an FMU by fmpy, between its initialisation and its end, with values by name."""
+    """Initialised instance of an FMU in fmpy, whose variables are read and set by name."""
 
     def __init__(self, path, folder, start=0.0, stop=None, values=None, update=None, **options):
         from fmpy.fmi2 import FMU2Slave
@@ -75,7 +75,7 @@ class Instance:
         self.raw.exitInitializationMode()
 
     def get(self, *names):
-        """The values of variables."""
+        """Return the values of variables."""
         get = self.raw.getFloat64 if self.version == 3 else self.raw.getReal
         return [float(v) for v in get([self.numbers[name] for name in names])]
 
@@ -85,18 +85,18 @@ class Instance:
         put([self.numbers[name] for name in values], list(values.values()))
 
     def step(self, at, size):
-        """A communication step; of FMI 3 the outcome."""
+        """Make a communication step from the time ``at``. For FMI 3, return its outcome."""
         return self.raw.doStep(currentCommunicationPoint=at, communicationStepSize=size)
 
     def end(self):
-        """Give the instance back."""
+        """Terminate the instance and free its memory."""
         self.raw.terminate()
         self.raw.freeInstance()
 
 
 @contextlib.contextmanager
 def running(*arguments, **options):
-    """An instance, which is freed at the end."""
+    """Yield an `Instance`, which is freed at the end."""
     instance = Instance(*arguments, **options)
     try:
         yield instance

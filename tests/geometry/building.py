@@ -1,4 +1,4 @@
-"""Systems from short texts, for the tests."""
+"""Systems for tests, made from short texts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from phigen.symbolic.expression import ZERO
 
 
 def system(coordinates: str, poisson: str, hamiltonian: str | None = None, extra: str = "") -> System:
-    """The system of a spec with these parts; ``poisson`` and ``extra`` are YAML, coordinates separated by spaces."""
+    """Return the system of a spec with these parts. ``coordinates`` are names with spaces between them; ``poisson`` and
+    ``extra`` are YAML.
+    """
     names = coordinates.split()
     return system_from_spec(
         loads(
@@ -21,18 +23,18 @@ def system(coordinates: str, poisson: str, hamiltonian: str | None = None, extra
 
 
 def family(name: str, size: int, sign: int = 1) -> System:
-    """The dual of a named algebra in coordinates x1, x2, …"""
+    """Return the system on the dual of a named Lie algebra, with coordinates x1, x2, … and H = 0."""
     names = [f"x{i + 1}" for i in range(dimension(name, size))]
     return build_system("t", names, [], LieAlgebraForm(sign=sign, family=name, size=size), ZERO)
 
 
 def typed(original: System) -> System:
-    """The same system with its π as a matrix, everything else forgotten."""
+    """Return the system with π given as a matrix of expressions, so that its form in the spec is unknown."""
     return build_system(
         original.name, original.coordinates, original.parameters, MatrixForm(original.poisson), original.hamiltonian
     )
 
 
 def texts(expressions: object) -> list[str]:
-    """Expressions as text."""
+    """Return the expressions as texts."""
     return [str(e) for e in expressions]  # type: ignore[attr-defined]

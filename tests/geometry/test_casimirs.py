@@ -1,4 +1,4 @@
-"""Casimirs that are found, and those that are not repeated."""
+"""Search for Casimirs: those that it finds, and candidates that it drops because they depend on other Casimirs."""
 
 import pytest
 from clock import processor_seconds_below
@@ -82,7 +82,7 @@ def test_named_algebras_have_all_their_casimirs_also_when_typed(name, size, numb
 
 
 def test_quadratic_tensor_has_polynomial_casimirs():
-    # Sklyanin-type: {x, y} = xy + z², …, the Nambu tensor of a cubic
+    # The Nambu bracket of a cubic, {x, y} = xy + z², …, of the type of Sklyanin's brackets.
     s = system("x y z", "{nambu: ['x*y*z + (x**3+y**3+z**3)/3']}")
     matrix = [[str(e) for e in row] for row in s.poisson]
     again = system("x y z", f"{{matrix: {matrix}}}")
@@ -102,6 +102,6 @@ def test_dense_inhomogeneous_tensor_of_six_coordinates_takes_less_than_a_second(
     pull = "nambu: [a+b**2+c*d, b*c+e*f, a*f+d**2, c+e**2]"
     s = system("a b c d e f", f"{{{pull}}}")
     matrix = [[str(e) for e in row] for row in s.poisson]
-    with processor_seconds_below(3):  # under a second on an idle machine
+    with processor_seconds_below(3):  # it takes less than a second on an idle machine
         again = system("a b c d e f", f"{{matrix: {matrix}}}")
     assert len(again.casimirs) == 4

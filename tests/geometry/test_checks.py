@@ -53,7 +53,7 @@ def test_magnetic_field_with_divergence_fails_in_exactly_one_component():
     statement = jacobi_identity(charged_particle("z", "x", "y"))
     assert statement.verdict == REFUTED
     assert "(u, v, w)" in statement.detail
-    assert "parts do not reduce" not in statement.detail  # one component of 20
+    assert "parts do not reduce" not in statement.detail  # only one of the 20 components fails
     assert statement.residual == "3"
 
 
@@ -66,7 +66,8 @@ def test_jacobi_identity_holds_for_all_parameters_or_is_refuted():
 
 
 def test_non_polynomial_poisson_tensors_are_proved_or_refuted():
-    conformal = "exp(x)*sqrt(1+y**2)/z"  # any multiple of a rank-2 tensor on R³ that has a Casimir
+    # On R³, a tensor of rank 2 that has a Casimir stays Poisson if it is multiplied by any function.
+    conformal = "exp(x)*sqrt(1+y**2)/z"
     good = f"{{brackets: {{x: {{y: 'z*{conformal}', z: '-y*{conformal}'}}, y: {{z: 'x*{conformal}'}}}}}}"
     assert jacobi_identity(system("x y z", good)).verdict == PROVED
     bad = f"{{brackets: {{x: {{y: 'z*{conformal}', z: '-y'}}, y: {{z: 'x*{conformal}'}}}}}}"

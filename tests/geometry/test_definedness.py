@@ -1,4 +1,4 @@
-"""Formulas that have a value nowhere are found: by proof where something is divided by zero, else at points."""
+"""Formulas that are defined nowhere are found: divisions by 0 by proof, others by evaluation at points."""
 
 import pytest
 

@@ -25,7 +25,7 @@ DIMENSIONS = {
 
 
 def constants(name, size):
-    """(i, j) → {k: c}, from 1, numbers as text."""
+    """Return the structure constants {(i, j): {k: c}} of a named algebra, with indices from 1 and numbers as texts."""
     rows = named(name, size).constants.items()
     return {(i + 1, j + 1): {k + 1: str(c) for k, c in row.items()} for (i, j), row in rows}
 
@@ -73,7 +73,8 @@ def test_small_families_have_the_documented_bases():
     assert constants("heisenberg", 2) == {(1, 3): {5: "1"}, (2, 4): {5: "1"}}
     assert constants("se", 2) == {(1, 2): {3: "1"}, (1, 3): {2: "-1"}}
     assert constants("gl", 2)[2, 3] == {1: "1", 4: "-1"}
-    assert constants("so", 4)[1, 2] == {4: "-1"}  # [12, 13] = −23
+    # [E12, E13] = −E23, where E12, E13, E14, E23 are the first elements of the basis.
+    assert constants("so", 4)[1, 2] == {4: "-1"}
 
 
 @pytest.mark.parametrize(

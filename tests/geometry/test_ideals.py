@@ -1,4 +1,4 @@
-"""Ideals that the basis hides."""
+"""Decomposition of Lie algebras into commuting ideals that no basis element may belong to."""
 
 import pytest
 from geometry.building import family, system

@@ -1,4 +1,4 @@
-"""Generic rank."""
+"""Generic rank of matrices of expressions."""
 
 from fractions import Fraction
 
@@ -16,7 +16,7 @@ def test_an_unlucky_point_does_not_lower_the_rank():
 
 
 def test_functions_are_evaluated_far_beyond_double_precision():
-    # sin² + cos² − 1 is rounding error, 1e-30·exp(x) is not.
+    # sin² + cos² − 1 only has values of the size of rounding errors and counts as 0. 1e-30·exp(x) does not.
     zero = call("sin", x) ** 2 + call("cos", x) ** 2 - 1
     assert generic_ranks([[[zero, ONE], [ZERO, ONE]], [[call("exp", x) / 10**30, ZERO], [ZERO, ONE]]]) == [1, 2]
 
@@ -37,7 +37,9 @@ def test_neither_multiples_of_a_prime_nor_denominators_with_it_lower_the_rank():
 
 
 def test_numbers_are_looked_at_once(monkeypatch):
-    """As the gradients of linear Casimirs are, of which large algebras have hundreds."""
+    """Constant matrices are evaluated at one point only. The gradients of linear Casimirs are constant, and large
+    algebras have hundreds of them.
+    """
     points = []
     monkeypatch.setattr(rank, "sample_point", lambda *arguments: points.append(1) or sample_point(*arguments))
     for entry, times in ((ONE, 1), (x, POINTS)):

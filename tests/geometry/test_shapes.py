@@ -1,4 +1,4 @@
-"""Recognition of what a π is, however it was typed, with parameters in it."""
+"""Recognition of the shape of π, for instance canonical or linear, in any notation and with parameters."""
 
 import pytest
 from geometry.building import family, system, typed
@@ -24,8 +24,8 @@ def test_canonical_pairs_are_found_in_any_order_and_sign():
     [
         ("1 + sin(x)**2 + cos(x)**2", "2"),
         ("m*exp(x + y)*exp(-x - y)", "m"),
-        ("(l*x + l)/(1 + x)", "l"),  # that has no value at −1 alone
-        ("log(x)/log(x) + l*(cosh(y)**2 - sinh(y)**2)", "1 + l"),  # neither at 0 nor at 1
+        ("(l*x + l)/(1 + x)", "l"),  # undefined at x = −1 only
+        ("log(x)/log(x) + l*(cosh(y)**2 - sinh(y)**2)", "1 + l"),  # undefined at x = 1 and for x ≤ 0
         ("sqrt(x)**2/x + atan(y) - atan(y)", "1"),
     ],
 )

@@ -88,7 +88,9 @@ OUT_OF_RANGE = {
 
 @pytest.mark.parametrize("what", OUT_OF_RANGE)
 def test_numbers_keep_the_limits_of_spec_files(what):
-    """Else they fail much later, where they become doubles."""
+    """Numbers from sympy obey the limits for numbers in specs. Otherwise they would fail later, when they become
+    doubles.
+    """
     with pytest.raises(LimitError, match="out of range"):
         System.from_sympy([x, y], [[0, 1], [-1, 0]], x + OUT_OF_RANGE[what] * y)
     assert expression(sympy.Float("1e-30")).value == Fraction(1, 10**30)

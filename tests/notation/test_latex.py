@@ -1,4 +1,4 @@
-"""LaTeX of whole systems, compared with reviewed files of the same names."""
+"""LaTeX of whole systems, compared with the reviewed files NAME.tex in this folder."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Formulas in MathML say what the expressions say, and can be trusted with any name."""
+"""Formulas in MathML have the values of the expressions, and are well-formed for any names."""
 
 from fractions import Fraction
 from xml.etree import ElementTree
@@ -50,11 +50,11 @@ def agrees(e):
 
 
 def joined_value(pieces, values=VALUES, functions=None):
-    """The value of pieces set one after the other."""
+    """Return the value of pieces of MathML that are set one after another."""
     return value_of(f"<mrow>{''.join(pieces)}</mrow>", values, functions)
 
 
-#: Functions that other tests read, and those of flows, which have no formula but their name.
+#: Functions that other tests cover, and functions of flows, which are written by their names only.
 OTHERS = {"phi0", "phi1", "phi2", "acosh", "anomaly", *ELLIPTIC, THIRD, *REMAINDERS, *QUOTIENTS}
 
 
@@ -163,7 +163,7 @@ def test_no_name_breaks_the_markup(name):
 
 
 def doubled(e, times=60):
-    """An expression that would have 2**times leaves if it were written out."""
+    """Return an expression with common subexpressions, which would have 2**times leaves if these were written out."""
     for _ in range(times):
         e = e * call("cos", e) + call("sin", e)
     return e

@@ -1,4 +1,4 @@
-"""Names for what formulas share, in text."""
+"""Names for the common subexpressions of formulas that are printed as text."""
 
 import cmath
 import math
@@ -35,7 +35,9 @@ def damped_spin():
 
 
 def test_long_flows_are_written_by_what_they_share(damped_spin):
-    """In lines that a reader can take in, which together are the flow: each name by those before it."""
+    """The formulas of a flow are printed in lines of less than 160 characters: the images, then the names of common
+    subexpressions, each defined by earlier names. Together they have the values of the flow.
+    """
     listed = flows.formulas(damped_spin, None)
     for k, flow in enumerate(damped_spin.splitting.flows, 1):
         lines = [(name.removeprefix(f"Φ_{k}: "), text) for name, text in listed if name.startswith(f"Φ_{k}: ")]
@@ -78,7 +80,7 @@ order: 2
 
 @pytest.mark.parametrize("most", [2, 3, 8])
 def test_terms_that_are_left_out_are_not_the_leading_ones(most):
-    """What is shown of α(x, p) is x at p = 0."""
+    """The terms that are printed give α(x, 0) = x, so the leading terms are among them."""
     compilation = compile_spec(loads(PENCIL))
     names = compilation.system.coordinates
     maps = {f"α_{c}": e for c, e in zip(names, compilation.realisation.alpha, strict=True)}

@@ -29,7 +29,7 @@ def test_latex_of_a_system_has_bracket_energy_and_casimirs(body):
 def test_html_is_well_formed_and_says_the_values_of_parameters(body):
     shown = body.system._repr_html_()
     lines = ElementTree.fromstring(shown.replace("&#x2062;", "")).findall("div")
-    assert len(lines) == 1 + 3 + 1  # H, the brackets, C
+    assert len(lines) == 1 + 3 + 1  # H, three brackets, C
     assert "I1 = 2, I2 = 1, I3 = 0.666667" in shown
     assert f"compiled to order {body.program.order}" in body._repr_html_()
 
@@ -58,7 +58,8 @@ def test_lattices_show_themselves_as_other_systems_do():
     assert rows[0] == ["", "t", "mean x", "mean y", "mean z", "energy", "C"]
     assert [row[:2] for row in rows[1:]] == [["start", "0"], ["end", "0.3"], ["largest change", ""]]
     assert float(rows[3][6]) < 1e-14
-    assert len(trajectory.plot().axes) == 3 * 2 + 1  # diagrams with their scales, and what was conserved
+    # Three diagrams with a colour scale each, and a diagram of what is conserved.
+    assert len(trajectory.plot().axes) == 3 * 2 + 1
     dataset = trajectory.to_xarray()
     assert dict(dataset.sizes) == {"t": 3, "coordinate": 3, "i": 4}
     assert (dataset.x.sel(coordinate="y").values[0] == states[1]).all()

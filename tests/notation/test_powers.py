@@ -15,7 +15,7 @@ TEXT = "phigen: 1\nname: l\ncoordinates: [x1, x2, x3]\nparameters: {k: 0.4}\nham
 
 @pytest.mark.parametrize("row", ["k, 2", "k - 1, 3/2", "2*k, -k"])
 def test_casimirs_with_parameters_in_exponents_are_products_of_powers(row):
-    """The value of what is written is that of the Casimir."""
+    """The printed product of powers has the value of the Casimir."""
     a, b = row.split(", ")
     matrix = f"[[0, 1, {a}], [-1, 0, {b}], [-({a}), -({b}), 0]]"
     system = system_from_spec(loads(f"{TEXT}poisson: {{log_canonical: {matrix}}}\n"))

@@ -1,4 +1,4 @@
-"""LaTeX: what mathematics looks like, and lines that fit the page."""
+"""LaTeX: how formulas look, and line breaks that fit the page."""
 
 import re
 import shutil
@@ -17,7 +17,8 @@ from phigen.symbolic.symbols import GAUGE, Symbol, momentum
 x, y, p = symbol("x"), symbol("px"), symbol(momentum("x1"))
 NAMES = [symbol(f"x{i}") for i in range(1, 31)]
 LONG = total(NAMES)
-#: Systems with wide tensors, deep parentheses, long fractions, exponents and roots, paths, splittings.
+#: Systems whose formulas are hard to set: wide tensors, nested parentheses, long fractions, exponents and roots, paths,
+#: splittings.
 WIDE = ("kepler", "poisson_not_hamiltonian", "sklyanin_gyrostat", "toda3_quadratic", "gaussian_moments", "spin_chain5")
 
 
@@ -43,7 +44,7 @@ def test_formulas_look_as_on_paper(e, written):
 
 
 def plain(text):
-    """Without what breaking lines changes: sizes of parentheses, signs of products, spaces."""
+    """Remove what line breaks may change: sizes of parentheses, signs of products, spaces."""
     return re.sub(r"\\(left|right|biggl|biggr|cdot)(?![a-z])|\s", "", text)
 
 
@@ -65,7 +66,7 @@ def test_long_formulas_are_broken_and_keep_every_part(e):
     assert len(broken) > 2
     assert plain("".join(broken)) == plain(latex(*markup))
     for line in broken:
-        # A letter with an index takes about an em, the sign and the spaces around it another.
+        # A letter with an index is about one em wide, and a sign with its spaces is another em wide.
         assert len(re.findall(r"x_|\\mathit|[-+]", line)) <= room
 
 

@@ -1,4 +1,6 @@
-"""Second derivation by sympy: equal to the compiler's for the corpus, and refuted with a planted bug."""
+"""The second derivation by sympy: it agrees with the compiler for the corpus, and refutes compilers with deliberate
+errors.
+"""
 
 import re
 import time
@@ -18,7 +20,7 @@ from phigen.symbolic.expression import fold, gradient, rebuild
 from phigen.symbolic.symbols import COEFFICIENT, kind_of
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED
 
-#: So many S_i take a second or two; the next would be 0, or take many seconds.
+#: Numbers of terms S_i that sympy derives in a second or two. The next term is 0, or takes many seconds.
 TERMS = {
     "ablowitz_ladik3": 3,
     "charged_particle": 5,
@@ -52,12 +54,12 @@ TERMS = {
     "vortices3": 2,
 }
 
-#: And so many a second or two more, for systems that are always examined.
+#: Larger numbers of terms, which take a second or two more, for three systems.
 MORE = {"lotka_volterra": 7, "poisson_not_hamiltonian": 3, "rigid_body": 7}
 
 
 def verdicts(compilation, terms):
-    """By name, the first word of which is enough: S_1, S_2, …, ∇S_h, and α or axioms."""
+    """Return the verdicts by the first words of the statements: S_1, S_2, …, ∇S_h, and α or axioms."""
     return {c.statement.name.split()[0]: c.statement.verdict for c in compare(compilation, terms)}
 
 
@@ -120,7 +122,7 @@ def test_other_bi_realisations_are_what_sympy_derives(name):
 
 
 def test_a_wrong_factor_in_the_recursion_is_refuted(monkeypatch):
-    """i for i + 1."""
+    """The recursion of the compiler is patched to divide by i instead of i + 1."""
     monkeypatch.setattr(hamilton_jacobi, "Fraction", lambda a, b: Fraction(a, max(b - 1, 1)))
     euler = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + sin(q)\n"
     assert verdicts(compile_anew(euler + "birealisation: canonical-euler\n"), 3)["S_2"] == REFUTED
@@ -132,7 +134,7 @@ def test_a_wrong_factor_in_the_recursion_is_refuted(monkeypatch):
 
 
 def test_a_wrong_series_of_paths_is_refuted(monkeypatch):
-    """1/j! for 1/(j + 1)! in the mean."""
+    """The mean of a path is patched to have 1/j! instead of 1/(j + 1)! in the terms that are compared."""
     text = BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: karasev\n"
     assert set(verdicts(compile_text(text), 3).values()) == {PROVED}
     monkeypatch.setattr(karasev, "factorial", lambda n: max(n - 1, 1))
@@ -140,12 +142,14 @@ def test_a_wrong_series_of_paths_is_refuted(monkeypatch):
 
 
 class Misprinted:
-    """The series of a compilation with the misprint of the paper in S_4: 1/3! {{α*H, S_2}, S_1} for 1/4 of it."""
+    """The series of a compilation with a misprint of the paper: in S_4 the bracket {{α*H, S_2}, S_1} has the factor
+    1/3! instead of 1/4.
+    """
 
     def __init__(self, compilation):
         self._true, system = compilation.series, compilation.system
         first, second = (s for s in compilation.series.graph(2))
-        # With α = (q, p + a) on p = 0: {{α*H, S_2}, S_1} = ∂²H/∂p² ∂S_2/∂q ∂S_1/∂q.
+        # For α = (q, p + a), where the covector is 0: {{α*H, S_2}, S_1} = ∂²H/∂p² ∂S_2/∂q ∂S_1/∂q.
         curvature = gradient(gradient(system.hamiltonian, ["p"])[0], ["p"])[0]
         bracket = curvature * gradient(second, ["q"])[0] * gradient(first, ["q"])[0]
         self._added = bracket * (Fraction(1, 6) - Fraction(1, 4))
@@ -164,7 +168,9 @@ def test_the_misprint_of_the_paper_is_refuted():
 
 
 def log_canonical(first, second):
-    """α = x exp(u/2) and β = x exp(−u/2) with signs before u, for {x, y} = xy."""
+    """Return the compilation for {x, y} = xy with α_i = x_i exp(±u_i/2) and β_i = x_i exp(∓u_i/2); ``first`` and
+    ``second`` are the signs for x and for y.
+    """
     return compile_text(
         f"{PLANE}poisson: {{brackets: {{x: {{y: x*y}}}}}}\nhamiltonian: x + y\nbirealisation:\n  kind: custom\n"
         f"  alpha: [x*exp({first}(-y*p_y)/2), y*exp({second}(x*p_x)/2)]\n"
@@ -174,12 +180,12 @@ def log_canonical(first, second):
 
 @pytest.mark.parametrize(("signs", "verdict"), [("++", PROVED), ("+-", REFUTED), ("-+", REFUTED), ("--", REFUTED)])
 def test_a_wrong_sign_of_alpha_is_refuted(signs, verdict):
-    """The S_i alone do not see it, since both derivations take them from that α."""
+    """The terms S_i do not show the wrong sign, since both derivations compute them from the wrong α. The axioms do."""
     assert verdicts(log_canonical(*signs), 3)["axioms"] == verdict
 
 
 def test_maps_that_do_not_begin_at_the_identity_are_refuted():
-    """Canonical brackets have shifts for symmetries, so only α(x, 0) = x tells."""
+    """Shifts preserve canonical brackets, so only the axiom α(x, 0) = x refutes these maps."""
     text = PLANE + "poisson: {canonical: {q: [x], p: [y]}}\nhamiltonian: x**2 + y\nbirealisation:\n  kind: custom\n"
     text += "  alpha: [x, y + p_x + 1]\n  beta: [x + p_y, y + 1]\n"
     assert verdicts(compile_text(text), 2)["axioms"] == REFUTED
@@ -250,7 +256,9 @@ def test_positive_symbols_stay_positive():
 
 
 def test_the_time_is_kept_and_what_was_compared_is_said():
-    """A machine that others use too gets more time for two terms."""
+    """The error names the terms that were compared in time. On a busy machine the time is doubled until two terms are
+    compared.
+    """
     agreements, seconds = [], 0.5
     while len(agreements) < 2:
         agreements, seconds = [], 2 * seconds
@@ -268,7 +276,9 @@ def test_the_time_is_kept_and_what_was_compared_is_said():
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.slow
 def test_the_time_is_kept_where_python_drops_exceptions():
-    """Callbacks of weak references, of which caches of expressions have many, do as destructors do."""
+    """Python ignores exceptions in destructors, and also in callbacks of weak references, which caches of expressions
+    call often. The time limit must end the work nevertheless.
+    """
 
     def wait(seconds):
         end = time.perf_counter() + seconds

@@ -1,4 +1,4 @@
-"""The text pairs of errors.txt: every message with its line, column and hint."""
+"""The cases of errors.txt: each spec is refused with the listed messages, with line, column and hint."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def test_declared_names_win_over_constants() -> None:
 
 
 def arithmetic() -> st.SearchStrategy[str]:
-    """Sources over small integers, every operator next to every other, few parentheses."""
+    """Strategy for texts of arithmetic with small integers, in which each operator occurs next to each other one."""
     digits = st.integers(0, 9).map(str)
 
     def extend(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
@@ -98,11 +98,12 @@ def arithmetic() -> st.SearchStrategy[str]:
 @example("2**-1*3")
 @example("8/2/2*3-1-1")
 def test_arithmetic_agrees_with_python(source: str) -> None:
-    # A test may evaluate what it wrote itself; phigen never does. Exponents stay plain integers.
+    # ``eval`` is safe here, because the text was made by this test; phigen never evaluates a text. All integers except
+    # exponents become Fractions.
     exact = re.sub(r"(?<![*\d])(?<!\*\*-)(\d+)", r"F(\1)", source)
     try:
         expected = eval(exact, {"F": Fraction, "__builtins__": {}})
-        # Python has no exact value for a fractional exponent.
+        # A power with a fractional exponent is no Fraction in Python; such texts are skipped.
         assume(isinstance(expected, Fraction) and abs(expected) < 10**30 and expected.denominator < 10**30)
     except (ZeroDivisionError, OverflowError):
         assume(False)
@@ -113,7 +114,7 @@ def test_arithmetic_agrees_with_python(source: str) -> None:
 
 
 def trees() -> st.SearchStrategy[Expression]:
-    """Expressions of every kind of node."""
+    """Strategy for expressions with nodes of every kind."""
     numbers = st.fractions(-9, 9, max_denominator=12).map(number)
     leaves = st.sampled_from([*(symbol(n) for n in NAMES), PI, EULER]) | numbers
     unary = sorted(f for f, arity in SPEC_FUNCTIONS.items() if arity == 1 and f != "sqrt")
@@ -136,7 +137,7 @@ def trees() -> st.SearchStrategy[Expression]:
 
 
 def value(e: Expression, point: dict[str, float]) -> float:
-    """The value in doubles. Raises where it is not finite and real."""
+    """Return the value in double precision. Raise an error unless it is real and at most 10⁶."""
 
     def visit(node: Expression, args: list[float]) -> float:
         simple: dict[str, Any] = {
@@ -165,7 +166,7 @@ def test_printed_expression_parses_to_equal_values(tree: Expression, point: tupl
     errors: list[str] = []
     printed = text(tree)
     again = parse(printed, SCOPE, lambda message, index, hint="", *, limit=False: errors.append(message))
-    if errors:  # a tree may hold what a spec must not, such as the logarithm of a negative number
+    if errors:  # a spec refuses some trees, for instance the logarithm of a negative number
         assert all(
             re.search("not defined|division by zero|not a real number|has no power|out of range", m) for m in errors
         )
@@ -198,7 +199,7 @@ def test_any_text_gives_an_expression_or_an_error_inside_it(source: str) -> None
         ("sqrt(4)", Fraction(2)),
         ("pi", Fraction(math.pi)),
         ("E", Fraction(math.e)),
-        ("log(1 - 1e-30*pi)", Fraction(-3.1415926535897933e-30)),  # doubles alone would give 0
+        ("log(1 - 1e-30*pi)", Fraction(-3.1415926535897933e-30)),  # in double precision it would be 0
         ("2**(1/3)", Fraction(2 ** (1 / 3))),
         ("abs(-1/3)", Fraction(1, 3)),
         ("atan2(1, 1)", Fraction(math.pi / 4)),

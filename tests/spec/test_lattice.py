@@ -1,4 +1,4 @@
-"""Specs of lattices: what their parts read as."""
+"""Specs of lattices: the objects that are read from their keys."""
 
 from __future__ import annotations
 

@@ -14,14 +14,14 @@ from phigen.errors import LimitError, SpecError
 from phigen.spec import limits, load, loads, starter
 
 HEAD = "phigen: 1\nname: attack\ncoordinates: [x1, x2, x3]\npoisson: {lie_algebra: {name: so(3)}}\n"
-SECONDS = 5.0  # a hang is what is looked for; machines are noisy
+SECONDS = 5.0  # of processor time; a hang takes far longer, and slow machines must pass
 
 
 def refused(data: str | bytes, tmp_path: Path) -> SpecError:
-    """The error of a file, which must come fast."""
+    """Return the error of a spec file with this content, which must come within `SECONDS`."""
     path = tmp_path / "spec.yaml"
     path.write_bytes(data.encode() if isinstance(data, str) else data)
-    start = time.process_time()  # not to depend on what else runs
+    start = time.process_time()  # of this process, since other processes must not count
     with pytest.raises(SpecError) as caught:
         load(path)
     assert time.process_time() - start < SECONDS

@@ -1,6 +1,7 @@
-"""Specs with one value replaced by another: each is read as what it says, or refused with a place; nothing else.
+"""Specs in which one value is replaced by another: the new spec must mean something else, or be refused with a
+place.
 
-PHIGEN_RANDOM_SEEDS sets how many samples of mutants are drawn with --all.
+PHIGEN_RANDOM_SEEDS is the number of samples of such specs (mutants) that are drawn with --all.
 """
 
 from __future__ import annotations
@@ -25,17 +26,17 @@ from phigen.spec.model import Spec
 SEEDS = int(os.environ.get("PHIGEN_RANDOM_SEEDS", "2"))
 FEW, MANY = 6, 50
 SAMPLES = slow_but(product(BASES, [0]), product(BASES, range(SEEDS)))
-#: Values that a key may have by default; all others must change what is read.
+#: Values that may equal the default of a key. Any other value must change what a spec means.
 DEFAULTS = ("[]", "{}", '""', "0", "auto", "true", "q")
 
 
 def meaning(text: str) -> Spec:
-    """What a spec says, but for its text and places."""
+    """Return a spec for comparison, without its text, its file name and the places of its values."""
     return replace(loads(text), source="", source_sha256="", locations={}, file="")
 
 
 def complaint(base: str, path: tuple[Any, ...], value: str) -> str:
-    """What is wrong with how a mutant is read; "" if nothing is."""
+    """Return what is wrong with the treatment of a mutant, or "" if it is read correctly or refused with a place."""
     tree = tree_of(BASES[base])
     text = document(replaced(tree, path, value))
     try:
@@ -65,7 +66,7 @@ def test_a_mutant_is_read_as_what_it_says_or_refused_at_its_place(base: str, see
     assert {mutant: said for mutant, said in complaints.items() if said} == {}
 
 
-#: Mutants that were read as something else, or ended in an internal error.
+#: Mutants that must be refused. They are regression tests: each was once misread, or ended in an internal error.
 DEFECTS = [
     ("plane", ("runs", "a", "initial", "scale"), "[q]"),
     ("plane", ("runs", "a", "initial", "scale"), "{random: normal}"),
@@ -83,7 +84,7 @@ def test_mutants_that_were_misread_are_refused(base: str, path: tuple[Any, ...],
 
 
 def records(kind: Kind) -> Iterator[Record]:
-    """All records of the format below a kind."""
+    """Yield all records of the spec format at and below a kind."""
     if isinstance(kind, Record):
         yield kind
         for field in kind.fields:

@@ -1,4 +1,4 @@
-"""The JSON Schema and the validator say the same, and the starter spec obeys both."""
+"""The JSON Schema and the validator accept the same specs, among them the starter spec."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def test_what_the_schema_refuses_the_validator_refuses(fragment: str) -> None:
 
 
 def fields_below(kind: Kind) -> list[RecordKey]:
-    """Every field of the table."""
+    """Return all keys of the spec format below a kind."""
     match kind:
         case Record():
             return [g for f in kind.fields for g in (f, *fields_below(f.kind))]

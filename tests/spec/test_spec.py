@@ -1,4 +1,4 @@
-"""Spec objects that accepted spec files become."""
+"""Reading of valid spec files: the values in the `Spec` objects."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ X1, X2, X3 = (symbol(f"x{i}") for i in (1, 2, 3))
 
 
 def spec(**keys: str) -> Spec:
-    """The minimal spec with some keys replaced or added."""
+    """Return the minimal spec with some keys replaced or added."""
     minimal = {
         "phigen": "1",
         "name": "minimal",

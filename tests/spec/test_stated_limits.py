@@ -1,4 +1,4 @@
-"""The limits that the reference states are those of the code."""
+"""The limits that docs/spec.md states are those of the code."""
 
 import re
 
@@ -8,7 +8,7 @@ from phigen import resources, spec
 from phigen.errors import LimitError, SpecError
 from phigen.spec import limits
 
-#: Rows of the table by the names of the numbers.
+#: For each limit in the code, its row of the table in docs/spec.md.
 ROWS = {
     "FILE_BYTES": "size of a file, in bytes",
     "YAML_NODES": "values and keys in a file",
@@ -75,7 +75,7 @@ def run(line):
 NAMED = "phigen: 1\nname: t\npoisson: {brackets: {x0: {x1: 1}}}\nhamiltonian: x0\n"
 
 
-#: Specs that have just so many of something.
+#: Limits, each with a function that returns a spec with n of the limited things.
 EXACTLY = {
     "a file": ("FILE_BYTES", lambda n: "#" * n),
     "values": ("YAML_NODES", lambda n: f"[{'1,' * (n - 1)}]"),
@@ -107,14 +107,14 @@ def breaks_a_limit(text):
     except LimitError:
         return True
     except SpecError:
-        pass  # for another reason
+        pass  # an error, but not of a limit
     return False
 
 
 @pytest.mark.parametrize("what", EXACTLY)
 def test_the_limit_itself_is_kept_and_one_more_is_not(what, monkeypatch):
     name, text = EXACTLY[what]
-    if name == "YAML_NODES":  # 20,000 values take a second
+    if name == "YAML_NODES":  # a test with the real limit of 20,000 values would take a second
         monkeypatch.setattr(limits, name, 100)
     most = getattr(limits, name)
     assert not breaks_a_limit(text(most))

@@ -21,12 +21,14 @@ _CPP = "algorithm chrono complex filesystem fstream functional iostream map memo
 
 
 def reached(compiler, language, names):
-    """The headers of the search path that these reach, without folder and suffix; those that are not there left out."""
+    """Return the names, without suffix, of the headers in the folders of the search path that these headers include,
+    directly or through others. Names that do not exist are left out.
+    """
     text = "".join(f"#if __has_include(<{name}>)\n#include <{name}>\n#endif\n" for name in names)
     command = [tool(compiler), "-x", language, "-E", "-M", "-v", "-"]
     process = subprocess.run(command, input=text, capture_output=True, text=True, check=True)
     searched = re.search(r"#include <\.\.\.> search starts here:\n(.*?)End of search list", process.stderr, re.DOTALL)
-    # Headers in backward/ are included by that name, not by their own.
+    # Files in backward/ are included as backward/NAME, so a header called NAME does not hide them.
     folders = {line.strip() for line in searched[1].splitlines() if not line.endswith("/backward")}
     paths = [path.rpartition("/") for path in process.stdout.split() if path.endswith(".h")]
     return {file.removesuffix(".h") for folder, _, file in paths if folder in folders}
@@ -47,13 +49,15 @@ def test_no_name_of_a_spec_hides_a_module_of_python_or_what_is_imported_beside_i
 
 
 def symbols(name, header):
-    """What a header declares with the prefix of the spec, without it."""
+    """Return the symbols in a header that begin with the name of the spec, without this prefix."""
     return set(re.findall(rf"\b{name}_(\w+)", re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)))
 
 
 @pytest.fixture(scope="module")
 def declared():
-    """The symbols of all bundled solvers, and of one with everything that can be asked for."""
+    """Return the symbols of all bundled solvers, and of a solver with all optional functions, without the names of
+    specs.
+    """
     asked = compile_text(
         "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: q**2 + p**2\norder: 1\n"
         "tangent: true\nadjoint: true\nmodified_hamiltonian: 1\n"
@@ -70,9 +74,12 @@ def declared():
 
 
 def test_no_two_specs_share_a_symbol(declared):
-    """NAME_SYMBOL is OTHER_SYMBOL for no OTHER = NAME_END but for the ends that are refused, which are all needed."""
+    """A symbol of one solver can only equal a symbol of another solver if the name of a spec has an end such as
+    _default. The list of refused ends has exactly these ends.
+    """
     pairs = {(s.removesuffix(f"_{t}"), s) for s in declared for t in declared if s.endswith(f"_{t}")}
-    clashing = {end: s for end, s in sorted(pairs, reverse=True) if end.islower()}  # as all names of specs are
+    # Names of specs have no capital letters.
+    clashing = {end: s for end, s in sorted(pairs, reverse=True) if end.islower()}
     assert clashing == CLASHING_ENDS
     for end in CLASHING_ENDS:
         assert f"a_{CLASHING_ENDS[end]}" in objection(f"a_{end}")[0]
@@ -91,7 +98,7 @@ def test_no_symbol_of_a_solver_is_one_of_the_c_library(declared):
 
 
 def run_text(*command):
-    """What a command prints."""
+    """Run a command and return its output."""
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
 

@@ -1,4 +1,4 @@
-"""Reading errors.txt: pairs of a spec and the errors it gives."""
+"""Reader of errors.txt, a list of specs with their errors."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ MINIMAL = {
 
 
 def complete(fragment: str) -> str:
-    """The fragment with the keys of the minimal spec that it lacks below it, so that its lines count from 1."""
+    """Return the fragment, followed by the keys of the minimal spec that it lacks, so that line numbers are those of
+    the fragment.
+    """
     missing = [f"{k}: {v}\n" for k, v in MINIMAL.items() if not re.search(rf"^{k}:", fragment, re.MULTILINE)]
     return fragment + "".join(missing)
 
 
 def errors_of(text: str) -> str:
-    """What `loads` reports, in the notation of errors.txt."""
+    """Return the errors that `loads` reports for a spec, in the format of errors.txt."""
     try:
         loads(text)
     except SpecError as error:
@@ -38,7 +40,7 @@ def errors_of(text: str) -> str:
 
 
 def cases() -> list[tuple[str, str, str]]:
-    """Title, spec and expected errors of every case."""
+    """Return the title, the spec and the expected errors of each case."""
     text = Path(__file__).with_name("errors.txt").read_text(encoding="utf-8")
     pairs = []
     for part in re.split(r"^== ", text, flags=re.MULTILINE)[1:]:
