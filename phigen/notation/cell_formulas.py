@@ -88,9 +88,10 @@ def _densities(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def rates(cell: Cell) -> list[tuple[str, Expression]]:
-    """Return the equations of motion at a site of a grid, as pairs of the left side as text and the right side.
+    """Return the equations of motion at a site of a grid, as tuples of left side (a text) and right side.
 
-    For graphs and pairs, the pairs are the derivatives of the densities of H of a site and of a bond or pair.
+    For a lattice without axes (a graph, or pairs of sites), the left sides are derivatives ∂h/∂x of the densities of H,
+    of a site and of a bond or pair.
     """
     if cell.relation == GRID:
         return [(f"d{f}/dt", e) for f, e in vector_field(cell).items()]

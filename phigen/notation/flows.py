@@ -25,7 +25,7 @@ def method(compilation: CompiledSplitting) -> str:
 
 
 def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
-    """Return the values, after the time h, of the coordinates that a flow changes, by coordinate.
+    """Return the coordinates that a flow changes, each with its value after the time h.
 
     Entries of a matrix exponential have the letter E, the number of the matrix from `matrices`, row and column.
     """
@@ -41,7 +41,10 @@ def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
 
 
 def matrices(compilation: CompiledSplitting) -> list[tuple[str, MatrixExponential]]:
-    """Return the distinct matrix exponentials of all flows, each with its number as text, "" if there is only one."""
+    """Return the distinct matrix exponentials of all flows, as pairs of a number and a matrix exponential.
+
+    The number is a text; it is "" if there is only one matrix exponential.
+    """
     distinct = list(dict.fromkeys(e for flow in compilation.splitting.flows for e in flow.exponentials))
     return [(str(k) if len(distinct) > 1 else "", e) for k, e in enumerate(distinct, 1)]
 

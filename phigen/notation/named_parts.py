@@ -89,7 +89,7 @@ def texts(named_expressions: Mapping[str, Expression], max_terms: int | None) ->
 
 
 def vanishing(subexpressions: Sequence[tuple[str, Expression]]) -> list[str]:
-    """Return the names of those subexpressions, pairs of a name and its definition, that are 0 if all momenta are 0."""
+    """Return the names of subexpressions that are 0 if all momenta are 0, from pairs (name, definition)."""
     zeros: dict[str, Expression] = {}
     for name, part in subexpressions:
         zeros |= {s: ZERO for s in symbols_of(part) if kind_of(s) == MOMENTUM}

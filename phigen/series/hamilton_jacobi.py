@@ -106,9 +106,9 @@ def graph_series(
 class HamiltonJacobi:
     """S_1, S_2, … of one Hamiltonian in one bi-realisation. Each term is computed when it is first requested.
 
-    ``alpha(n)`` returns the map α(x, p), exactly or up to the degree in p that S_1 … S_n need; ``max_terms`` is the
-    first n. ``static`` are the parameters and other constants in H and α; ``times`` has the symbol of the time, if H
-    depends on it.
+    ``alpha(n)`` returns the map α(x, p), exactly or up to the degree in p that S_1 … S_n need. It is first called with
+    n = ``max_terms``. ``static`` are the parameters and other constants in H and α; ``times`` has the symbol of the
+    time, if H depends on it.
     """
 
     def __init__(
@@ -152,8 +152,8 @@ class HamiltonJacobi:
     def reach(self, terms: int) -> None:
         """Prepare for the computation of S_1 … S_terms: if α is a series in p of too low a degree, extend it.
 
-        Terms that were computed from the shorter series are then dropped. A call before the first term is computed
-        avoids that they are computed twice.
+        Terms that were computed from the shorter series are then dropped, and must be computed again. To avoid this,
+        call `reach` with the largest number of terms before any term is computed.
         """
         if terms <= self._most:
             return
@@ -222,8 +222,10 @@ class _Recursion:
         self._sizes: dict[int, int] = {}  # number of monomials of ∇S_i, by i
 
     def first(self, terms: int) -> tuple[Any, ...]:
-        """Return S_1 … S_terms. Raises `OverflowError` if a term is too large, then at each later call that needs
-        it."""
+        """Return S_1 … S_terms.
+
+        Raises `OverflowError` if a term is too large; later calls that need this term raise it again.
+        """
         while len(self._found) < terms:
             if self._overflow:
                 raise self._overflow
@@ -269,9 +271,10 @@ class _Recursion:
 
 
 def beginning(ring: Any, times: Sequence[str], i: int) -> dict[str, Any]:
-    """Return the coefficient of t^i in τ − t/2, the time at the beginning of a step of size t, as {symbol of τ: value}.
+    """Return the coefficient of t^i in τ − t/2, as {symbol of τ: coefficient}.
 
-    The dictionary is empty if ``times`` is, so that H does not depend on the time.
+    τ − t/2 is the time at the beginning of a step of size t. If ``times`` is empty, H does not depend on the time, and
+    the dictionary is empty.
     """
     values = {0: ring.variable, 1: lambda _: ring.constant(Fraction(-1, 2))}
     return {t: values.get(i, lambda _: ring.constant(0))(t) for t in times}

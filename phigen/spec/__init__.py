@@ -1,4 +1,5 @@
-"""Reader of spec files. It makes a `Spec` with source positions of YAML, and reports all errors that users can make.
+"""Reader of spec files. It makes a `Spec`, which has the place of each part in the file, and reports all errors of a
+file together.
 
 `load` and `loads` read a spec, `schema` describes the format for editors, `starter` returns a first spec.
 """

@@ -61,12 +61,12 @@ class Declarations:
 
     @property
     def neighbours(self) -> Neighbours:
-        """Symbols of the coordinates and of the parameters that have a value at every site, and of their neighbours."""
+        """Record that makes symbols of values at sites and their neighbours, for coordinates and for parameters."""
         at_sites = (n for n, p in self.parameters.items() if p.at == "sites")
         return Neighbours((*self.coordinates, *at_sites), self.lattice.axes if self.lattice else ())
 
     def _at_bonds(self, names: Mapping[str, Expression]) -> dict[str, tuple[str, str]]:
-        """Return the names that have a value at bonds only, each with the message and hint for its use at a site."""
+        """Return the names with values at bonds only, each with the error (message, hint) for its use at a site."""
         bond_parameters = {n for n, p in self.parameters.items() if p.at == "bonds"}
         bond_names = (
             {n for n, e in names.items() if bond_parameters.intersection(symbols_of(e))} if bond_parameters else set()
@@ -74,7 +74,7 @@ class Declarations:
         return {n: (f"{n!r} has a value at every bond, not at sites", "use it in bonds:") for n in bond_names}
 
     def _counters(self) -> dict[str, tuple[str, str]]:
-        """Return the names of indices and sizes (i, N_i), each with the message and the hint if a density uses it."""
+        """Return the names of indices and sizes (i, N_i), each with the error (message, hint) if a density uses it."""
         reason = "this expression must be the same for all sites"
         hint = "a parameter at: sites has a value for each site"
         index_names = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
@@ -84,9 +84,10 @@ class Declarations:
         }
 
     def indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
-        """Return the record of the names that may have an index, those among ``names`` that depend on the site.
+        """Return the record of the names that may have an index: those of ``names`` that depend on the site.
 
-        None if no name may have an index. With ``ends``, an index is an end of a bond, otherwise an offset on a grid.
+        The result is None if no name may have an index. With ``ends``, an index is an end of a bond, otherwise it is an
+        offset on a grid.
         """
         if self.lattice is None or not self.indexed:
             return None
@@ -101,9 +102,10 @@ class Declarations:
         return Indices(neighbours, varying, {**same, **at_bonds}, ends)
 
     def bond_scope(self, *, dated: bool = False) -> AllowedNames:
-        """Return the names that a formula of a bond or pair may use; its sites are the ends a and b, as in ``x[a]``.
+        """Return the names that a formula of a bond or pair may use; at its ends a and b, x is ``x[a]`` and
+        ``x[b]``.
 
-        ``dated`` includes the time, which densities of H may depend on, and brackets may not.
+        ``dated`` includes the time, which densities of H may depend on, but brackets may not.
         """
         scope = self.dated_scope() if dated else self.scope()
         names = scope.names
@@ -384,7 +386,8 @@ def _declare_definitions(entries: Mapping[str, tuple[Scalar, Scalar | None]], de
     sources = {name: node for name, (key, node) in entries.items() if declared.declare(key, "definition")}
     uses = {name: names_in(node.text) if node else [] for name, node in sources.items()}
     coordinates = set(declared.coordinates)
-    # Until a definition is read, a symbol stands for it. Only definitions in a cycle, an error, refer to the symbol.
+    # At first, every name stands for a symbol. Definitions are read after those that they use, so that the symbol is
+    # replaced by the expression before it is used. In a cycle of definitions, which is an error, the symbol remains.
     scope = declared.dated_scope()
     names = {**scope.names, **{name: symbol(name) for name in sources}}
     for name in _in_order(uses, entries, declared.reader):

@@ -280,7 +280,8 @@ SOURCE = Record(
     ),
 )
 
-#: Hints for keys that stand inside a run, but belong to the whole spec or have another name there.
+#: Hints for keys that users may write inside a run, although the setting belongs to the whole spec, to a call in
+#: Python, or to a key of runs with another name.
 _BESIDE_RUNS = {
     key: f"{key}: belongs beside runs, to the whole spec"
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")

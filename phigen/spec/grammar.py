@@ -55,7 +55,7 @@ OTHER_FUNCTIONS = {"ln": "log", "fabs": "abs", "arcsin": "asin", "arccos": "acos
 
 
 class Report(Protocol):
-    """Function that receives an error in an expression; ``index`` is the character of the text where it is."""
+    """Function that receives an error in an expression; ``index`` is the position of the error in the text."""
 
     def __call__(self, message: str, index: int, hint: str = "", *, limit: bool = False) -> None: ...
 
@@ -123,8 +123,8 @@ _CHARACTER_HINTS = {
     ":": "expressions are not Python",
 }
 
-#: Operators that are meant by wrong characters. After the error, reading continues with the operator that is meant, so
-#: that later errors of the expression are reported too.
+#: Characters that users may write instead of operators, with the operators. After the error, the parser continues as if
+#: the operator stood there, so that later errors of the expression are reported too.
 _MEANT = {"^": "**", "−": "-", "–": "-", "·": "*", "×": "*"}
 
 
@@ -489,7 +489,7 @@ class Parser:
         return result
 
 
-#: Piecewise functions as expressions; ``choose(a, b, c)`` is b where a > 0, else c. So heaviside(0) is 1.
+#: Piecewise functions as expressions; ``choose(a, b, c)`` is b where a > 0, else c. The value heaviside(0) is 1.
 _PIECEWISE: Mapping[str, Callable[..., Expression]] = {
     "sign": lambda a: call("sign", a),
     "heaviside": lambda a: call("choose", neg(a), number(Fraction(0)), ONE),

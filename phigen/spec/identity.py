@@ -1,4 +1,4 @@
-"""Digest of a spec, by which two files of results are recognised as having columns of the same quantities."""
+"""Digest of a spec. Files of results with the same digest have the same quantities in their columns."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ Schema = dict[str, Any]
 
 @dataclass
 class Reader:
-    """Record of what is read: the errors, and the place and the purpose of every value, by its path of keys."""
+    """Record of what was read: the errors, and the place and the purpose of each value by its path of keys."""
 
     problems: Problems
     locations: dict[Path, Location] = field(default_factory=dict)
@@ -53,7 +53,10 @@ def label(path: Path) -> str:
 
 
 def list_hint(node: Node) -> str:
-    """Return the hint for a node that should be a list: how its value, or the names of its mapping, look as a list."""
+    """Return the hint for a node that should be a list.
+
+    The hint shows how to write a list with the value of the node or, if the node is a mapping, with its names.
+    """
     if isinstance(node, MappingNode):
         names = [key.text for key, _ in node.entries.values()][:3]
         return f"{_LISTS}; of names only: [{', '.join(names)}]" if names else _LISTS
@@ -83,7 +86,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Text(Kind):
-    """Prose, such as a title or a description, of one line or, with ``lines``, of several lines."""
+    """Prose, such as a title or a description. It has one line or, with ``lines``, may have several lines."""
 
     lines: bool = False
     expected = "text"
@@ -248,7 +251,8 @@ class ListOf(Kind):
     def read(self, node: Node, path: Path, reader: Reader) -> list[Any] | None:
         if isinstance(node, MappingNode) and isinstance(self.item, ShapedText):
             self.mismatch(node, path, reader, list_hint(node))
-            # The keys of the mapping are read as the list. So their names are declared, and uses of them are no errors.
+            # The keys of the mapping are read as the list, so that the names are declared and later uses of them are
+            # not reported.
             node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
         if not isinstance(node, SequenceNode):
             is_matrix = isinstance(self.item, ListOf) and isinstance(node, MappingNode)

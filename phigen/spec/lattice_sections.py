@@ -29,7 +29,8 @@ _WANTED = {"graph": "lattice: {graph: NAME}", "pairs": "lattice: {pairs: all}"}
 def densities(raw: Any, declared: Declarations) -> tuple[Expression, Expression]:
     """Return the density of H of a site, and that of a bond or pair, which is 0 if the spec has none.
 
-    ``raw`` is the value of ``hamiltonian:``, an expression or a mapping; H is the sum of both densities.
+    ``raw`` is the value of ``hamiltonian:``, an expression or a mapping. H is the sum of the first density over all
+    sites plus the sum of the second one over all bonds or pairs.
     """
     if not isinstance(raw, dict):
         return declared.formula(raw, declared.dated_scope()) or ZERO, ZERO
@@ -120,9 +121,10 @@ def _scope_of_numbers(declared: Declarations, observables: Iterable[str], fields
 
 
 def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRunSettings | None:
-    """Return the settings that only runs of lattices have; None without a lattice, where their keys are reported.
+    """Return the settings that only runs of lattices have; None for a spec without lattice.
 
-    The arrays of parameters are read elsewhere, by `phigen.spec.runs`.
+    Without a lattice, these settings are reported as errors. The arrays of parameters are read elsewhere, by
+    `phigen.spec.runs`.
     """
     if declared.lattice is None:
         for key in ("sizes", "bonds", "names", "spectrum", "correlation"):

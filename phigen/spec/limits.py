@@ -23,7 +23,7 @@ EXPRESSION_LENGTH = 10_000
 EXPRESSION_NODES = 2_000
 #: Largest nesting of parentheses, calls, signs and exponents in one expression.
 EXPRESSION_DEPTH = 64
-#: Numbers in a spec are smaller than this in absolute value, those that constant folding makes too.
+#: Numbers in a spec, and numbers that constant folding makes, are smaller than this in absolute value.
 NUMBER = 10**40
 #: Denominators of rationals are smaller than this. So a decimal may have up to 79 places after the point.
 DENOMINATOR = 10**80
@@ -53,8 +53,8 @@ CORRECTIONS = 8
 OPERATIONS = 100_000
 #: Largest number of monomials of a term S_i of the Hamilton–Jacobi series: the next S_i would take minutes to compute.
 SERIES_TERMS = 50_000
-#: Largest number of stored exponents, one for each symbol of each monomial, when a polynomial and its derivatives are
-#: expanded. At the limit this takes 80 MB and some seconds.
+#: Largest number of exponents that are stored when a polynomial and its derivatives are expanded; each monomial has one
+#: exponent for each symbol. At the limit this takes 80 MB and some seconds.
 CELLS = 8_000_000
 #: Largest estimated number of products of terms in the proof of a bi-realisation, which then takes ten seconds. A
 #: bi-realisation beyond the limit is checked at sample points instead.

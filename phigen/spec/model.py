@@ -246,7 +246,7 @@ class Run:
     seed: int = 0  # seed of the noise
     members: int = 1  # number of paths of the noise from the same initial state
     parameters: Mapping[str, Fraction] = field(default_factory=dict)
-    # exact solution by coordinate; its symbols are ELAPSED, the time, initial(NAME) and parameters
+    # exact solution by coordinate; its symbols are the time (ELAPSED), initial values (initial(NAME)) and parameters
     exact: Mapping[str, Expression] = field(default_factory=dict)
     compare: tuple[str, ...] = ()
     section: Expression | None = None
@@ -381,16 +381,16 @@ class SweepSettings:
 
     @property
     def stored(self) -> tuple[str, ...]:
-        """The entries of ``keep`` and, for each entry ``mean(M)``, ``error(M)``, which figures draw as error bars."""
+        """The entries of ``keep``; each ``mean(M)`` adds ``error(M)``, because figures draw the error bars of means."""
         errors = (word.replace("mean(", "error(", 1) for word in self.keep if word.startswith("mean("))
         return tuple(dict.fromkeys((*self.keep, *errors)))
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """Reduction of an observable of a lattice, a density, to one number: its ``kind`` is mean, sum, max or min.
+    """Reduction of an observable of a lattice to one number. Its ``kind`` is mean, sum, max or min.
 
-    The density has a value at each element of ``over``: ``sites``, ``bonds`` or ``pairs``.
+    The observable is a density, with a value at each element of ``over``: ``sites``, ``bonds`` or ``pairs``.
     """
 
     kind: str
@@ -481,7 +481,7 @@ class Spec:
     terms: int | None = None
     composition: str = "auto"
     gauge: str | Mapping[str, Expression] = "auto"  # auto, none, or the multiple of each Casimir
-    monitor: str | Expression | None = None  # log, or g of dt = g dτ
+    monitor: str | Expression | None = None  # log, or the factor g of dt = g dτ
     scheme: str = "series"
     structure: str = "exact"  # for a Gauss method: exact, or to truncation
     coordinates_from: str = ""  # for a splitting of attracting bodies: jacobi or democratic_heliocentric
@@ -516,7 +516,7 @@ class Spec:
 
     @property
     def wanted_order(self) -> int:
-        """Order that the spec requests. With ``terms`` it is the even order of symmetric methods with these terms."""
+        """Order that the spec requests; with ``terms``, the order of a symmetric method with these terms."""
         return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
 
     def overridden(

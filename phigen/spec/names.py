@@ -101,8 +101,7 @@ PROFILES = ("fast", "small", "certified")
 #: Number types of the C.
 REALS = ("double", "float")
 
-#: Parts of the generated code that can be left out one by one. The profile small leaves out the parts for speed, for
-#: ensembles whose members have different parameters, and for the change of parameters between steps.
+#: Parts of the generated code that can be left out one by one. Below, the parts that each profile leaves out.
 PARTS = ("by-hand", "ensemble", "gauge-search", "kicks", "lanes", "members", "parameters", "recurrences")
 LEFT_OUT = {
     "fast": frozenset[str](),
@@ -128,8 +127,9 @@ STATISTICS = ("mean", "std", "error")
 #: Representations of an attitude, the rotation of a rigid body, that ``reconstruct:`` may name.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
-#: Compositions of the flows of parts of H. CORRECTED are those with a corrector, for near-integrable systems;
-#: NEAR_INTEGRABLE adds those without; FLOW_COMPOSITIONS adds those for two parts; COMPOSITIONS are all.
+#: Compositions of the flows of parts of H. CORRECTED: for near-integrable systems, with a corrector. NEAR_INTEGRABLE:
+#: all for near-integrable systems, with and without a corrector. FLOW_COMPOSITIONS: these and the compositions for two
+#: parts. COMPOSITIONS: all.
 CORRECTED = (
     *(f"wisdom-holman{order}" for order in ("", "-3", "-5", "-7", "-11", "-17")),
     *(f"wisdom-holman-modified-{order}" for order in (7, 11, 17)),

@@ -20,7 +20,8 @@ from phigen.symbolic.symbols import ELAPSED, initial
 
 #: Words that users may write as a step because they expect an adaptive step size, which phigen does not have.
 _ADAPTING = ("auto", "adaptive", "variable")
-#: A ratio of times counts as an integer if its relative distance from it is at most this, since users round decimals.
+#: A ratio of times counts as an integer if it differs from the integer by at most this fraction, because users write
+#: rounded decimals.
 NEAR_INTEGER = Fraction(1, 10**9)
 
 
@@ -352,7 +353,7 @@ def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declaratio
     time_values = dict(zip(dated, substitute(list(dated.values()), {declared.time: symbol(ELAPSED)}), strict=True))
     scope = declared.constants("an exact solution", symbols | time_values)
     hints = {c: (scope.refused[c][0], f"initial values are written x0_{c}") for c in declared.coordinates}
-    # In an exact solution, t always means the time, even if a coordinate is called t, so that it is not refused.
+    # In an exact solution, t always means the time, even if a coordinate is called t; so this name is not refused.
     refused = {n: reason for n, reason in {**scope.refused, **hints}.items() if n not in symbols}
     scope = AllowedNames(scope.names, refused, scope.open)
     values = {}

@@ -1,8 +1,8 @@
 """Names that a spec must not have.
 
 The name of a spec is that of the generated files NAME.h and NAME.py, and the prefix of generated symbols, such as
-NAME_init. So NAME must not be a header or a module that other code needs, which the generated file would hide on a
-search path. The symbols must not clash with those of libraries or of other specs.
+NAME_init. So NAME must not be the name of a header or module that other code needs, since the generated file would hide
+it on a search path. The symbols must not clash with those of libraries or of other specs.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ def validate(data: bytes, file: str) -> Spec:
 
 
 def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
-    """Return the arguments of `Spec` by name. Errors are reported; values with errors are then harmless ones.
+    """Return the arguments of `Spec` by name. Values with errors are reported, and replaced by harmless ones.
 
     ``raw`` is the content of the file by key, ``declared`` its names.
     """
@@ -413,7 +413,7 @@ def _on_covectors(
 
 
 def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
-    """Return the names ``p_NAME`` of momenta with their symbols; report those that the spec declares otherwise."""
+    """Return the names ``p_NAME`` of momenta with their symbols; report names that the spec declares itself."""
     momenta = {f"p_{c}": symbol(momentum(c)) for c in declared.coordinates}
     for name in [c for c in momenta if c in declared.nodes]:
         message = f"the name {name!r} means the momentum of {name[2:]!r} in {where}"

@@ -57,7 +57,7 @@ def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> 
         if key not in RANDOM_KEYS:
             hint = did_you_mean(key, RANDOM_KEYS) or f"keys: {', '.join(RANDOM_KEYS)}"
             reader.error(node, f"random values have no key {shown(key)}", hint)
-    if not entries:  # no key of the mapping was a name, which was reported when it was read
+    if not entries:  # all keys were invalid; the errors were reported when the mapping was read
         return None
     if "random" not in entries:
         first = next(iter(entries.values()))[0]

@@ -12,8 +12,8 @@ from phigen.spec.model import DEFAULT_ORDER, MatrixForm, Parameter, Run, Spec, V
 from phigen.symbolic.expression import Expression, neg, number, text
 from phigen.symbolic.readable import infix, signed_sum
 
-#: Lengths, in characters and in names and operators, above which an expression is divided into definitions. They are
-#: nine tenths of the limits for expressions, since parentheses may be added.
+#: An expression with more characters or more nodes (numbers, names, operators) than this is divided into definitions.
+#: The bounds are nine tenths of the limits for expressions, since parentheses may be added.
 _LENGTH, _NODES = limits.EXPRESSION_LENGTH * 9 // 10, limits.EXPRESSION_NODES * 9 // 10
 _WIDTH = 110
 _PLAIN = re.compile(r"[A-Za-z0-9_+*/(). ^-]*")

@@ -60,9 +60,10 @@ class Arithmetic(Generic[T]):
         return self.function(node.op, args)
 
     def values(self, roots: Sequence[Expression], computed: Mapping[int, T] = NOTHING) -> list[T]:
-        """Return the values of expressions. A shared node is computed once; its value is dropped after its last use.
+        """Return the values of expressions.
 
-        ``computed`` maps the ``id`` of nodes to known values; nodes that only such nodes use are not visited.
+        A shared node is computed once; its value is dropped after its last use. ``computed`` maps the ``id`` of nodes
+        to known values; nodes that are needed only to compute these values are not visited.
         """
         order = topological(roots, computed)
         uses = Counter(id(a) for node in order for a in node.args)

@@ -44,11 +44,10 @@ class Arrays(Arithmetic[Any]):
 
 
 def evaluate(roots: Sequence[Expression], values: Mapping[str, Any]) -> list[Floats]:
-    """Return the values of expressions, elementwise for arrays (or numbers) as values of their symbols.
+    """Return the values of expressions as arrays; ``values`` maps symbols to arrays, which are elementwise, or to
+    numbers.
 
-    Outside its domain a function gives NaN or infinity.
-
-    Raises `KeyError` for a symbol without a value.
+    Outside its domain a function gives NaN or infinity. Raises `KeyError` for a symbol without a value.
     """
     with np.errstate(all="ignore"):
         return [np.asarray(v, dtype=np.float64) for v in Arrays(values).values(roots)]

@@ -40,8 +40,8 @@ THIRD = "amplitude3"
 #: of terms of the series. At t/16 the omitted terms are below 10⁻¹⁸.
 DOUBLINGS, TERMS = 4, 6
 
-#: The iteration a, b → (a + b)/2, √(ab) of the arithmetic–geometric mean ends when c = (a − b)/2 is at most this
-#: fraction of a: in the next iteration, c/a would be a quarter of its square, which is below rounding.
+#: The iteration a, b → (a + b)/2, √(ab) of the arithmetic–geometric mean ends when c/a, with c = (a − b)/2, is at most
+#: this. One more iteration would change c/a to (c/a)²/4, which is below rounding.
 MEAN_RATIO = 1e-8
 
 #: Number of duplication steps for Carlson's R_D in SIMD code, which has no branches. The arguments of R_D there differ
@@ -196,7 +196,8 @@ def carlson_third(library: Any, x: Any, y: Any, w: Any) -> Any:
 
 
 def _third_series(a: Any, b: Any, c: Any) -> Any:
-    """Return Carlson's R_J for arguments close to their mean, by a power series, divided by mean^(−3/2).
+    """Return R_J · mean^(3/2) by a power series, for an integral R_J of Carlson whose arguments are close to their
+    mean.
 
     ``a``, ``b`` and ``c`` are the relative differences of the mean from the first three arguments of R_J.
     """

@@ -152,5 +152,8 @@ def precisely(context: Any, name: str, s: Any) -> Any:
 
 
 def value(library: Any, name: str, s: Any) -> Any:
-    """Return the value of a function of `ENTIRE`, in double precision if the library is `math`, else in mpmath's."""
+    """Return the value of a function of `ENTIRE`.
+
+    The precision is double if the library is `math`, else that of an mpmath context.
+    """
     return in_double(name, s) if library is math else precisely(library, name, s)

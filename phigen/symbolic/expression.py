@@ -40,7 +40,8 @@ from phigen.symbolic.functions import FUNCTIONS
 
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
 
-#: Number of nodes from which on a walk over an expression reports progress, because it takes a tenth of a second.
+#: A walk over an expression with at least this number of nodes reports progress, because it takes a tenth of a second
+#: or more.
 MANY = 10_000
 
 Number = int | Fraction
@@ -390,7 +391,7 @@ def topological(roots: Iterable[Expression], excluded: Container[int] = ()) -> l
     """Return the roots and all nodes below them; the arguments of a node come before the node.
 
     The order depends only on the expressions, not on addresses in memory. Nodes whose ``id`` is in ``excluded`` are
-    left out, and nodes that only these use.
+    left out; so are nodes that are arguments of excluded nodes only.
     """
     order: list[Expression] = []
     visited: set[Expression] = set()
@@ -458,9 +459,9 @@ def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
 
 
 def familiar(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with internal functions of phigen replaced by well-known ones, such as cosroot(s) by cos √s.
+    """Return the roots with internal functions of phigen replaced by well-known ones: cosroot(s) by cos √s.
 
-    If the replacement depends on the sign of an argument, that for positive arguments is taken.
+    If a replacement has two forms, for positive and for negative arguments, the form for positive arguments is used.
     """
 
     def visit(node: Expression, args: list[Expression]) -> Expression:

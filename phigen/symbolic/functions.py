@@ -152,7 +152,7 @@ _LISTED = (
         },
         inline=True,
     ),
-    Function(  # 1/a for a > 0, else 0; in formulas where the other factor of the product is 0 for a ≤ 0
+    Function(  # 1/a for a > 0, else 0; used in products whose second factor is 0 for a ≤ 0
         "inv0",
         own=True,
         slopes=lambda call, f, a: (-(f**2),),
@@ -320,9 +320,9 @@ _LISTED = (
 
 
 def _phi(order: int) -> Function:
-    """Return the record of the derivative of φ of this order, of φ itself for 0 (`phigen.symbolic.special`).
+    """Return the record of a derivative of φ (`phigen.symbolic.special`) or, for the order 0, of φ itself.
 
-    The cost is that of small arguments: a series of nine terms, and a test of the argument.
+    The ``cost`` in the record is that for small arguments: a series of nine terms, and a test of the argument.
     """
     name, further = SPECIAL[order], SPECIAL[order + 1 : order + 2]
     return Function(
@@ -338,7 +338,7 @@ def _phi(order: int) -> Function:
 
 
 def _entire(name: str) -> Function:
-    """Return the record of a function of `phigen.symbolic.entire`, for small arguments computed by a power series."""
+    """Return the record of a function of `phigen.symbolic.entire`; flows have a version of it for small arguments."""
     series = ENTIRE[name]
     return Function(
         name,

@@ -8,17 +8,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from phigen.symbolic.expression import ZERO, Expression, power, product, total
 
 Monomial = tuple[int, ...]
-#: A monomial as pairs (index of a variable, exponent) of the variables that it contains; few, even in large systems.
+#: A monomial as pairs (index of a variable, exponent) of the variables that it contains. Even in large systems a
+#: monomial contains few variables.
 Powers = tuple[tuple[int, int], ...]
 
 
 def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]) -> Expression:
     """Return Σ coefficient · Π variables[i]**exponent[i] as a nested expression.
 
-    ``terms`` maps the exponents of a monomial to its coefficient.
-    At each level, the variable that occurs in the most terms is factored out of them, with the smallest exponent that
-    it has there. So even polynomials become polynomials in the squares of the variables, and each square is computed
-    once. The result depends on the terms only, not on their order.
+    ``terms`` maps the exponents of a monomial to its coefficient. At each level, the variable that occurs in the most
+    terms is factored out of them, with the smallest exponent that it has there. So even polynomials become polynomials
+    in the squares of the variables, and each square is computed once. The result depends on the terms only, not on
+    their order.
     """
     return sparse_horner({_powers(m): c for m, c in terms.items()}, variables)
 

@@ -24,8 +24,8 @@ from typing import Any
 REMAINDERS = tuple(f"exprem{k}" for k in range(4))
 QUOTIENTS = tuple(f"expquo{k}" for k in range(4))
 
-#: Largest bound of the roots of p at which halving t ends, and number of terms of the series of e^y that are then
-#: summed: the omitted terms are below 10⁻¹⁷.
+#: MAX_ROOT: halving t ends when a bound for the roots of p is at most this. TERMS: number of terms of the series of e^y
+#: that are then summed; the omitted terms are below 10⁻¹⁷.
 MAX_ROOT, TERMS = 0.25, 18
 
 #: Number of halvings and doublings in SIMD code, which has no branches. Two of them allow roots up to 4 `MAX_ROOT`.
@@ -33,9 +33,9 @@ LANE_DOUBLINGS = 2
 
 
 def slopes(k: int) -> Callable[..., tuple[Any, ...]]:
-    """Return the function that computes the partial derivatives of F_k, the function `value`, by t, a_0, …, a_3.
+    """Return the function that computes the partial derivatives of F_k (see `value`) by t, a_0, …, a_3.
 
-    Its first argument applies a function by its name.
+    Its first argument, ``call``, applies a function by its name.
     """
 
     def rule(call: Callable[..., Any], f: Any, t: Any, *a: Any) -> tuple[Any, ...]:
@@ -72,8 +72,9 @@ def value(k: int, library: Any, t: Any, *a: Any) -> Any:
 
 
 def quotient(k: int, library: Any, t: Any, *a: Any) -> Any:
-    """Return G_k: Σ G_k x^k is the remainder of the quotient of the division in `value`, on division by its divisor.
+    """Return G_k, where Σ G_k x^k is the remainder of a second division by the polynomial.
 
+    The first division, in `value`, has a quotient; the second division divides this quotient by the same polynomial.
     The precision is double if the library is `math`, else that of an mpmath context.
     """
     return _coefficients(library, t, a)[1][k]

@@ -209,7 +209,7 @@ class Taylor:
             for j in range(1, i + 1)
             if not (zero(a[j]) or zero(powers[i - j]))
         ]
-        # The reciprocal is computed only if there are terms: for a constant base, the ring may not contain it.
+        # The reciprocal of a constant base is not computed, because the ring need not contain it.
         return self.ring.combine(terms) * self.ring.power(a[0], -1) if terms else self._zero
 
     def _integer_power(self, a: list[Any], n: int, i: int) -> Any:

@@ -39,8 +39,8 @@ from phigen.symbolic.special import SPECIAL, coefficient, order_of
 from phigen.symbolic.symbols import Symbol
 
 #: If an element contains at least MANY_GENERATORS generators, it is evaluated at a point before it is reduced by the
-#: relations, since the reduction takes minutes for seven roots. A value counts as nonzero there if it is larger than
-#: the fraction ROUNDING of the sum of the absolute values of its terms.
+#: relations, since the reduction takes minutes for seven roots. The value at the point counts as nonzero if it is
+#: larger than the fraction ROUNDING of the sum of the absolute values of its terms.
 MANY_GENERATORS, ROUNDING = 5, 1e-9
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
@@ -65,7 +65,10 @@ class Generator:
 
 
 class _MissingError(Exception):
-    """Raised if an expression needs a generator that the ring lacks; it is then added, or the expression refused."""
+    """Raised for an expression that needs a generator that the ring lacks.
+
+    The generator is then added, or the expression is refused.
+    """
 
     def __init__(self, kind: str, arguments: list[Poly], degree: int = 1, inverse: bool = False) -> None:
         self.kind, self.arguments, self.degree, self.inverse = kind, arguments, degree, inverse
@@ -501,9 +504,9 @@ class Tower(Arithmetic[Poly]):
         return g.kind in ("sin", "cosh", "cosroot", "sign") or (g.kind == "root" and not self._partner(g))
 
     def _divided(self, element: Poly, g: Generator) -> Poly:
-        """Return the element with lower powers of the generator r = 1/f or r = f^(−1/n).
+        """Return the element with lower powers of a generator r = f^(−1/n), or of r = 1/f, for which n is 1.
 
-        The coefficient of a power of r is divided by f: the quotient belongs to the power with r·f, or rⁿ·f, cancelled.
+        The coefficient c of rᵉ is divided by f: c = q·f + remainder. Since rⁿ·f = 1, the term q·f·rᵉ becomes q·rᵉ⁻ⁿ.
         """
         parts, generator, base = self._parts(element, g.name), self.variable(g.name), g.arguments[0]
         for e in range(max(parts, default=0), g.degree - 1, -1):

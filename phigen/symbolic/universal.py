@@ -22,8 +22,8 @@ ANOMALY = "anomaly"
 #: Largest number of iterations, after which the function has no value. Bisection alone takes 53 for double precision.
 MOST_ITERATIONS = 100
 
-#: A motion counts as radial if |q × q̇|² is at most this fraction of η² + |μ|r. Rounding of q × q̇, about 10⁻¹⁵
-#: relative to the products in it, has the square 10⁻³⁰.
+#: A motion counts as radial if |q × q̇|² is at most this fraction of η² + |μ|r. The rounding error of q × q̇ is about
+#: 10⁻¹⁵ of the products in it, and 10⁻³⁰ is its square.
 RADIAL = 1e-30
 
 
@@ -91,8 +91,9 @@ def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any
 def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
     """Return an initial value for the iteration that computes the universal anomaly s after the time t.
 
-    For a small part of an orbit it is a power series in t, or its first term t/r. Otherwise it is βt/μ, which s is on
-    the average over an elliptic orbit, or 1/√−β for a hyperbolic one; if this is too small, the iteration doubles it.
+    For a small part of an orbit it is a power series in t, or its first term t/r. For a larger part of an elliptic
+    orbit it is βt/μ, since s grows by β/μ per unit of time on average; for a hyperbolic orbit it is 1/√−β, which the
+    iteration doubles as long as it is too small.
     """
     u = t / r
     if abs(beta) * u**2 > 1:
@@ -104,9 +105,10 @@ def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
 
 
 def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> tuple[Any, Any, Any, Any]:
-    """Return the residual of the equation for the universal anomaly s, and its first two derivatives by s.
+    """Return (residual, scale, slope, bend) for the equation of the universal anomaly s.
 
-    The second number of the result is the sum of the absolute values of the terms of the equation.
+    The scale is the sum of the absolute values of the terms of the equation. Slope and bend are the first two
+    derivatives of the residual with respect to s.
     """
     from phigen.symbolic import entire
 

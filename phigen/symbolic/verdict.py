@@ -80,7 +80,10 @@ def decide_zero(
 def decide_elements(
     name: str, tower: Tower, residuals: Iterable[tuple[str, Poly]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """Return the statement that elements of a ring, ``tower``, vanish, with its verdict, as `decide_zero` does."""
+    """Return the statement ``name``, that elements of the ring ``tower`` are 0, with its verdict.
+
+    The arguments have the meaning that they have in `decide_zero`.
+    """
     pending = [(label, element) for label, element in residuals if not tower.is_zero(element)]
     if not pending:
         return Statement(name, PROVED, detail)
