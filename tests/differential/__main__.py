@@ -1,4 +1,4 @@
-"""`python -m differential ordinary 0:100`: check the systems of many seeds, and print what fails."""
+"""Command `python -m differential ordinary 0:100`: check the random systems of a range of seeds, and print failures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from phigen.runtime import toolchain
 
 
 def main() -> int:
-    """Check a range of seeds; 1 if anything fails."""
+    """Check the systems of a range of seeds and return the exit status: 1 if a check fails, otherwise 0."""
     parser = argparse.ArgumentParser(prog="differential")
     parser.add_argument("kind", choices=SUITES)
     parser.add_argument("seeds", help="FIRST:END, or one seed")

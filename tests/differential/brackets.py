@@ -1,4 +1,4 @@
-"""Random Poisson structures: how a spec says them, and π as a matrix that is computed without phigen."""
+"""Random Poisson structures: their form in a spec, and the matrix π, computed without phigen."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ Matrix = sympy.Matrix
 
 @dataclass(frozen=True)
 class Structure:
-    """A Poisson structure: the ``form`` of the spec, π, what is known of it, and values where it is regular.
+    """A Poisson structure: its ``form`` in a spec, the matrix π, and known properties.
 
-    ``kind`` says how it was drawn, ``casimirs`` are some of its Casimirs. ``pairs`` are positions and momenta where it
-    is canonical. ``body`` tells so(3)* and its sign, whose attitude is known.
+    ``kind`` names the function that drew the structure. ``casimirs`` are some of its Casimirs, and ``pairs`` its pairs
+    of canonical positions and momenta. If ``positive``, the structure is regular at positive coordinates. ``body`` is
+    the sign of the bracket if the structure is so(3)*, where tests compute the attitude, and otherwise 0.
     """
 
     kind: str
@@ -40,7 +41,7 @@ def draw_structure(source: random.Random) -> Structure:
 
 
 def canonical(source: random.Random, most: int = 3) -> Structure:
-    """Draw pairs with {q, p} = 1, now and then with a coordinate beside them that is a Casimir."""
+    """Draw canonical pairs with {q, p} = 1, sometimes with a further coordinate that is a Casimir."""
     n = source.randint(1, most)
     q, p = symbols(f"q{k}" for k in range(n)), symbols(f"p{k}" for k in range(n))
     spare = symbols(["z"]) if source.random() < 0.1 else ()
@@ -65,7 +66,7 @@ def paired(pairs: Sequence[tuple[str, str]]) -> Structure:
 
 
 def constant(source: random.Random) -> Structure:
-    """Draw a constant skew matrix, which may be singular."""
+    """Draw a constant structure: a skew matrix, which may be singular."""
     n = source.randint(2, 5)
     x = symbols(f"x{k}" for k in range(n))
     pi = skew(n, lambda i, j: small(source) if source.random() < 0.7 else sympy.Integer(0))
@@ -73,7 +74,7 @@ def constant(source: random.Random) -> Structure:
 
 
 def log_canonical(source: random.Random) -> Structure:
-    """Draw {x_i, x_j} = a_ij x_i x_j."""
+    """Draw a log-canonical structure {x_i, x_j} = a_ij x_i x_j."""
     n = source.randint(2, 4)
     x = symbols(f"y{k}" for k in range(n))
     a = skew(n, lambda i, j: small(source) if source.random() < 0.8 else sympy.Integer(0))
@@ -83,7 +84,7 @@ def log_canonical(source: random.Random) -> Structure:
 
 
 def gauged(source: random.Random) -> Structure:
-    """Draw π_ij = g_i(x_i) A_ij g_j(x_j)."""
+    """Draw a structure π_ij = g_i(x_i) A_ij g_j(x_j) with a constant skew matrix A."""
     n = source.randint(2, 3)
     x = symbols(f"x{k}" for k in range(n))
     g = [source.choice([v, v + 2, 1 + v**2, sympy.Integer(1)]) for v in x]
@@ -127,7 +128,7 @@ def moved_algebra(source: random.Random) -> Structure:
 
 
 def affine(source: random.Random) -> Structure:
-    """Draw a linear structure whose coordinates are shifted, so that π has constants."""
+    """Draw a Lie–Poisson structure in shifted coordinates, so that π has constant terms."""
     basis = ALGEBRAS[source.choice(["so(3)", "sl(2)", "se(2)", "heisenberg(1)"])]()
     x = symbols(f"m{k + 1}" for k in range(len(basis)))
     shift = {v: v + small(source) for v in x}
@@ -144,7 +145,7 @@ def general(source: random.Random) -> Structure:
 
 
 def product(source: random.Random) -> Structure:
-    """Draw so(3)* beside pairs, with no brackets between them."""
+    """Draw the product of a named Lie algebra and canonical pairs, with no brackets between the two."""
     left, right = algebra(source), canonical(source, 2)
     n, m = len(left.coordinates), len(right.coordinates)
     pi = sympy.zeros(n + m)
@@ -163,7 +164,9 @@ def nothing(source: random.Random) -> Structure:
 
 
 def chain(source: random.Random) -> Structure:
-    """Draw pairs on both sides of the number where the code has no lanes."""
+    """Draw canonical brackets of 8 to 24 pairs. The largest systems exceed the limit up to which the C uses
+    SIMD lanes.
+    """
     n = source.choice([8, 17, 19, 20, 21, 22, 24])
     q, p = symbols(f"q{k}" for k in range(n)), symbols(f"p{k}" for k in range(n))
     pi = sympy.zeros(2 * n)
@@ -201,12 +204,12 @@ def skew(n: int, entry: Callable[[int, int], Expr]) -> Matrix:
 
 
 def rows(matrix: Matrix) -> list[list[str]]:
-    """Return the entries of a matrix as a spec has them."""
+    """Return the entries of a matrix as texts for a spec."""
     return [[text(v) for v in matrix.row(i)] for i in range(matrix.shape[0])]
 
 
 def written(source: random.Random, x: Sequence[Symbol], pi: Matrix) -> dict[str, Any]:
-    """Return a structure by its matrix, or by brackets that are given in a random order."""
+    """Return a structure in the form for a spec: as a matrix, or as brackets with a random order in each pair."""
     if source.random() < 0.2:
         return {"matrix": rows(pi)}
     brackets: dict[str, dict[str, str]] = {}
@@ -218,7 +221,7 @@ def written(source: random.Random, x: Sequence[Symbol], pi: Matrix) -> dict[str,
 
 
 def lie_poisson(basis: Sequence[Matrix], x: Sequence[Symbol]) -> Matrix:
-    """Return {x_i, x_j} = Σ c_ij^k x_k of the algebra that matrices span."""
+    """Return the Lie–Poisson brackets {x_i, x_j} = Σ c_ij^k x_k of the Lie algebra that the matrices span."""
     columns = Matrix.hstack(*(Matrix(list(m)) for m in basis))
     normal = (columns.T * columns).inv() * columns.T
     pi = sympy.zeros(len(x))
@@ -231,7 +234,7 @@ def lie_poisson(basis: Sequence[Matrix], x: Sequence[Symbol]) -> Matrix:
 
 
 def constants(pi: Matrix, x: Sequence[Symbol]) -> dict[str, Any]:
-    """Return the structure constants of a linear structure as a spec has them."""
+    """Return the structure constants of a linear structure in the form for a spec."""
     structure_constants: dict[str, Any] = {}
     for i, j in combinations(range(len(x)), 2):
         parts = {f"E{k + 1}": text(sympy.diff(pi[i, j], v)) for k, v in enumerate(x) if sympy.diff(pi[i, j], v) != 0}
@@ -241,7 +244,7 @@ def constants(pi: Matrix, x: Sequence[Symbol]) -> dict[str, Any]:
 
 
 def unit(n: int, i: int, j: int) -> Matrix:
-    """Return the matrix with a single 1."""
+    """Return the n×n matrix with a 1 at (i, j) and zeros elsewhere."""
     m = sympy.zeros(n)
     m[i, j] = 1
     return m
@@ -252,12 +255,14 @@ def _rotations(n: int) -> list[Matrix]:
 
 
 def _so3() -> list[Matrix]:
-    """[L_1, L_2] = L_3 and cyclic."""
+    """Return the basis of so(3) with [L_1, L_2] = L_3 and its cyclic permutations."""
     return [unit(3, k - 1, k - 2) - unit(3, k - 2, k - 1) for k in range(3)]
 
 
 def _grown(matrices: Sequence[Matrix]) -> list[Matrix]:
-    """Matrices with a row and a column of zeros more, and the translations."""
+    """Return the basis of a semidirect product: the matrices with a row and a column of zeros added, and the
+    translations.
+    """
     n = matrices[0].shape[0]
     return [sympy.diag(m, 0) for m in matrices] + [unit(n + 1, k, n) for k in range(n)]
 
@@ -278,7 +283,7 @@ def _heisenberg() -> list[Matrix]:
     return [unit(3, 0, 1), unit(3, 1, 2), unit(3, 0, 2)]
 
 
-#: The basis matrices of docs/spec.md, by name.
+#: Bases of matrices for the Lie algebras of docs/spec.md, by name.
 ALGEBRAS: Mapping[str, Callable[[], list[Matrix]]] = {
     "so(3)": _so3,
     "se(2)": _se2,

@@ -1,4 +1,4 @@
-"""Random systems on a device, by OpenCL on the processor, against C."""
+"""Random systems on a device, run by OpenCL on the processor and compared with C."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from differential.reference import expect_close
 
 from phigen.api import lattice_solver_of, solver_of
 
-#: One in so many seeds: kernels take a second to compile.
+#: One in ONE_IN seeds is tested on a device, as kernels take a second to compile.
 ONE_IN = 50
 
-#: Kernels compile in a fifth of the time without optimisation.
+#: Compile kernels without optimisation, in a fifth of the time.
 os.environ.setdefault("PYOPENCL_BUILD_OPTIONS", "-cl-opt-disable")
 
 
 def applies(seed: int) -> bool:
-    """Whether a system with this seed is tried on a device."""
+    """Whether a system with this seed is tested on a device."""
     return seed % ONE_IN == 11 and importlib.util.find_spec("pyopencl") is not None
 
 
 def lattice(trial: Any) -> None:
-    """A run has the states, energies, Casimirs and observables of C."""
+    """Check that states, energies, Casimirs and observables of a run of a lattice agree with those in C."""
     device, c = lattice_solver_of(trial.compilation, "opencl"), trial.solvers["c"]
     ours, theirs = (s.integrate(trial.x0, trial.h, 7, 3, **trial.since, **trial.given) for s in (device, c))
     part, scale = trial.part("c", 1e-12), float(np.abs(theirs.x).max())
@@ -38,7 +38,7 @@ def lattice(trial: Any) -> None:
 
 
 def members(trial: Any, many: Any) -> None:
-    """Members with parameters, steps and times of their own are those of C."""
+    """Check that ensembles whose members differ in parameters, steps and start times agree with those in C."""
     device, c = solver_of(trial.compilation, "opencl"), trial.solvers["c"]
     x, sizes, parameters, since = many
     ours, theirs = (s.ensemble(x, sizes, 6, 4, **since, **parameters) for s in (device, c))

@@ -1,6 +1,6 @@
-"""Random formulas as sympy expressions, their text in a spec, and functions of NumPy that evaluate them.
+"""Random formulas as sympy expressions, their text in specs, and NumPy functions that evaluate them.
 
-Nothing here uses phigen: the derivatives are those of sympy.
+This module imports nothing of phigen; derivatives are computed by sympy.
 """
 
 from __future__ import annotations
@@ -15,27 +15,29 @@ import sympy
 Expr = sympy.Expr
 Symbol = sympy.Symbol
 
-#: The name of the time in all drawn systems.
+#: Symbol of the time in all random systems.
 TIME = Symbol("t")
 
 
 def text(expression: Expr) -> str:
-    """Return a formula as a spec has it."""
+    """Return a formula as text in the syntax of specs."""
     return str(sympy.sstr(expression))
 
 
 def symbols(names: Iterable[str]) -> tuple[Symbol, ...]:
-    """Return symbols without assumptions, so that equal names are equal symbols."""
+    """Return symbols without assumptions such as real=True, as sympy treats symbols with different assumptions as
+    different.
+    """
     return tuple(Symbol(name) for name in names)
 
 
 def small(source: random.Random) -> sympy.Rational:
-    """Return a rational between −3 and 3 that is not 0."""
+    """Return a random rational between −3 and 3 that is not 0."""
     return sympy.Rational(source.choice([-3, -2, -1, 1, 2, 3]), source.choice([1, 2, 3]))
 
 
 def bounded(source: random.Random, argument: Expr) -> Expr:
-    """Return a function of an argument that is smooth on the whole line, and grows slowly."""
+    """Return a random function of the argument that is smooth on the whole line and has moderate derivatives."""
     shapes: list[Callable[[Expr], Expr]] = [
         sympy.sin,
         sympy.cos,
@@ -51,7 +53,7 @@ def bounded(source: random.Random, argument: Expr) -> Expr:
 
 
 def monomial(source: random.Random, among: Sequence[Symbol], degree: int) -> Expr:
-    """Return a product of up to ``degree`` symbols."""
+    """Return a random product of 1 to ``degree`` of the symbols."""
     product = sympy.Integer(1)
     for _ in range(source.randint(1, degree)):
         product *= source.choice(list(among))
@@ -59,25 +61,25 @@ def monomial(source: random.Random, among: Sequence[Symbol], degree: int) -> Exp
 
 
 def linear(source: random.Random, among: Sequence[Symbol]) -> Expr:
-    """Return a combination of one or two symbols."""
+    """Return a random linear combination of one or two of the symbols."""
     chosen = source.sample(list(among), min(len(among), source.randint(1, 2)))
     return sympy.Add(*(small(source) * v for v in chosen))
 
 
 def numeric(expressions: Sequence[Expr], arguments: Sequence[Symbol]) -> Callable[..., list[Any]]:
-    """Return a function of NumPy with the values of expressions, for arguments that are numbers or arrays."""
+    """Return a function that evaluates the expressions by NumPy, for arguments that are numbers or arrays."""
     stand_ins = [Symbol(f"v{k}") for k in range(len(arguments))]
     renamed = dict(zip(arguments, stand_ins, strict=True))
     return sympy.lambdify(stand_ins, [sympy.sympify(e).xreplace(renamed) for e in expressions], "numpy", cse=True)
 
 
 def gradient(expression: Expr, along: Sequence[Symbol]) -> list[Expr]:
-    """Return the derivatives of an expression."""
+    """Return the derivatives of an expression along symbols."""
     return [sympy.diff(expression, v) for v in along]
 
 
 def values_of(expression: Expr, numbers: Mapping[str, Any]) -> Any:
-    """Return the value of an expression where its symbols are numbers or arrays."""
+    """Return the value of an expression; ``numbers`` has numbers or arrays as values of its symbols."""
     names = sorted(str(s) for s in expression.free_symbols)
     (value,) = numeric([expression], symbols(names))(*(numbers[name] for name in names))
     return np.asarray(value, dtype=float)

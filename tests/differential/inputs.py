@@ -1,4 +1,6 @@
-"""Checks of what lattices take from a spec beside formulas: wrong values, tables of bonds; and of their C as C++."""
+"""Checks of inputs of lattices: wrong values in specs, and tables of bonds; and a check that the generated C compiles
+as C++.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +23,12 @@ from phigen.compiler import emit
 from phigen.errors import SpecError
 from phigen.lattice.states import Start, start_of
 
-#: Values of a kind that numbers and seeds are not.
+#: Values that are invalid where a number or a seed is needed.
 WRONG = ([1], [5, 6], {"x": 1}, "N_x", None)
 
 
 def refusal(make: Callable[[], Any]) -> str:
-    """Return the message with which something is refused, or nothing."""
+    """Return the message of the error that ``make`` raises, or "" if it raises none."""
     try:
         make()
     except SpecError as error:
@@ -35,7 +37,7 @@ def refusal(make: Callable[[], Any]) -> str:
 
 
 def malformed(system: Lattice) -> None:
-    """A value of the wrong kind in what is drawn at random is refused, with its place."""
+    """Check that an invalid value in a mapping that draws random numbers is refused."""
     source = random.Random(f"malformed {system.seed}")
     drawn = list(_random_values(system))
     for key in source.sample(["seed", "scale", "mean", "random"], 2) if drawn else ():
@@ -46,7 +48,7 @@ def malformed(system: Lattice) -> None:
 
 
 def _random_values(system: Lattice) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The mappings in a spec that draw random numbers."""
+    """Yield the mappings in a spec that draw random numbers, with a description."""
     for name, parameter in system.parameters.items():
         if isinstance(parameter.value, dict):
             yield f"parameter {name}", parameter.value
@@ -59,7 +61,7 @@ def _started(spec: phigen.spec.Spec) -> Start:
 
 
 def tables(system: Lattice) -> None:
-    """Bonds and their parameters come from a table; what is wrong with it is refused."""
+    """Check that bonds and their parameters can be read from a table, and that errors in the table are refused."""
     bonds = [list(b) for b in system.bonds]
     values = np.random.default_rng(system.seed).uniform(0.5, 1.5, len(bonds)).round(3)
     right = {"a": [str(a) for a, _ in bonds], "b": [str(b) for _, b in bonds], "k": [str(v) for v in values]}
@@ -82,14 +84,14 @@ def tables(system: Lattice) -> None:
 
 
 def _check_moved(system: Lattice, right: dict[str, list[str]], bonds: list[list[int]], values: Any) -> None:
-    """A table whose columns stand in another order is read by their names, if it is read."""
+    """Check that a table with columns in another order is read by the names of the columns."""
     begun = _of_table(system, ["k", "a", "b"], right)
     expect(begun.bonds.tolist() == bonds, f"columns k, a, b are read as bonds {begun.bonds.tolist()}")
     expect_close(np.asarray(begun.parameters["k"]), values, 0.0, "the column k of k, a, b")
 
 
 def _of_table(system: Lattice, names: list[str], columns: dict[str, list[str]]) -> Start:
-    """The start of the run with its bonds in a file."""
+    """Return the start of a run whose bonds are read from a table with the given columns."""
     lines = [",".join(names), *(",".join(row) for row in zip(*(columns[n] for n in names), strict=True))]
     run = {"sizes": list(system.sizes), "initial": dict.fromkeys(system.fields, 1), "step": 0.1, "steps": 4}
     keys = [(k, v) for k, v in system.entries() if k != "runs"] + [("runs", {"r": run | {"bonds": "table.csv"}})]
@@ -105,7 +107,9 @@ int main() { return CALL == NAME_OK; }
 
 
 def as_cpp(compilation: Compilation, *, lattice: bool) -> None:
-    """The C compiles and links as C++, with OpenMP where it uses that, and refuses a null pointer."""
+    """Check that the C compiles and links as C++, for lattices with OpenMP, and that its functions refuse a null
+    pointer.
+    """
     name, sources = compilation.program.name, emit(compilation.program, "c", COMMAND)
     resumed = f"{name}_resume(" in sources[f"{name}.h"]
     call = f"{name}_resume(nullptr, 0.1, nullptr, 0, 0)" if resumed else f"{name}_integrate(nullptr, 0.1, 1)"

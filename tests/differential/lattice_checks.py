@@ -1,4 +1,6 @@
-"""What holds for every lattice: checks against independent equations, differences, and other targets."""
+"""Checks that every random lattice must pass: comparisons with independent equations of motion, with finite
+differences, and across targets.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ START = 0.3
 
 @dataclass(frozen=True)
 class Trial:
-    """A lattice with its compilation and solvers, and a run: x0 (fields, *sizes), parameters, h, t0."""
+    """A lattice with its compilation and solvers, and the data of a run: initial state x0 (fields, *sizes), parameters,
+    step size h, start time t0.
+    """
 
     system: Lattice
     compilation: Compilation
@@ -55,12 +59,12 @@ class Trial:
 
     @property
     def random(self) -> np.random.Generator:
-        """Random numbers, the same for every check."""
+        """New generator of random numbers, with the same numbers for every check."""
         return np.random.default_rng(self.system.seed)
 
     @cached_property
     def x0(self) -> Floats:
-        """The start."""
+        """Initial state of the run."""
         shape = (len(self.system.fields), *self.system.sizes)
         drawn = np.random.default_rng(self.system.seed + 1).uniform(0.4, 1.1, shape)
         signs = np.random.default_rng(self.system.seed + 2).choice([-1.0, 1.0], shape)
@@ -68,7 +72,7 @@ class Trial:
 
     @cached_property
     def values(self) -> dict[str, Any]:
-        """The parameters: numbers, and arrays over sites and bonds."""
+        """Values of the parameters: numbers, or arrays over sites or bonds."""
         random, shapes = (
             np.random.default_rng(self.system.seed + 3),
             {"sites": self.system.sizes, "bonds": (len(self.system.bonds),)},
@@ -80,24 +84,24 @@ class Trial:
 
     @property
     def given(self) -> dict[str, Any]:
-        """Parameters and bonds as arguments of a solver."""
+        """Parameters and bonds as keyword arguments for a solver."""
         return {**self.values, **({"bonds": self.system.edges} if self.system.graph else {})}
 
     @property
     def since(self) -> dict[str, Any]:
-        """Arguments of calls that begin at the start: its time, and which noise acts."""
+        """Keyword arguments for calls that begin at the start: the start time, and the seed of the noise."""
         return ({"t0": START} if self.system.timed else {}) | ({"seed": 2**40 + 3} if self.system.noise else {})
 
     @property
     def held(self) -> dict[str, Any]:
-        """Argument of calls that hold the level of the start, where steps are equal in τ."""
+        """Keyword argument for calls that hold the energy level of the start fixed, for lattices with a monitor."""
         if not self.system.monitored:
             return {}
         return {"gauge": -self.system.densities(self.values, self.t0, self.x0.reshape(len(self.x0), -1))}
 
     @property
     def t0(self) -> float:
-        """The time of the start."""
+        """Start time of the run."""
         return START if self.system.timed else 0.0
 
     @property
@@ -107,16 +111,18 @@ class Trial:
 
     @property
     def splits(self) -> bool:
-        """Whether steps are flows of parts."""
+        """Whether steps are compositions of flows of parts of H."""
         return self.compilation.program.step.equation is None  # type: ignore[union-attr]
 
     def part(self, target: str, double: float, single: float = 2e-4) -> float:
-        """A tolerance, that of single precision where the C of the target has it."""
+        """Return the tolerance ``single`` for a target that computes in single precision, otherwise ``double``."""
         return single if self.single and target == "c" else double
 
     @cached_property
     def field(self) -> Callable[[float, Floats], Floats]:
-        """The right-hand side without noise, of flat states; per unit of τ where steps are equal in τ."""
+        """Right-hand side of the equations of motion without noise, for states as vectors; with a monitor, the
+        derivative along τ.
+        """
         rate, shape = self.system.rates(self.values), (len(self.system.fields), self.system.count)
 
         def field(t: float, y: Floats) -> Floats:
@@ -127,7 +133,7 @@ class Trial:
 
 
 def prepare(system: Lattice) -> Trial:
-    """Compile a lattice, and choose the step by the speed of its field."""
+    """Compile a lattice, and choose a step size that suits the time scale of its vector field."""
     try:
         spec = phigen.spec.loads(system.text + "".join(f"{key}: true\n" for key in system.asked))
         compilation = compile_spec(spec)
@@ -145,7 +151,7 @@ def prepare(system: Lattice) -> Trial:
 
 
 def starts(trial: Trial) -> None:
-    """What runs of the spec start from has the values that docs/lattices.md tells."""
+    """Check that the initial state and parameters of a run have the values that docs/lattices.md defines."""
     system = trial.system
     begun = start_of(trial.compilation.spec, trial.compilation.spec.runs["r"])
     for name, parameter in system.parameters.items():
@@ -163,7 +169,7 @@ def starts(trial: Trial) -> None:
 
 
 def _expect_drawn(system: Lattice, value: Floats, said: Any, what: str) -> None:
-    """Expect an array to be a number, a formula, a list, or the mean with something random added."""
+    """Check that an array equals the number, formula or list in the spec, or its mean plus random numbers."""
     if not isinstance(said, dict):
         return expect_close(value, _spelt(system, said, value.shape), 1e-14, what, 1.0)
     spread = value - np.broadcast_to(_spelt(system, said.get("mean", 0), value.shape), value.shape)
@@ -176,7 +182,7 @@ def _expect_drawn(system: Lattice, value: Floats, said: Any, what: str) -> None:
 
 
 def _spelt(system: Lattice, said: Any, shape: tuple[int, ...]) -> Floats:
-    """The values of a number, a list, or one of the formulas that are drawn."""
+    """Return the values that a number, a list or one of the drawn formulas in a spec denotes."""
     if isinstance(said, list):
         return np.array(said, dtype=float).reshape(shape)
     if not isinstance(said, str) or (said[0].isdigit() and said[-1].isdigit()):
@@ -193,7 +199,7 @@ def _number(said: Any) -> float:
 
 
 def functions(trial: Trial) -> None:
-    """H, its density, the vector field and Casimirs have the values of the formulas."""
+    """Check that H, its density, the vector field, observables and Casimirs agree with the formulas."""
     system, x, when = trial.system, trial.x0, {"t": START} if trial.system.timed else {}
     field = trial.field(trial.t0, x.ravel()).reshape(x.shape) / system.pace(trial.values, x.reshape(len(x), -1))
     energy = system.densities(trial.values, trial.t0, x.reshape(len(x), -1))
@@ -224,7 +230,9 @@ def functions(trial: Trial) -> None:
 
 
 def order(trial: Trial) -> None:
-    """Errors fall with the step as the order says, on the way to the flow of the independent field."""
+    """Check that errors decrease with the stated order, compared with a solution of the independent equations by
+    DOP853.
+    """
     system, stated, span = trial.system, trial.compilation.order.order, 8 * trial.h
     expect(stated >= system.options.get("order", 2), f"order {system.options['order']} was asked for, and is {stated}")
     exact = flow(trial.field, trial.t0, trial.x0.ravel(), span)
@@ -240,7 +248,7 @@ def order(trial: Trial) -> None:
 
 
 def targets(trial: Trial) -> None:
-    """C, NumPy and JavaScript make the same run to round-off."""
+    """Check that runs in C, NumPy and JavaScript agree to round-off."""
     steps = 7
     runs = {t: s.integrate(trial.x0, trial.h, steps, 3, **trial.since, **trial.given) for t, s in trial.solvers.items()}
     c, numpy = runs["c"], runs["numpy"]
@@ -257,7 +265,7 @@ def targets(trial: Trial) -> None:
 
 
 def _javascript(trial: Trial, steps: int) -> Any:
-    """State, time and energy of the run in JavaScript."""
+    """Return the final state, time and energy of the run in JavaScript."""
     program = trial.compilation.program
     plain = replace(program, step=replace(program.step, adjoint=None), extras=replace(program.extras, adjoint=False))
     options: dict[str, Any] = {"x0": trial.x0.ravel().tolist(), "sizes": list(trial.system.sizes)}
@@ -274,7 +282,9 @@ def _javascript(trial: Trial, steps: int) -> Any:
 
 
 def bits(trial: Trial) -> None:
-    """Strides, calls of a session, its copies, streams and checkpoints do not change a bit."""
+    """Check that a stride, streamed frames and a resumed checkpoint give the same bits as one run; with implicit steps
+    a stride may change round-off.
+    """
     for target, solver in trial.solvers.items():
         whole = solver.integrate(trial.x0, trial.h, 9, **trial.since, **trial.given)
         thin = solver.integrate(trial.x0, trial.h, 9, 4, **trial.since, **trial.given)
@@ -287,7 +297,7 @@ def bits(trial: Trial) -> None:
 
 
 def _expect_resumed(trial: Trial, solver: LatticeSolver, rows: Floats, folder: Path, target: str) -> None:
-    """Expect a run that was interrupted, and goes on from its checkpoint, to be the whole run."""
+    """Check that an interrupted run, resumed from its checkpoint, has the same bits as a whole run."""
 
     def stop(steps_done: int) -> None:
         if steps_done >= 6:
@@ -307,7 +317,7 @@ def _expect_resumed(trial: Trial, solver: LatticeSolver, rows: Floats, folder: P
 
 
 def sessions(trial: Trial) -> None:
-    """Sessions and their copies make the steps of a run."""
+    """Check that sessions and their copies agree with a run."""
     for target, solver in trial.solvers.items():
         whole = solver.integrate(trial.x0, trial.h, 9, **trial.since, **trial.given)
         session = solver.session(trial.x0, **trial.since, **trial.given).step(trial.h, 3)
@@ -318,7 +328,7 @@ def sessions(trial: Trial) -> None:
 
 
 def members(trial: Trial) -> None:
-    """Members of ensembles, with disorder and steps of their own, are single runs."""
+    """Check that members of ensembles with different parameters and steps agree with single runs."""
     x, sizes, options = _many(trial, 3)
     shared = {"bonds": trial.system.edges} if trial.system.graph else {}
     for target, solver in trial.solvers.items():
@@ -331,7 +341,7 @@ def members(trial: Trial) -> None:
 
 
 def _many(trial: Trial, many: int) -> tuple[Floats, Floats, dict[str, Any]]:
-    """States, steps and parameters of members."""
+    """Return the states, step sizes and parameters of the members of an ensemble."""
     random = trial.random
     x = trial.x0 + 0.05 * random.uniform(-1, 1, (many, *trial.x0.shape))
     parameters = {n: np.multiply.outer(random.uniform(0.9, 1.1, many), v) for n, v in trial.values.items()}
@@ -339,7 +349,9 @@ def _many(trial: Trial, many: int) -> tuple[Floats, Floats, dict[str, Any]]:
 
 
 def gradient(trial: Trial) -> None:
-    """`pullback` of a run is the derivative of that run, by differences, along its start and all parameters."""
+    """Check that the pullback of a run agrees with finite differences, along random directions of the start and of all
+    parameters.
+    """
     steps, stride, random = 5, 2, trial.random
     bars, along = random.normal(size=(4, *trial.x0.shape)), random.normal(size=trial.x0.shape)
     pushes = {n: 0.3 * random.normal(size=np.shape(v)) for n, v in trial.values.items()}
@@ -372,7 +384,7 @@ def gradient(trial: Trial) -> None:
 
 
 def member_gradients(trial: Trial) -> None:
-    """Cotangents of members are those of single runs."""
+    """Check that pullbacks of members agree with those of single runs."""
     x, sizes, options = _many(trial, 3)
     bars, shared = trial.random.normal(size=x.shape), {"bonds": trial.system.edges} if trial.system.graph else {}
     for target, solver in trial.solvers.items():
@@ -395,7 +407,7 @@ def member_gradients(trial: Trial) -> None:
 
 
 def tangent(trial: Trial) -> None:
-    """Tangent vectors are carried as differences say; those of targets agree."""
+    """Check that tangent vectors agree with finite differences and between targets."""
     steps, along = 3, trial.random.normal(size=(2, *trial.x0.shape))
     run, carried = trial.solvers["numpy" if trial.single else "c"], {}
     for target, solver in trial.solvers.items():
@@ -411,7 +423,7 @@ def tangent(trial: Trial) -> None:
 
 
 def jacobian(trial: Trial) -> None:
-    """The transpose of the tangent map is what a step pulls back by."""
+    """Check that the pullback of a step is the transpose of its tangent map."""
     along, bar = trial.random.normal(size=(1, *trial.x0.shape)), trial.random.normal(size=trial.x0.shape)
     for target, solver in trial.solvers.items():
         _, carried = solver.step_tangent(trial.x0, trial.h, along, **trial.since, **trial.given)
@@ -422,7 +434,7 @@ def jacobian(trial: Trial) -> None:
 
 
 def poisson(trial: Trial) -> None:
-    """A step is a Poisson map: DΦ π DΦᵀ is π at its end."""
+    """Check that a step is a Poisson map: DΦ π DΦᵀ equals π at the end of the step."""
     n, shape = trial.x0.size, (len(trial.system.fields), trial.system.count)
     unit = np.eye(n).reshape(n, *trial.x0.shape)
     for target, solver in trial.solvers.items():
@@ -436,7 +448,7 @@ def poisson(trial: Trial) -> None:
 
 
 def casimirs(trial: Trial) -> None:
-    """|x|² of every site is constant to round-off."""
+    """Check that the Casimir |x|² of every site is constant to round-off."""
     for target, solver in trial.solvers.items():
         run = solver.integrate(trial.x0, 2 * trial.h, 20, 20, **trial.since, **trial.given)
         squares = (run.x**2).sum(axis=1)
@@ -444,7 +456,7 @@ def casimirs(trial: Trial) -> None:
 
 
 def reversal(trial: Trial) -> None:
-    """A step of −h undoes one of h."""
+    """Check that steps of −h lead back to the start of steps of h."""
     for target, solver in trial.solvers.items():
         there = solver.integrate(trial.x0, trial.h, 3, 3, **trial.since, **trial.given).x[-1]
         since = {"t0": START + 3 * trial.h} if trial.system.timed else {}
@@ -454,7 +466,7 @@ def reversal(trial: Trial) -> None:
 
 
 def hopeless(trial: Trial) -> None:
-    """A step that is far too large fails with a `StepError`, or ends somewhere finite, and leaves the state."""
+    """Check that a step that is far too large raises a `StepError` and leaves the state, or has a finite result."""
     for target, solver in trial.solvers.items():
         try:
             run = solver.integrate(trial.x0, 1e9 * trial.h, 1, **trial.since, **trial.given)
@@ -467,7 +479,9 @@ def hopeless(trial: Trial) -> None:
 
 
 def extras(trial: Trial) -> None:
-    """What the spec asks for and what `compile` is asked for is there."""
+    """Check that derivatives and options work, both those requested in the spec and those requested in the call of
+    `compile`.
+    """
     solver = phigen.compile(phigen.spec.loads(trial.system.text), "numpy", **trial.system.asked)
     requested = trial.compilation.program.extras
     if requested.adjoint:
@@ -490,7 +504,7 @@ def _runs_on_devices(trial: Trial) -> bool:
 
 
 def _asked_twice(trial: Trial) -> bool:
-    """Whether the spec and the call of `compile` ask for something each."""
+    """Whether both the spec and the call of `compile` request options."""
     return bool(trial.system.asked) and not {"adjoint", "tangent", "real", "without"}.isdisjoint(trial.system.options)
 
 
@@ -534,7 +548,7 @@ CHECKS = (
 
 
 def script(system: Lattice, check: Check | None) -> str:
-    """A script that shows what a check found."""
+    """Return a script that shows the two results which a check compares."""
     trial = Trial(system, None, {})  # type: ignore[arg-type]
     arguments = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in (trial.given | trial.since).items()}
     h = float(f"{0.1 / speed_of(trial.field, trial.t0, trial.x0.ravel()):.2g}")

@@ -1,4 +1,4 @@
-"""Draws of random lattices: grids of one to three axes, graphs and pairs, on a few sites."""
+"""Random lattices: grids of one to three axes, graphs, and sites that interact in pairs, with few sites."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from differential.sites import Lattice, Parameter
 
 @dataclass(frozen=True)
 class Cell:
-    """The structure of a site: fields, its form in a spec, π; positions and momenta where it is canonical."""
+    """The brackets of a site: its fields, their form in a spec, and π. ``pairs`` has canonical positions and momenta,
+    ``across`` the brackets with other sites.
+    """
 
     kind: str
     fields: tuple[str, ...]
@@ -28,7 +30,7 @@ class Cell:
 
 
 def draw_lattice(seed: int, attempt: int = 0) -> Lattice:
-    """Draw a lattice of a seed, another in each attempt; equal on every machine."""
+    """Draw the lattice of a seed; each attempt gives another one. The result is the same on every machine."""
     source = random.Random(f"lattice {seed}" + f" {attempt}" * (attempt > 0))
     relation = source.choices(["grid", "graph", "pairs"], [60, 25, 15])[0]
     place = _relation(source, relation)
@@ -44,7 +46,7 @@ def draw_lattice(seed: int, attempt: int = 0) -> Lattice:
 
 
 def _relation(source: random.Random, relation: str) -> dict[str, Any]:
-    """Axes, boundaries and sizes; or sites with bonds; or pairs."""
+    """Draw how sites are related: the axes of a grid with boundaries and sizes, the bonds of a graph, or all pairs."""
     if relation == "grid":
         axes = ("i", "j", "k")[: source.choices([1, 2, 3], [60, 28, 12])[0]]
         most = {1: [1, 2, 3, 4, 5, 6, 7, 8, 9, 12], 2: [1, 2, 3, 4, 5], 3: [1, 2, 3]}[len(axes)]
@@ -60,7 +62,7 @@ def _relation(source: random.Random, relation: str) -> dict[str, Any]:
 
 
 def _cell(source: random.Random, relation: str, place: dict[str, Any]) -> Cell:
-    """The structure of a site."""
+    """Draw the brackets of a site."""
     kinds: list[tuple[Callable[..., Cell], float]] = [(_canonical, 42), (_algebra, 32), (_log, 6), (_nothing, 3)]
     if relation == "grid":
         kinds.append((_coupled, 12))
@@ -114,7 +116,7 @@ def _nothing(source: random.Random, place: dict[str, Any]) -> Cell:
 
 
 def _coupled(source: random.Random, place: dict[str, Any]) -> Cell:
-    """Brackets that couple neighbours: of Volterra, Toda, Korteweg and de Vries."""
+    """Draw brackets between neighbours: those of the Volterra, Toda or Korteweg–de Vries lattice."""
     axis = source.choice(place["axes"])
     kind, index = source.choice(["volterra", "toda", "kdv"]), f"[{axis}+1]"
     if kind == "toda":
@@ -137,7 +139,7 @@ def _along_bonds(source: random.Random, place: dict[str, Any]) -> Cell:
 
 
 def _parameters(source: random.Random, place: dict[str, Any]) -> dict[str, Parameter]:
-    """J is one number, B an array over sites, and k one over the bonds of graphs."""
+    """Draw parameters: J is a number, B an array over sites, and k, for graphs, an array over bonds."""
     parameters = {
         "J": Parameter("all", round(source.uniform(0.5, 1.5), 2), source.random() < 0.3),
         "B": Parameter("sites", _array(source, place)),
@@ -150,7 +152,7 @@ def _parameters(source: random.Random, place: dict[str, Any]) -> dict[str, Param
 
 
 def _array(source: random.Random, place: dict[str, Any]) -> Any:
-    """The values of a parameter at sites, in one of the ways of docs/lattices.md."""
+    """Draw values of a parameter at sites, in one of the forms of docs/lattices.md."""
     index = (place.get("axes") or "i")[0]
     formulas = [f"1 + {index}/N_{index}", f"cos(2*pi*{index}/N_{index})/2", f"{index} - 1"]
     formula: Any = source.choice(formulas) if place.get("axes") or place.get("pairs") else 1.5
@@ -167,7 +169,7 @@ def _array(source: random.Random, place: dict[str, Any]) -> Any:
 
 
 def _initial(source: random.Random, cell: Cell, place: dict[str, Any]) -> Any:
-    """Where the run of the spec starts."""
+    """Draw the initial state of the run in the spec."""
     if not cell.positive and len(cell.fields) == 3 and source.random() < 0.3:
         return {"random": "sphere", "seed": source.randint(0, 9)}
     if source.random() < 0.3 and not cell.positive:
@@ -179,7 +181,7 @@ def _initial(source: random.Random, cell: Cell, place: dict[str, Any]) -> Any:
 
 
 def _with_energy(source: random.Random, drawn: Lattice, cell: Cell) -> Lattice:
-    """The lattice with a Hamiltonian: terms of a site, and terms that relate sites."""
+    """Return the lattice with a random Hamiltonian: terms of single sites, and terms of two sites."""
     one_part = source.random() < 0.15
     site_terms, between = _terms(source, cell, one_part)
     if not drawn.axes:
@@ -188,7 +190,7 @@ def _with_energy(source: random.Random, drawn: Lattice, cell: Cell) -> Lattice:
             for _ in range(source.choice([0, 1, 1, 2]))
         ]
         if cell.kind == "food web":
-            ends = []  # energies of bonds beside brackets along bonds are refused
+            ends = []  # phigen refuses bond energies if brackets act along bonds
         weight = Symbol("k") if drawn.graph and source.random() < 0.5 else Symbol("J")
         return replace(drawn, sites=tuple(site_terms), ends=tuple(weight * e for e in ends))
     terms = list(site_terms)
@@ -210,12 +212,12 @@ def _with_energy(source: random.Random, drawn: Lattice, cell: Cell) -> Lattice:
 
 
 def _weighted(source: random.Random) -> Expr:
-    """A coefficient of a term that relates sites."""
+    """Draw a coefficient for a term of two sites."""
     return source.choice([Symbol("J"), Symbol("B"), sympy.Rational(1, 2), Symbol("J") / 3])
 
 
 def _offset(source: random.Random, drawn: Lattice) -> list[int]:
-    """The place of a neighbour, next along one axis as a rule."""
+    """Draw the offset to another site, usually the next one along an axis."""
     if source.random() < 0.75:
         k = source.randrange(len(drawn.axes))
         return [source.choice([1, 1, -1]) * (n == k) for n in range(len(drawn.axes))]
@@ -223,12 +225,12 @@ def _offset(source: random.Random, drawn: Lattice) -> list[int]:
 
 
 def _index(axes: Sequence[str], offset: Sequence[int]) -> str:
-    """An offset as a spec has it."""
+    """Return an offset as an index in the syntax of specs."""
     return "[" + ",".join(f"{a}{o:+d}" for a, o in zip(axes, offset, strict=True) if o) + "]"
 
 
 def _terms(source: random.Random, cell: Cell, one_part: bool) -> tuple[list[Expr], list[tuple[str, str]]]:
-    """Terms of a site, and which fields of two sites meet in terms between them."""
+    """Draw terms of a site. Return also pairs of fields that terms of two sites may contain."""
     v = symbols(cell.fields)
     b = Symbol("B")
     if cell.pairs:
@@ -265,7 +267,7 @@ def _terms(source: random.Random, cell: Cell, one_part: bool) -> tuple[list[Expr
 def _between(
     source: random.Random, cell: Cell, left: str, right: str, meet: Sequence[tuple[str, str]], *, symmetric: bool
 ) -> Expr:
-    """A term that relates two sites."""
+    """Draw a term of two sites."""
     first, second = source.choice([(a, b) for a, b in meet if a == b or not symmetric] or [(cell.fields[0],) * 2])
     a, b = symbols([first + left, second + right])
     if cell.pairs and first == second:
@@ -276,11 +278,11 @@ def _between(
     return source.choice([a * b, a * b / 2, a * b, (b - a) ** 2 / 3]) if first == second else a * b / 2
 
 
-# --- what acts beside H, and options
+# --- time, forces and noise, and options
 
 
 def _acted_upon(source: random.Random, drawn: Lattice, cell: Cell) -> Lattice:
-    """The lattice with a time, forces, damping, noise, or with none of these."""
+    """Return the lattice with time dependence, a force, damping or noise, or unchanged."""
     what = source.choices(["", "time", "vector", "covector", "damping", "noise"], [58, 14, 7, 6, 7, 8])[0]
     v = symbols(cell.fields)
     if what == "time":
@@ -299,7 +301,7 @@ def _acted_upon(source: random.Random, drawn: Lattice, cell: Cell) -> Lattice:
 
 
 def _with_options(source: random.Random, drawn: Lattice) -> Lattice:
-    """The lattice with further keys of the spec, and with derivatives asked for."""
+    """Return the lattice with further keys of the spec, and with requests for derivatives."""
     options: dict[str, Any] = {}
     scheme = source.choices(["", "auto", "series", "splitting"], [45, 10, 30, 15])[0]
     if scheme:
@@ -323,7 +325,9 @@ def _with_options(source: random.Random, drawn: Lattice) -> Lattice:
 
 
 def _monitored(source: random.Random, drawn: Lattice, cell: Cell) -> Lattice:
-    """The lattice, or for canonical pairs another energy with a negative part, and a monitor."""
+    """Return the lattice unchanged or, if canonical pairs interact, with a monitor and another energy that has a
+    negative part.
+    """
     acted_upon = drawn.timed or drawn.forced or bool(drawn.noise)
     if not (drawn.pairs and cell.pairs and drawn.count > 1) or acted_upon or source.random() < 0.4:
         return drawn

@@ -1,4 +1,6 @@
-"""Random ordinary systems: the text of their spec, and their equations of motion without phigen."""
+"""Random systems other than lattices ("ordinary"): the text of their spec, and their equations of motion, derived
+without phigen.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +18,10 @@ from differential.brackets import Structure, draw_structure, paired
 from differential.formulas import TIME, Expr, Symbol, bounded, gradient, linear, monomial, numeric, small, text
 from differential.reference import Floats
 
-#: Names of parameters, some of them words of C or names that code may use itself.
+#: Names of parameters; some are keywords of C or Python, or may occur in generated code.
 PARAMETERS = ("a", "mu", "lambda", "k", "c")
 
-#: Forms of observables of two expressions: as a spec has them, and as functions of their values.
+#: Forms of observables with two operands, as text in a spec and as Python functions of the values of the operands.
 OBSERVED: Mapping[str, Callable[[float, float], float]] = {
     "({0})*({1})": lambda a, b: a * b,
     "atan2({0}, 2 + ({1})**2)": lambda a, b: math.atan2(a, 2 + b**2),
@@ -31,13 +33,12 @@ OBSERVED: Mapping[str, Callable[[float, float], float]] = {
 
 @dataclass(frozen=True)
 class Ordinary:
-    """A drawn system.
+    """A random system.
 
-    H is the sum of ``terms``. ``parameters`` have a default, and say whether they are positive. ``covector``,
-    ``vector``, ``damping``, ``monitor`` and ``noise`` (Hamiltonian and amplitude) act as docs/spec.md has it;
-    ``monitor`` may be "log", with ``attraction`` the negative part of H. ``observables``
-    are forms of `OBSERVED` with two expressions. ``options`` are further keys of the spec,
-    ``asked`` what `phigen.compile` is asked for beside it.
+    H is the sum of ``terms``. Each of the ``parameters`` has a default and a flag for positivity. ``covector``,
+    ``vector``, ``damping``, ``monitor`` and ``noise`` (Hamiltonian and amplitude) have the meaning of docs/spec.md. If
+    ``monitor`` is "log", ``attraction`` is the negative part of H. ``observables`` are forms of `OBSERVED` with two
+    operands. ``options`` are further keys of the spec, and ``asked`` further options of the call of `phigen.compile`.
     """
 
     seed: int
@@ -62,11 +63,11 @@ class Ordinary:
 
     @property
     def text(self) -> str:
-        """The spec; every value is JSON, which is YAML too."""
+        """Text of the spec; every value is written as JSON, which is valid YAML."""
         return "".join(f"{key}: {json.dumps(value)}\n" for key, value in self.entries())
 
     def entries(self) -> Iterator[tuple[str, Any]]:
-        """Yield the keys of the spec."""
+        """Yield the top-level keys of the spec with their values."""
         yield from {"phigen": 1, "name": f"o{self.seed}"}.items()
         yield "coordinates", [str(v) for v in self.structure.coordinates]
         if self.parameters:
@@ -98,31 +99,31 @@ class Ordinary:
 
     @property
     def forced(self) -> bool:
-        """Whether something acts beside H."""
+        """Whether there are forces or damping."""
         return bool(self.covector or self.vector or self.damping is not None)
 
     @property
     def hamiltonian(self) -> Expr:
-        """H."""
+        """Hamiltonian: the sum of all terms."""
         return sympy.Add(*self.terms)
 
     @property
     def order(self) -> int:
-        """The order that is asked for."""
+        """Order that the spec requests, or the default."""
         return int(self.options.get("order", 2 if self.noise else 4))
 
     @property
     def arguments(self) -> list[Symbol]:
-        """The symbols of all functions: time, coordinates, parameters."""
+        """Symbols on which formulas depend: time, coordinates, parameters."""
         return [TIME, *self.structure.coordinates, *(Symbol(name) for name in self.parameters)]
 
     @property
     def values(self) -> dict[str, float]:
-        """The defaults of the parameters."""
+        """Default values of the parameters."""
         return {name: float(value) for name, (value, _) in self.parameters.items()}
 
     def function(self, expressions: list[Expr]) -> Callable[[float, Floats], Floats]:
-        """Return expressions as a function of time and state (DIM,), with the default parameters."""
+        """Return a function of time and state (DIM,) that evaluates the expressions, with the default parameters."""
         compiled, values = numeric(expressions, self.arguments), list(self.values.values())
 
         def at(t: float, x: Floats) -> Floats:
@@ -132,25 +133,27 @@ class Ordinary:
 
     @cached_property
     def slope(self) -> list[Expr]:
-        """∇H."""
+        """Gradient of H along the coordinates."""
         return gradient(self.hamiltonian, self.structure.coordinates)
 
     @cached_property
     def pace(self) -> Expr:
-        """dt/dτ."""
+        """Derivative of the time t along the fictitious time τ: the value of the monitor, or 1."""
         if self.attraction is not None:
             return -1 / self.attraction
         return sympy.Integer(1) if self.monitor is None else self.monitor
 
     @cached_property
     def field(self) -> Callable[[float, Floats], Floats]:
-        """The right-hand side without noise, for the state and, behind it, the time: d/dτ of both."""
+        """Right-hand side without noise: the derivatives along τ of the state and, as the last component, of
+        the time.
+        """
         whole = self.function([*(self.pace * v for v in self.velocity), self.pace])
         return lambda s, y: whole(y[-1], y[:-1])
 
     @cached_property
     def velocity(self) -> list[Expr]:
-        """π∇H with what forces and damping add."""
+        """Time derivative of the state: π∇H plus the contributions of forces and damping."""
         x, pi, slope = self.structure.coordinates, self.structure.pi, sympy.Matrix(self.slope)
         pushed = slope + sympy.Matrix([self.covector.get(str(v), 0) for v in x])
         if self.damping is not None:
@@ -159,14 +162,14 @@ class Ordinary:
 
     @cached_property
     def sources(self) -> list[Callable[[float, Floats], Floats]]:
-        """σπ∇g of each source of noise."""
+        """Vector field σπ∇g of each noise source with Hamiltonian g and amplitude σ."""
         x, pi = self.structure.coordinates, self.structure.pi
         return [self.function(list(s * pi * sympy.Matrix(gradient(g, x)))) for g, s in self.noise.values()]
 
     # --- shrinking
 
     def simpler(self) -> Iterator[Ordinary]:
-        """Yield systems with a part less."""
+        """Yield simpler systems, each with one term or option removed."""
         for k in range(len(self.terms)):
             if len(self.terms) > 1:
                 yield replace(self, terms=self.terms[:k] + self.terms[k + 1 :])
@@ -203,7 +206,7 @@ class Ordinary:
         ]
 
     def _with_value(self, name: str, value: sympy.Rational, rest: Mapping[str, Any]) -> Ordinary:
-        """The system with a number in place of a parameter."""
+        """Return the system with a parameter replaced by its value."""
         put = {Symbol(name): value}
         new: dict[str, Any] = {
             "terms": tuple(e.xreplace(put) for e in self.terms),
@@ -222,7 +225,7 @@ class Ordinary:
 
 
 def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
-    """Draw a system of a seed, another in each attempt; equal on every machine."""
+    """Draw the system of a seed; each attempt gives another one. The result is the same on every machine."""
     source = random.Random(f"ordinary {seed}" + f" {attempt}" * (attempt > 0))
     structure = draw_structure(source)
     scheme = source.choices(["series", "splitting"], [65, 35])[0]
@@ -231,7 +234,7 @@ def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
     weights = [Symbol(name) for name in parameters]
 
     def weight() -> Expr:
-        """A coefficient: a number, or a parameter times a number."""
+        """Draw a coefficient: a number, or a number times a parameter."""
         return small(source) * (source.choice(weights) if weights and source.random() < 0.4 else 1)
 
     make = _splittable if scheme == "splitting" else _any_terms
@@ -248,13 +251,13 @@ def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
 
 
 def _observed(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """The system, or with observables, of the time and of parameters too."""
+    """Return the system, in half of the cases with observables, which may depend on time and parameters."""
     if source.random() < 0.5:
         return drawn
     symbols = [*drawn.structure.coordinates, *(Symbol(name) for name in drawn.parameters), *([TIME] * drawn.timed)]
 
     def operand() -> Expr:
-        """A function of coordinates, and perhaps of parameters and the time."""
+        """Draw a function of coordinates, parameters and the time."""
         return small(source) * bounded(source, linear(source, symbols)) + small(source) * source.choice(symbols) / 3
 
     forms = source.sample(list(OBSERVED), source.randint(1, 3))
@@ -262,7 +265,9 @@ def _observed(source: random.Random, drawn: Ordinary) -> Ordinary:
 
 
 def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """The system, or with a rotation or body, or with the same pairs a linear one, or a perturbed Kepler motion."""
+    """Return the system unchanged or with terms that have exact flows. For so(3)* these are a rotation or a free rigid
+    body; for canonical pairs a quadratic H, a perturbed Kepler motion, or two or three bodies.
+    """
     acted_upon = drawn.timed or drawn.forced or drawn.noise or drawn.monitor is not None
     if drawn.structure.body and not acted_upon and drawn.options.get("scheme") == "splitting":
         return _with_rotations(source, drawn)
@@ -293,7 +298,7 @@ def _with_exact_flows(source: random.Random, drawn: Ordinary) -> Ordinary:
 
 
 def _with_rotations(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """The system with a rotation about a vector, or a free rigid body with three moments, or the system."""
+    """Return the system with a rotation about a vector, with the kinetic energy of a free rigid body, or unchanged."""
     x, way = drawn.structure.coordinates, source.choice(["vector", "body", "body", ""])
     if way == "vector":
         return replace(drawn, terms=(*drawn.terms, small(source) * linear(source, x) ** 2 / 4))
@@ -306,7 +311,9 @@ def _with_rotations(source: random.Random, drawn: Ordinary) -> Ordinary:
 
 
 def _bodies(source: random.Random, drawn: Ordinary, options: dict[str, Any]) -> Ordinary:
-    """Draw two or three bodies in a plane about the first one, in relative coordinates."""
+    """Draw two or three bodies in a plane, the first one heavy, with Jacobi or democratic heliocentric coordinates for
+    the step.
+    """
     count, change = source.choice([2, 3, 3]), source.choice(["jacobi", "jacobi", "democratic_heliocentric"])
     names = [f"{axis}{i}" for axis in "xy" for i in range(count)]
     if source.random() < 0.5:
@@ -338,7 +345,7 @@ def _bodies(source: random.Random, drawn: Ordinary, options: dict[str, Any]) -> 
 
 
 def _any_terms(source: random.Random, structure: Structure, weight: Callable[[], Expr]) -> list[Expr]:
-    """Terms of H of any form, squares among them."""
+    """Draw terms of H: squares of coordinates, monomials, and functions of linear combinations."""
     x = structure.coordinates
     terms = [sympy.Rational(source.randint(1, 4), 4) * v**2 for v in x if source.random() < 0.8]
     for _ in range(source.randint(1, 3)):
@@ -350,7 +357,7 @@ def _any_terms(source: random.Random, structure: Structure, weight: Callable[[],
 
 
 def _splittable(source: random.Random, structure: Structure, weight: Callable[[], Expr]) -> list[Expr]:
-    """Terms of H that have elementary flows, by the kind of the structure."""
+    """Draw terms of H with elementary flows for the structure."""
     x = structure.coordinates
     if structure.pairs:
         q, p = zip(*structure.pairs, strict=True)
@@ -363,7 +370,7 @@ def _splittable(source: random.Random, structure: Structure, weight: Callable[[]
 
 
 def _coupled(source: random.Random, structure: Structure, weight: Callable[[], Expr]) -> list[Expr]:
-    """Terms of H of a ring of oscillators."""
+    """Draw the terms of H for a ring of oscillators."""
     q, p = zip(*structure.pairs, strict=True)
     power = source.choice([2, 4])
     kinetic, well = [v**2 / 2 for v in p], source.choice([0, 1])
@@ -372,7 +379,7 @@ def _coupled(source: random.Random, structure: Structure, weight: Callable[[], E
 
 
 def _acted_upon(source: random.Random, drawn: Ordinary, scheme: str, weight: Callable[[], Expr]) -> Ordinary:
-    """The system with a time, forces, damping, a monitor or noise, or with none of these."""
+    """Return the system with time dependence, forces, damping, a monitor or noise, or unchanged."""
     if drawn.structure.kind == "chain":
         return drawn
     what = source.choices(["", "time", "forces", "monitor", "noise", "forces, time"], [45, 14, 14, 12, 10, 5])[0]
@@ -396,7 +403,7 @@ def _acted_upon(source: random.Random, drawn: Ordinary, scheme: str, weight: Cal
 
 
 def _forces(source: random.Random, drawn: Ordinary, weight: Callable[[], Expr], *, timed: bool) -> dict[str, Any]:
-    """Forces on one coordinate, or damping."""
+    """Draw forces on coordinates, or damping."""
     x = drawn.structure.coordinates
     acting = source.choice(["covector", "vector", "damping", "vector", "covector, vector"])
     new: dict[str, Any] = {}
@@ -412,7 +419,9 @@ def _forces(source: random.Random, drawn: Ordinary, weight: Callable[[], Expr], 
 
 
 def _monitored(source: random.Random, drawn: Ordinary, scheme: str) -> dict[str, Any]:
-    """A monitor; of a splitting in two the logarithmic one, with a negative potential."""
+    """Draw a monitor. For a splitting of canonical pairs it is "log", with a kinetic energy and a negative
+    potential.
+    """
     x, pairs = drawn.structure.coordinates, drawn.structure.pairs
     if scheme == "series":
         v, w = source.choice(list(x)), source.choice(list(x))
@@ -425,7 +434,7 @@ def _monitored(source: random.Random, drawn: Ordinary, scheme: str) -> dict[str,
     return {"monitor": "log", "attraction": well, "terms": (sum(v**2 for v in p) / 2, well)}
 
 
-#: Orders with their weights, for the series and for splittings.
+#: Orders with their probabilities (relative weights), for the schemes series and splitting.
 _ORDERS = {"series": ([1, 2, 3, 4, 6, 8], [4, 44, 4, 30, 12, 6]), "splitting": ([2, 4, 6, 8], [35, 35, 20, 10])}
 
 _COMPOSITIONS = {4: ["suzuki", "triple-jump"], 6: ["kahan-li", "yoshida"], 8: ["kahan-li", "yoshida"]}
@@ -433,7 +442,7 @@ _PARTS = ("by-hand", "ensemble", "kicks", "lanes", "members", "recurrences")
 
 
 def _options(source: random.Random, drawn: Ordinary, scheme: str) -> dict[str, Any]:
-    """Further keys of the spec."""
+    """Draw further keys of the spec."""
     chain, costly = drawn.structure.kind == "chain", drawn.structure.kind in ("nambu3", "nambu4", "pull-back")
     heavy = costly or drawn.forced or drawn.monitor is not None or len(drawn.structure.coordinates) > 4
     options: dict[str, Any] = {}
@@ -461,7 +470,7 @@ def _options(source: random.Random, drawn: Ordinary, scheme: str) -> dict[str, A
 
 
 def _realised(source: random.Random, drawn: Ordinary) -> dict[str, Any]:
-    """The gauge and the bi-realisation of a series."""
+    """Draw the gauge and the bi-realisation for the scheme series."""
     chosen: dict[str, Any] = {}
     if source.random() < 0.5:
         chosen["gauge"] = "none"
@@ -479,7 +488,9 @@ def _realised(source: random.Random, drawn: Ordinary) -> dict[str, Any]:
 
 
 def _extras(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """The system with derivatives asked for, in the spec, of `phigen.compile`, or one in each."""
+    """Return the system with random requests for ``adjoint`` and ``tangent``, each in the spec or in the call of
+    `phigen.compile`.
+    """
     options, asked = dict(drawn.options), {}
     for name, chance in (("adjoint", 0.75), ("tangent", 0.4)):
         if name == "adjoint" and drawn.noise:
@@ -493,19 +504,19 @@ def _extras(source: random.Random, drawn: Ordinary) -> Ordinary:
 
 
 def _chosen(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """The system, now and then with the scheme left to the compiler."""
+    """Return the system, in some cases with `scheme: auto`."""
     scheme = drawn.options.get("scheme", "series")
     if source.random() > 0.1 or "structure" in drawn.options or drawn.monitor == "log" or scheme == "splitting":
         return drawn
     return replace(drawn, options={**drawn.options, "scheme": "auto"})
 
 
-#: Options of other schemes.
+#: Options that the scheme gauss refuses or that are drawn anew for it.
 _NOT_OF_GAUSS = ("birealisation", "composition", "coordinates_from", "reconstruct", "solver")
 
 
 def _collocated(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """The system, now and then with Gauss collocation in place of its scheme."""
+    """Return the system, in a quarter of the cases with the scheme gauss."""
     if source.random() > 0.25 or drawn.noise or drawn.monitor == "log":
         return drawn
     options = {k: v for k, v in drawn.options.items() if k not in _NOT_OF_GAUSS}

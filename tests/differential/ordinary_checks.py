@@ -1,4 +1,6 @@
-"""What holds for every ordinary system: checks against independent equations, differences, and other targets."""
+"""Checks that every random system other than a lattice must pass: comparisons with independent equations of motion,
+with finite differences, and across targets.
+"""
 
 from __future__ import annotations
 
@@ -34,14 +36,16 @@ from phigen.compiler import compile_spec
 from phigen.errors import LimitError, SpecError, StepError
 from phigen.runtime.solver import Solver
 
-#: The targets that Python runs.
+#: Targets that run in Python.
 LOADED = ("c", "numpy")
 START = 0.3
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A system with its compilation and solvers, and a run that its field makes easy: x0, h, t0."""
+    """A system with its compilation and solvers, and the data of a run: initial state x0, start time t0, and a step
+    size h that suits the time scale of the vector field.
+    """
 
     system: Ordinary
     compilation: Compilation
@@ -50,17 +54,17 @@ class Trial:
 
     @property
     def random(self) -> np.random.Generator:
-        """Random numbers, the same for every check."""
+        """New generator of random numbers, with the same numbers for every check."""
         return np.random.default_rng(self.system.seed)
 
     @property
     def x0(self) -> Floats:
-        """The start."""
+        """Initial state of the run."""
         return np.array(self.system.start)
 
     @property
     def t0(self) -> float:
-        """The time of the start."""
+        """Start time of the run."""
         return START if self.system.timed else 0.0
 
     @property
@@ -70,18 +74,18 @@ class Trial:
 
     @property
     def since(self) -> dict[str, Any]:
-        """Arguments of calls that begin at the start: its time, and which noise acts."""
+        """Keyword arguments for calls that begin at the start: the start time, and the seed of the noise."""
         timed = {"t0": self.t0} if self.system.timed else {}
         return timed | ({"seed": 2**40 + 3} if self.system.noise else {})
 
     def since_step(self, step: int) -> dict[str, Any]:
-        """The same for calls that begin after some steps."""
+        """Return the keyword arguments for calls that begin after ``step`` steps."""
         timed = {"t0": self.t0 + step * self.h} if self.system.timed else {}
         return timed | ({"seed": 2**40 + 3, "step0": step} if self.system.noise else {})
 
     @cached_property
     def fixed(self) -> Mapping[str, Solver]:
-        """The solvers with the gauge that they choose at the start held fixed."""
+        """Solvers that keep the gauge which they choose at the start of the run."""
         if not self.compilation.program.gauge:
             return self.solvers
         module = self.solvers["numpy"].backend.module  # type: ignore[attr-defined]
@@ -90,22 +94,22 @@ class Trial:
 
     @cached_property
     def plain(self) -> Compilation:
-        """The compilation without gradients, which JavaScript does not have."""
+        """The compilation without pullbacks, which JavaScript does not have."""
         program = self.compilation.program
         step, extras = replace(program.step, adjoint=None), replace(program.extras, adjoint=False)
         return replace(self.compilation, program=replace(program, step=step, extras=extras))
 
     def part(self, target: str, double: float, single: float = 2e-4) -> float:
-        """A tolerance, that of single precision where the C of the target has it."""
+        """Return the tolerance ``single`` for a target that computes in single precision, otherwise ``double``."""
         return single if self.single and target == "c" else double
 
     def attribute(self, name: str) -> Any:
-        """What the compilation says of itself."""
+        """Return an attribute of the compilation."""
         return getattr(self.compilation, name)
 
 
 def prepare(system: Ordinary) -> Trial:
-    """Compile a system, and choose the step by the speed of its field."""
+    """Compile a system, and choose a step size that suits the time scale of its vector field."""
     try:
         spec = phigen.spec.loads(system.text + "".join(f"{key}: true\n" for key in system.asked))
         compilation = compile_spec(spec)
@@ -123,7 +127,7 @@ def prepare(system: Ordinary) -> Trial:
 
 
 def functions(trial: Trial) -> None:
-    """H, the vector field with its forces, and Casimirs have the values of the formulas."""
+    """Check that H, the vector field with forces, and Casimirs agree with the formulas."""
     system, x = trial.system, trial.x0 + 0.1 * trial.random.uniform(-1, 1, (3, len(trial.x0)))
     when = {"t": trial.t0 + 0.2} if system.timed else {}
     energy, velocity = system.function([system.hamiltonian]), system.function(system.velocity)
@@ -143,7 +147,7 @@ def functions(trial: Trial) -> None:
 
 
 def observables(trial: Trial) -> None:
-    """Observables have the values of their formulas, at states and along a run, which ends at other times."""
+    """Check that observables agree with their formulas, at given states and times and along a run."""
     system, x = trial.system, trial.x0 + 0.1 * trial.random.uniform(-1, 1, (5, len(trial.x0)))
     forms = [OBSERVED[form] for form, *_ in system.observables.values()]
     operands = system.function([e for _, *pair in system.observables.values() for e in pair])
@@ -162,7 +166,9 @@ def observables(trial: Trial) -> None:
 
 
 def order(trial: Trial) -> None:
-    """Errors fall with the step as the order says, on the way to the flow of the independent field."""
+    """Check that errors decrease with the stated order, compared with a solution of the independent equations by
+    DOP853.
+    """
     system, solver, stated = trial.system, trial.solvers["c"], trial.compilation.order.order
     expect(
         stated >= min(system.order, 2 if system.noise else 16), f"order {system.order} was asked for, and is {stated}"
@@ -190,7 +196,9 @@ def _expect_flow(
 
 
 def noise(trial: Trial) -> None:
-    """With increments in proportion to the step, the limit is the flow of the field and the sources together."""
+    """Check noise with increments in proportion to the step size. Then the limit of small steps is the flow of the
+    vector field plus those of the noise sources, and errors decrease with order 2.
+    """
     system, draws = trial.system, trial.solvers["c"].interface.draws
     pushes = trial.random.normal(size=len(system.sources)) * 0.5
     span = 8 * trial.h
@@ -207,7 +215,7 @@ def noise(trial: Trial) -> None:
 
 
 def targets(trial: Trial) -> None:
-    """C, NumPy and JavaScript make the same run to round-off."""
+    """Check that runs in C, NumPy and JavaScript agree to round-off."""
     steps = 11
     runs = {t: s.integrate(trial.x0, trial.h, steps, 3, **trial.since) for t, s in trial.solvers.items()}
     c, numpy = runs["c"], runs["numpy"]
@@ -236,7 +244,7 @@ def targets(trial: Trial) -> None:
 
 
 def bits(trial: Trial) -> None:
-    """Strides, calls of a session, its copies and pickles do not change a bit."""
+    """Check that runs with a stride, sessions, their copies and pickles give the same bits as one run."""
     for target, steps, stride in (("c", 19, 7), ("numpy", 7, 3)):
         solver = trial.solvers[target]
         whole = solver.integrate(trial.x0, trial.h, steps, **trial.since)
@@ -253,7 +261,7 @@ def bits(trial: Trial) -> None:
 
 
 def until(trial: Trial) -> None:
-    """A run until a time ends with a part of a step."""
+    """Check that a run until a given time ends with a fraction of a step."""
     if trial.system.monitor is not None:
         return
     for target, solver in trial.solvers.items():
@@ -269,7 +277,7 @@ def until(trial: Trial) -> None:
 
 
 def members(trial: Trial) -> None:
-    """Members of ensembles, with parameters, steps and times of their own, are single runs."""
+    """Check that members of ensembles with different parameters, steps and start times agree with single runs."""
     many, steps = 11, 6
     x, sizes, options, since = _many(trial, many)
     for target, solver in trial.solvers.items():
@@ -287,7 +295,7 @@ def members(trial: Trial) -> None:
 
 
 def _expect_unmoved_by_failure(trial: Trial, target: str, rows: Floats, many: Any) -> None:
-    """Members follow their trajectories if another one fails, as one that starts far from all others may."""
+    """Check that members do not change if another member starts so far away that it may fail."""
     x, sizes, parameters, since = many
     far = x.copy()
     far[1] = 1e150
@@ -302,7 +310,7 @@ def _expect_unmoved_by_failure(trial: Trial, target: str, rows: Floats, many: An
 
 
 def _many(trial: Trial, many: int) -> tuple[Floats, Floats, dict[str, Floats], dict[str, Any]]:
-    """States, steps, parameters and further arguments of members."""
+    """Return the states, step sizes, parameters and further arguments of the members of an ensemble."""
     random = trial.random
     x = trial.x0 + 0.05 * random.uniform(-1, 1, (many, len(trial.x0)))
     sizes = trial.h * random.uniform(0.7, 1, many)
@@ -314,7 +322,9 @@ def _many(trial: Trial, many: int) -> tuple[Floats, Floats, dict[str, Floats], d
 
 
 def gradient(trial: Trial) -> None:
-    """`pullback` of a run is the derivative of that run, by differences, along its start and all parameters."""
+    """Check that the pullback of a run agrees with finite differences, along random directions of the start and of all
+    parameters.
+    """
     steps, stride, random = 7, 3, trial.random
     values, n = trial.system.values, len(trial.x0)
     bars, along = random.normal(size=(4, n)), random.normal(size=n)
@@ -343,7 +353,7 @@ def gradient(trial: Trial) -> None:
 
 
 def member_gradients(trial: Trial) -> None:
-    """Cotangents of members are those of single runs."""
+    """Check that pullbacks of members agree with those of single runs."""
     many, steps = 10, 3
     x, sizes, options, since = _many(trial, many)
     bars = trial.random.normal(size=x.shape)
@@ -362,7 +372,7 @@ def member_gradients(trial: Trial) -> None:
 
 
 def tangent(trial: Trial) -> None:
-    """`tangents` of a run are its derivative, by differences; those of targets agree."""
+    """Check that the product of the tangent maps of a run agrees with finite differences and between targets."""
     steps, n = 3, len(trial.x0)
     along, products = trial.random.normal(size=n), {}
     for target, solver in trial.fixed.items():
@@ -383,7 +393,7 @@ def tangent(trial: Trial) -> None:
 
 
 def jacobian(trial: Trial) -> None:
-    """The transpose of the tangent map is what a step pulls back by."""
+    """Check that the pullback of a step is the transpose of its tangent map."""
     bar = trial.random.normal(size=len(trial.x0))
     for target, solver in trial.solvers.items():
         _, step = solver.step_tangent(trial.x0, trial.h, **trial.since)
@@ -394,7 +404,7 @@ def jacobian(trial: Trial) -> None:
 
 
 def poisson(trial: Trial) -> None:
-    """A step is a Poisson map: DΦ π DΦᵀ is π at its end."""
+    """Check that a step is a Poisson map: DΦ π DΦᵀ equals π at the end of the step."""
     system = trial.system
     n = len(trial.x0)
     entries = system.function([system.structure.pi[i, j] for i in range(n) for j in range(n)])
@@ -408,7 +418,7 @@ def poisson(trial: Trial) -> None:
 
 
 def casimirs(trial: Trial) -> None:
-    """Casimirs are constant to round-off, by their own formulas."""
+    """Check that Casimirs are constant to round-off; they are evaluated by the formulas of this test."""
     compiled = numeric(list(trial.system.structure.casimirs), trial.system.arguments)
     for target, solver in trial.solvers.items():
         run = solver.integrate(trial.x0, 2 * trial.h, 30, 30, **trial.since)
@@ -419,7 +429,7 @@ def casimirs(trial: Trial) -> None:
 
 
 def reversal(trial: Trial) -> None:
-    """A step of −h undoes one of h."""
+    """Check that steps of −h lead back to the start of steps of h."""
     for target, solver in trial.solvers.items():
         session = solver.session(trial.x0, **trial.since)
         for _ in range(3):
@@ -432,7 +442,9 @@ def reversal(trial: Trial) -> None:
 
 
 def attitude(trial: Trial) -> None:
-    """The attitude turns the momentum back to what it was, and follows ∇H to the order of the method."""
+    """Check that the attitude maps the momentum to its constant value in the other frame, and that errors of the
+    attitude decrease with the order of the method.
+    """
     system, sign, span = trial.system, trial.system.structure.body, 8 * trial.h
     slope = system.function(list(system.slope))
 
@@ -457,12 +469,12 @@ def attitude(trial: Trial) -> None:
 
 
 def _hat(v: Floats) -> Floats:
-    """The matrix of the product v × ·."""
+    """Return the matrix of the map u ↦ v × u."""
     return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
 def _rotation(q: Floats) -> Floats:
-    """The rotation matrix of a quaternion, or the matrix itself."""
+    """Return the rotation matrix of a quaternion; a matrix is returned unchanged."""
     if q.shape == (3, 3):
         return q
     w, v = q[0], q[1:]
@@ -470,7 +482,7 @@ def _rotation(q: Floats) -> Floats:
 
 
 def hopeless(trial: Trial) -> None:
-    """A step that is far too large fails with a `StepError`, or ends somewhere finite, and leaves the state."""
+    """Check that a step that is far too large raises a `StepError` and leaves the state, or has a finite result."""
     for target, solver in trial.solvers.items():
         for h in (300 * trial.h, 1e30) if target == "c" else (1e30,):
             session = solver.session(trial.x0, **trial.since)
@@ -485,7 +497,9 @@ def hopeless(trial: Trial) -> None:
 
 
 def extras(trial: Trial) -> None:
-    """What the spec asks for and what `compile` is asked for is there."""
+    """Check that derivatives and options work, both those requested in the spec and those requested in the call of
+    `compile`.
+    """
     spec = phigen.spec.loads(trial.system.text)
     solver = phigen.compile(spec, "numpy", **trial.system.asked)
     if trial.compilation.program.extras.adjoint:
@@ -508,12 +522,14 @@ def _always(trial: Trial) -> bool:
 
 
 def _is_plain(trial: Trial) -> bool:
-    """Whether runs have no corrector, which rounds anew at each output."""
+    """Whether runs have no final corrector; a corrector adds rounding errors at each output."""
     return not trial.compilation.program.step.corrected
 
 
 def _has_both(trial: Trial) -> bool:
-    """Whether a step has a tangent map and its transpose; e of a monitor is held fixed by the one only."""
+    """Whether a step has both a tangent map and a pullback of the same map. With a monitor the maps differ, as only the
+    tangent map holds the energy level fixed.
+    """
     return _wants("adjoint")(trial) and _wants("tangent")(trial) and trial.system.monitor is None
 
 
@@ -535,7 +551,7 @@ def _runs_on_devices(trial: Trial) -> bool:
 
 
 def _asked_twice(trial: Trial) -> bool:
-    """Whether the spec and the call of `compile` ask for something each."""
+    """Whether both the spec and the call of `compile` request options."""
     return bool(trial.system.asked) and not {"adjoint", "tangent", "real", "without"}.isdisjoint(trial.system.options)
 
 
@@ -572,11 +588,11 @@ CHECKS = (
 
 
 def script(system: Ordinary, check: Check | None) -> str:
-    """A script that shows what a check found."""
+    """Return a script that shows the two results which a check compares."""
     since = ({"t0": START} if system.timed else {}) | ({"seed": 2**40 + 3} if system.noise else {})
     try:
         h = prepare(system).h
-    except Exception:  # it does not compile, which the script shows
+    except Exception:  # the script shows that the system does not compile
         h = 0.1
     return (
         f"import numpy as np, phigen, phigen.spec\n"

@@ -1,4 +1,4 @@
-"""What solvers are compared with: flows by SciPy's DOP853, derivatives by differences, orders by halved steps."""
+"""References for solvers: flows by SciPy's DOP853, derivatives by differences, orders by halved steps."""
 
 from __future__ import annotations
 
@@ -13,24 +13,26 @@ Field = Callable[[float, Floats], Floats]
 
 EPS = float(np.finfo(float).eps)
 
-#: Halvings of the step after which a method of some order must show that order, or an error at round-off.
+#: Number of halvings of the step, by order, after which errors must show the order or be at round-off.
 _HALVINGS = {1: 8, 2: 7, 3: 6, 4: 5}
-#: How far below the order the observed one may be on the finest pair of steps.
+#: The order observed with the two smallest steps may be lower than the stated one by this much.
 _SLACK = 0.5
 
 
 class DisagreementError(AssertionError):
-    """Two ways of computing one thing differ."""
+    """Two computations of the same quantity differ."""
 
 
 def expect(holds: bool, message: str) -> None:
-    """Raise `DisagreementError` unless something holds."""
+    """Raise `DisagreementError` with a message if ``holds`` is false."""
     if not holds:
         raise DisagreementError(message)
 
 
 def expect_close(value: Floats, reference: Floats, part: float, what: str, scale: float | None = None) -> None:
-    """Expect two arrays to agree to ``part`` of ``scale``, by default of the largest number in them."""
+    """Raise `DisagreementError` if two arrays differ by more than ``part`` times ``scale``, which is by default the
+    largest absolute value in the arrays.
+    """
     value, reference = np.asarray(value, dtype=float), np.asarray(reference, dtype=float)
     expect(value.shape == reference.shape, f"{what}: shapes {value.shape} and {reference.shape}")
     expect(bool(np.isfinite(value).all()), f"{what}: not finite: {value.ravel()[:8]}")
@@ -45,7 +47,7 @@ def expect_close(value: Floats, reference: Floats, part: float, what: str, scale
 
 
 def expect_same_bits(value: Floats, reference: Floats, what: str) -> None:
-    """Expect two arrays to be equal bit by bit."""
+    """Raise `DisagreementError` unless two arrays are equal bit by bit."""
     value, reference = np.asarray(value, dtype=float), np.asarray(reference, dtype=float)
     expect(value.shape == reference.shape, f"{what}: shapes {value.shape} and {reference.shape}")
     off = float(np.abs(value - reference).max()) if value.size else 0.0
@@ -53,13 +55,15 @@ def expect_same_bits(value: Floats, reference: Floats, what: str) -> None:
 
 
 def flow(field: Field, t0: float, x0: Floats, span: float) -> Floats:
-    """Return the state after a span of time, to about 1e-12."""
+    """Return the solution of an ODE after the time ``span``, to about 1e-12; NaN if the integration fails."""
     solution = solve_ivp(field, (t0, t0 + span), x0, method="DOP853", rtol=2.5e-14, atol=1e-15)
     return np.asarray(solution.y[:, -1], dtype=float) if solution.success else np.full_like(x0, np.nan)
 
 
 def speed_of(field: Field, t0: float, x0: Floats) -> float:
-    """Return the larger of the norm of the derivative of a field and its relative size at a state."""
+    """Return the rate at which a vector field changes a state: the largest of the norm of its Jacobian, its size
+    relative to that of the state, and 0.05.
+    """
     columns = [(field(t0, x0 + 1e-6 * e) - field(t0, x0 - 1e-6 * e)) / 2e-6 for e in np.eye(len(x0))]
     relative = float(np.linalg.norm(field(t0, x0)) / max(np.linalg.norm(x0), 0.1))
     return max(float(np.linalg.norm(np.array(columns), 2)), relative, 0.05)
@@ -68,9 +72,10 @@ def speed_of(field: Field, t0: float, x0: Floats) -> float:
 def expect_order(
     ends: Callable[[int], Floats], exact: Floats, order: int, floor: float, what: str, least: int = 4
 ) -> None:
-    """Expect errors of ``ends(steps)``, states after a fixed time, to fall as a method of some order lets them.
+    """Raise `DisagreementError` unless the errors of ``ends(steps)``, the state at a fixed time, decrease with the
+    stated order.
 
-    The step is halved until the last two errors show the order, or the error is at ``floor``.
+    The step is halved until the last two errors show the order, or until the error is at most ``floor``.
     """
     errors: list[float] = []
     for halving in range(_HALVINGS.get(order, 4) + 1):

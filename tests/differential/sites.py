@@ -1,4 +1,4 @@
-"""Random lattices: the text of their spec, and their equations of motion on a few sites, without phigen."""
+"""Random lattices: the text of their spec, and their equations of motion, derived without phigen."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ _INDEXED = re.compile(r"(\w+)(\[[^\]]*\])?$")
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter: where it has values of its own (``all``, ``sites``, ``bonds``), and its value as a spec has it."""
+    """A parameter: whether it has one value (``all``) or a value at each site or bond (``sites``, ``bonds``), and its
+    value as written in a spec.
+    """
 
     at: str
     value: Any
@@ -33,12 +35,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Lattice:
-    """A drawn lattice.
+    """A random lattice.
 
-    ``boundary`` is that of each of the ``axes``; without axes it is a graph, or ``pairs``. ``pi`` has the brackets of
-    a site, ``across`` the brackets (f, g, place of g, value) with others, or along bonds. H is the sum of ``sites``
-    over all sites, and of ``ends`` over bonds or pairs. ``vector``, ``covector``, ``damping`` and ``noise`` act as
-    docs/lattices.md has it. Where it is ``monitored``, steps are equal in τ, and ``ends`` are the negative part of H.
+    A lattice with ``axes`` is a grid, with a ``boundary`` for each axis; without axes it is a graph with ``bonds``, or
+    all ``pairs`` of sites interact. ``pi`` has the brackets within a site; ``across`` lists the brackets between sites
+    as (f, g, index of g, value). H is the sum of ``sites`` over all sites, and of ``ends`` over bonds or pairs.
+    ``vector``, ``covector``, ``damping`` and ``noise`` have the meaning of docs/lattices.md. If ``monitored``, steps
+    are equal in the fictitious time τ, and ``ends`` are the negative part of H.
     """
 
     seed: int
@@ -70,23 +73,23 @@ class Lattice:
 
     @property
     def graph(self) -> bool:
-        """Whether bonds relate the sites."""
+        """Whether the lattice is a graph, whose bonds connect sites."""
         return not (self.axes or self.pairs)
 
     @property
     def forced(self) -> bool:
-        """Whether something acts beside H."""
+        """Whether there are forces or damping."""
         return bool(self.covector or self.vector or self.damping is not None)
 
     # --- the spec
 
     @property
     def text(self) -> str:
-        """The spec; every value is JSON, which is YAML too."""
+        """Text of the spec; every value is written as JSON, which is valid YAML."""
         return "".join(f"{key}: {json.dumps(value)}\n" for key, value in self.entries())
 
     def entries(self) -> Iterator[tuple[str, Any]]:
-        """Yield the keys of the spec."""
+        """Yield the top-level keys of the spec with their values."""
         yield from {"phigen": 1, "name": f"l{self.seed}", "lattice": self._relation()}.items()
         yield "coordinates", list(self.fields)
         if self.parameters:
@@ -127,21 +130,23 @@ class Lattice:
             return {"axes": list(self.axes), "boundary": list(self.boundary)}
         return {"pairs": "all"} if self.pairs else {"graph": "bonds"}
 
-    # --- where things are
+    # --- indices of sites
 
     @property
     def count(self) -> int:
-        """The number of sites."""
+        """Number of sites."""
         return int(np.prod(self.sizes))
 
     @property
     def edges(self) -> Places:
-        """The bonds of a graph, or all pairs, (edges, 2)."""
+        """Bonds of a graph, or all pairs of sites, as an array (edges, 2)."""
         listed = list(itertools.combinations(range(self.count), 2)) if self.pairs else list(self.bonds)
         return np.array(listed, dtype=np.int64).reshape(-1, 2)
 
     def places(self, suffix: str, edges: bool) -> Places:
-        """The sites that an index such as ``[i+1]`` or ``[a]`` names, from every site or edge; −1 beyond open ends."""
+        """Return the site that an index such as ``[i+1]`` or ``[a]`` denotes, for every site or edge; −1 beyond an open
+        end.
+        """
         if edges:
             return self.edges[:, "ab".index(suffix[1])]
         grid = np.indices(self.sizes)
@@ -173,7 +178,7 @@ class Lattice:
         damping = None if self.damping is None else self._term(self.damping)
 
         def turned(t: float, x: Floats, slope: Floats) -> Floats:
-            """π times a covector."""
+            """Return the product of π and a covector."""
             increments = np.zeros_like(x)
             for i, j, term in entries:
                 increments[i] += term.at(t, x, values) * slope[j]
@@ -210,7 +215,7 @@ class Lattice:
         return _Term(self, [sympy.sympify(expression)], edges, target)
 
     def pace(self, values: Mapping[str, Any], x: Floats) -> float:
-        """dt/dτ at a state."""
+        """Return the derivative of t along the fictitious time τ at a state; without a monitor it is 1."""
         if not self.monitored:
             return 1.0
         well = sum(np.sum(self._term(e, edges=True).at(0.0, x, values)) for e in self.ends)
@@ -219,24 +224,24 @@ class Lattice:
 
     @property
     def observed(self) -> Expr:
-        """A field of each site that is observed."""
+        """Observable of each site, as an expression."""
         first, last = sympy.Symbol(self.fields[0], real=True), sympy.Symbol(self.fields[-1], real=True)
         return first * last + 2 * last
 
     def seen(self, values: Mapping[str, Any], x: Floats) -> dict[str, Floats]:
-        """The observables of a state (fields, sites)."""
+        """Return the observables of a state (fields, sites), by name."""
         named = {f"o{k}": np.array(getattr(np, kind)(x[0])) for k, kind in enumerate(REDUCTIONS)}
         if not self.axes and self.ends:
             named["apart"] = np.array(np.sum(self._term(self.ends[0], edges=True).at(0.0, x, values)))
         return named | {"own": (x[0] * x[-1] + 2 * x[-1]).reshape(self.sizes)}
 
     def densities(self, values: Mapping[str, Any], t: float, x: Floats) -> float:
-        """The value of H."""
+        """Return the value of H at a state."""
         terms = [self._term(e) for e in self.sites] + [self._term(e, edges=True) for e in self.ends]
         return float(sum(np.sum(term.at(t, x, values)) for term in terms))
 
     def matrix(self, values: Mapping[str, Any], x: Floats) -> Floats:
-        """π of the whole lattice, (fields · sites) squared."""
+        """Return π of the whole lattice, a square matrix of (fields · sites) rows."""
         n = self.count
         entries = np.zeros((len(x) * n, len(x) * n))
         for i, row in enumerate(self.pi.tolist()):
@@ -256,7 +261,7 @@ class Lattice:
     # --- shrinking
 
     def simpler(self) -> Iterator[Lattice]:
-        """Yield lattices with a part less."""
+        """Yield simpler lattices, each with one term, option, bond or layer of sites removed."""
         for name in ("sites", "ends", "across"):
             parts = getattr(self, name)
             for k in range(len(parts)):
@@ -294,12 +299,14 @@ class Lattice:
 
 
 def _shortened(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
-    """Parameters whose lists, which fit one size only, are numbers."""
+    """Return the parameters with lists of values replaced by a number, as lists fit only one size of the lattice."""
     return {n: replace(p, value=1) if isinstance(p.value, list) else p for n, p in parameters.items()}
 
 
 class _Term:
-    """Expressions at every site or edge, 0 where they reach beyond an open end."""
+    """Expressions that are evaluated at every site or edge. They are 0 where they refer to a site beyond an
+    open end.
+    """
 
     def __init__(self, lattice: Lattice, expressions: Sequence[Expr], edges: bool, target: int = -1) -> None:
         self.lattice, self.edges, self.target = lattice, edges, target
@@ -319,7 +326,7 @@ class _Term:
                 self.inside &= places >= 0
 
     def values(self, t: float, x: Floats, values: Mapping[str, Any]) -> list[Floats]:
-        """The value of each expression."""
+        """Return the values of each expression at all sites or edges."""
         numbers = []
         for name in self.names:
             base, places = self.read[name]
@@ -343,12 +350,12 @@ class _Term:
         ]
 
     def at(self, t: float, x: Floats, values: Mapping[str, Any]) -> Floats:
-        """The value of the only expression."""
+        """Return the values of the first expression at all sites or edges."""
         return self.values(t, x, values)[0]
 
 
 class _Slope:
-    """The gradient of a term of H, which is added to the sites that the term reads."""
+    """Gradient of a term of H, as contributions to all sites that the term contains."""
 
     def __init__(self, lattice: Lattice, expression: Expr, edges: bool) -> None:
         names = sorted(str(s) for s in sympy.sympify(expression).free_symbols)
@@ -356,7 +363,7 @@ class _Slope:
         self.term = _Term(lattice, [*gradient(expression, symbols(self.reads)), sympy.sympify(expression)], edges)
 
     def add(self, t: float, x: Floats, values: Mapping[str, Any], slope: Floats) -> None:
-        """Add ∇ of the sum of the term."""
+        """Add the gradient of the sum of the term over all sites or edges to ``slope``."""
         *arguments, _ = self.term.values(t, x, values)
         for name, value in zip(self.reads, arguments, strict=True):
             base, places = self.term.read[name]

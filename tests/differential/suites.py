@@ -1,4 +1,4 @@
-"""The kinds of random systems by name."""
+"""Test suites for random systems, by the kind of system."""
 
 from __future__ import annotations
 

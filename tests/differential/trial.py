@@ -1,4 +1,6 @@
-"""Checks of drawn systems: which apply, what they find, and how a system that fails is made smaller and shown."""
+"""Checks of random systems: a suite draws a system, runs the checks that apply, and reduces a failing system to a small
+one.
+"""
 
 from __future__ import annotations
 
@@ -13,36 +15,38 @@ from differential.reference import DisagreementError
 
 from phigen.errors import PhigenWarning, SpecError
 
-#: How often a system is drawn for a seed, until one is offered.
+#: Number of draws for a seed, in case phigen refuses the first ones.
 _ATTEMPTS = 6
 
 
 class System(Protocol):
-    """A drawn system, ordinary or a lattice."""
+    """A random system: a lattice, or an ordinary one."""
 
     seed: int
     kind: str
 
     @property
     def text(self) -> str:
-        """The spec."""
+        """Text of the spec."""
         ...
 
     def simpler(self) -> Iterator[Self]:
-        """Yield systems with a part less."""
+        """Yield simpler systems, each with one part removed."""
         ...
 
 
 class RefusedError(Exception):
-    """phigen does not offer what was drawn, and says so with a `SpecError`."""
+    """phigen refuses a random system with a `SpecError`, for instance because it does not offer a combination of
+    options.
+    """
 
 
 @dataclass(frozen=True)
 class Check:
-    """A statement about the solvers of a system, tested by ``run``, which raises `DisagreementError`.
+    """A property of the solvers of a system. ``run`` tests it and raises `DisagreementError` if it fails.
 
-    ``applies`` says of which systems it is true. ``lines`` is a script that shows the two sides, after the solver
-    ``s``, the state ``x``, the step ``h`` and numpy as ``np``.
+    ``applies`` decides for which systems the property holds. ``lines`` is the end of a script that prints the two
+    results, with the solver ``s``, the state ``x``, the step ``h`` and numpy as ``np``.
     """
 
     name: str
@@ -53,7 +57,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Failure:
-    """A check that failed, on a system that was made as small as it still fails on."""
+    """A failed check, with the smallest system found on which it still fails."""
 
     check: str
     message: str
@@ -65,7 +69,7 @@ class Failure:
         return f"{self.system.kind} {self.system.seed}: {self.check}: {self.message}\n{self.system.text}\n{script}"
 
 
-#: The result of checking one system: failures, the names of the checks that were made, and why it was refused.
+#: Result for one system: the failures, the names of the checks that ran, and the reason if phigen refused the system.
 @dataclass(frozen=True)
 class Outcome:
     failures: tuple[Failure, ...]
@@ -75,7 +79,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Suite:
-    """How systems of one kind are drawn, prepared and checked."""
+    """Suite for one kind of system: functions that draw a system, prepare it, and check it."""
 
     draw: Callable[[int, int], Any]
     prepare: Callable[[Any], Any]
@@ -83,7 +87,9 @@ class Suite:
     script: Callable[[Any, Check | None], str]
 
     def outcome(self, seed: int, *, shrink: bool = True) -> Outcome:
-        """Check the system of a seed: the first of its draws that phigen does not refuse."""
+        """Check the system of a seed: the first draw that phigen does not refuse. A failing system is replaced by a
+        smaller one if ``shrink``.
+        """
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PhigenWarning)
             for attempt in range(_ATTEMPTS):
@@ -104,12 +110,14 @@ class Suite:
         return Outcome(failures, tuple(checks_made), refused)
 
     def _tried(self, system: Any, only: str | None) -> tuple[dict[str, str], list[str], str]:
-        """The messages of the checks that fail, the names of those that were made, and why phigen refuses it."""
+        """Run the checks, or ``only`` one of them, on a system. Return the messages of failed checks by name, the names
+        of the checks that ran, and the reason if phigen refused the system.
+        """
         try:
             trial = self.prepare(system)
         except RefusedError as error:
             return {}, [], str(error)
-        except Exception as error:  # whatever it is, it is a defect
+        except Exception as error:  # any other exception is a defect
             return {"it compiles": _said(error)}, [], ""
         failures, checks_made = dict[str, str](), list[str]()
         for check in self.checks:
@@ -119,12 +127,12 @@ class Suite:
                     check.run(trial)
                 except DisagreementError as error:
                     failures[check.name] = str(error)
-                except Exception as error:  # as well
+                except Exception as error:  # any other exception is a failure too
                     failures[check.name] = _said(error)
         return failures, checks_made, ""
 
     def _shrunk(self, system: Any, name: str, most: int = 60) -> Any:
-        """The system with all parts left out without which the check still fails."""
+        """Return a system reduced as far as possible such that the check ``name`` still fails."""
         tries, progress = 0, True
         while progress and tries < most:
             progress = False
@@ -139,17 +147,17 @@ class Suite:
 
 
 def _said(error: Exception) -> str:
-    """The last lines of an error that nobody expected."""
+    """Return a one-line description of an unexpected exception, with the place where it was raised."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     lines = str(error).strip().splitlines()
     return f"{type(error).__name__}: {' / '.join(lines[:6])} ({place.filename}:{place.lineno})"
 
 
 def refused(error: SpecError) -> RefusedError:
-    """What a system is refused with, in one line."""
+    """Return a `RefusedError` with the messages of a `SpecError` on one line."""
     return RefusedError("; ".join(d.message for d in error.diagnostics))
 
 
 def numbers(seed: int, salt: str) -> random.Random:
-    """Random numbers of a check."""
+    """Return a random generator for a seed and a word that distinguishes checks."""
     return random.Random(f"{salt} {seed}")
