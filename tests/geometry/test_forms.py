@@ -53,7 +53,7 @@ def test_nambu_bracket_on_four_coordinates_is_the_jacobian_determinant():
     s = system("a b c d", "{nambu: [c, d]}")
     assert brackets(s) == {("a", "b"): "1", ("b", "a"): "-1"}  # det ∂(a, b, c, d)/∂(a, b, c, d) = 1
     s = system("a b c d", "{nambu: [b, c]}")
-    # Det ∂(a, d, b, c)/∂(a, b, c, d) = 1, since the permutation is even.
+    # det ∂(a, d, b, c)/∂(a, b, c, d) = 1, since the permutation is even.
     assert brackets(s) == {("a", "d"): "1", ("d", "a"): "-1"}
     s = system("a b c d", "{nambu: [a*b, c*d]}")
     assert all(c.holds for c in check(s))

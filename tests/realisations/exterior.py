@@ -1,4 +1,6 @@
-"""Forms on T*U with expressions as coefficients: an independent check of `phigen.realisations.cotangent`."""
+"""Differential forms on T*U whose coefficients are expressions: an independent check of
+`phigen.realisations.cotangent`.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +12,18 @@ from phigen.symbolic.expression import ZERO, Expression, derivatives, number, su
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: (a, b) with a < b → the coefficient of dz_a ∧ dz_b.
+#: 2-form in the variables z: each pair (a, b) with a < b is mapped to the coefficient of dz_a ∧ dz_b.
 Form = dict[tuple[int, int], Expression]
 TIME = Symbol("s")
 
 
 def canonical(n: int) -> Form:
-    """ω = Σ dx_i ∧ dp_i in the variables x, then p."""
+    """Return ω = Σ dx_i ∧ dp_i in the variables z = (x, p)."""
     return {(i, n + i): number(1) for i in range(n)}
 
 
 def wedge(left: Sequence[Expression], right: Sequence[Expression]) -> Form:
-    """λ ∧ μ of 1-forms given by components."""
+    """Return λ ∧ μ of two 1-forms that are given by their components."""
     n = range(len(left))
     return {(a, b): left[a] * right[b] - left[b] * right[a] for a in n for b in n if a < b}
 
@@ -33,7 +35,7 @@ def combine(*parts: tuple[Fraction | int, Form]) -> Form:
 
 
 def pull_back(form: Form, images: Sequence[Expression], names: Sequence[str]) -> Form:
-    """φ*(Σ w_ab dz_a ∧ dz_b) for z∘φ = images."""
+    """Return the pull-back φ*(Σ w_ab dz_a ∧ dz_b) of a 2-form by the map φ with z∘φ = images."""
     columns = [derivatives(images, name) for name in names]
     d = [[column[a] for column in columns] for a in range(len(images))]
     moved = substitute(list(form.values()), dict(zip(names, images, strict=True)))
@@ -49,7 +51,9 @@ def differential(f: Expression, names: Sequence[str]) -> list[Expression]:
 
 
 def integrated(e: Expression, start: Fraction | int, end: Fraction | int) -> Expression:
-    """∫ e ds over [start, end] of a polynomial in `TIME`."""
+    """Return the integral over s from ``start`` to ``end`` of an expression that is a polynomial in s, the symbol
+    `TIME`.
+    """
     terms = coordinate_terms([TIME], [e])
     assert terms is not None
     limits = [Fraction(start), Fraction(end)]
@@ -69,14 +73,16 @@ def same(left: Sequence[Expression], right: Sequence[Expression]) -> bool:
 
 
 def is_flow(images: Sequence[Expression], field: Sequence[Expression], names: Sequence[str]) -> bool:
-    """Whether images (in z and `TIME`) start at z and obey dΦ/ds = X∘Φ."""
+    """Whether ``images``, expressions in z and s = `TIME`, are the flow Φ of the vector field X: Φ is z at s = 0, and
+    dΦ/ds = X∘Φ.
+    """
     start = substitute(images, {TIME: ZERO})
     along = substitute(field, dict(zip(names, images, strict=True)))
     return same(start, [symbol(name) for name in names]) and same(derivatives(images, TIME), along)
 
 
 def at_time(images: Sequence[Expression], time: Fraction | int) -> list[Expression]:
-    """The flow for a fixed time."""
+    """Return the flow for a fixed time."""
     return substitute(images, {TIME: number(Fraction(time))})
 
 
@@ -86,7 +92,7 @@ def after(outer: Sequence[Expression], inner: Sequence[Expression], names: Seque
 
 
 def parts_in_p(e: Expression, covector: Sequence[str]) -> Mapping[int, Expression]:
-    """The homogeneous parts in p of a polynomial in p."""
+    """Return the homogeneous parts in p of a polynomial in p, by their degree."""
     return dict(_by_degree(e, covector))
 
 

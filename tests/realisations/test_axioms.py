@@ -26,7 +26,7 @@ def verdicts(statements: list[Statement]) -> list[str]:
 
 
 def custom(coordinates, poisson, alpha, beta, extra=""):
-    """Return the statements on α and β of a spec."""
+    """Return the statements on α and β for a spec with this custom bi-realisation."""
     text = (
         f"phigen: 1\nname: t\ncoordinates: [{coordinates.replace(' ', ', ')}]\npoisson: {poisson}\nhamiltonian: 1\n"
         f"order: 2\nbirealisation: {{kind: custom, alpha: {alpha}, beta: {beta}}}\n{extra}"
@@ -90,7 +90,7 @@ LOG3 = "{log_canonical: [[0, 1, 1], [-1, 0, 1], [-1, -1, 0]]}"
 
 
 def test_the_sign_printed_in_the_paper_is_refuted():
-    # α_j = x_j exp(−½ Σ a_ij x_i p_i): u_x = −y p_y, u_y = x p_x
+    # The paper prints α_j = x_j exp(−½ u_j) with u_j = Σ_i a_ij x_i p_i. Here u_x is −y p_y and u_y is x p_x.
     wrong = custom("x y", LOG, "[x*exp(y*p_y/2), y*exp(-x*p_x/2)]", "[x*exp(-y*p_y/2), y*exp(x*p_x/2)]")
     assert verdicts(wrong) == [PROVED, REFUTED, REFUTED, PROVED, PROVED]
     right = custom("x y", LOG, "[x*exp(-y*p_y/2), y*exp(x*p_x/2)]", "[x*exp(y*p_y/2), y*exp(-x*p_x/2)]")
@@ -114,7 +114,9 @@ def test_midpoint_is_no_realisation_of_a_lie_poisson_tensor():
 
 
 def cayley_with(quotient: int):
-    """α = x + (2/quotient) p×x + (4/quotient²)(p·x)p on so(3)*; the paper prints quotient 4."""
+    """Return the statements on α = x + p×x/quotient + (p·x)p/quotient² and β(x, p) = α(x, −p) for so(3)*. The paper
+    prints the quotient 4; the right one is 2.
+    """
     a, b = f"2/{quotient}", f"4/{quotient}**2"
     dot = "(p_x*x + p_y*y + p_z*z)"
     cross = [("x", "p_y*z - p_z*y"), ("y", "p_z*x - p_x*z"), ("z", "p_x*y - p_y*x")]
@@ -126,7 +128,7 @@ def cayley_with(quotient: int):
 
 def test_cayley_of_so3_in_closed_form_is_proved_and_with_the_papers_quarter_refuted():
     assert verdicts(cayley_with(2)) == [PROVED] * 5
-    # The maps still commute and are the unit at p = 0; they realise ½π.
+    # Brackets of α with β still vanish, and the maps are the identity at p = 0. But they realise ½π instead of π.
     assert verdicts(cayley_with(4)) == [PROVED, REFUTED, REFUTED, PROVED, PROVED]
 
 
@@ -168,7 +170,8 @@ def test_realisation_of_a_non_poisson_tensor_is_refuted():
 
 
 def test_non_polynomial_tensor_is_pulled_back_along_the_maps():
-    # The canonical pair (x, √y), one-sided: {x, y} = 2√y. At α the root is |√y + p_x|, beyond the ring's relations.
+    # The pair (x, √y) is canonical, so {x, y} = 2√y, and the maps are the one-sided chart of this pair. At α the square
+    # root is |√y + p_x|, which relations of the ring cannot simplify.
     tensor = "{brackets: {x: {y: '2*sqrt(y)'}}}"
     statements = custom("x y", tensor, "[x, '(sqrt(y) + p_x)**2']", "['x + 2*sqrt(y)*p_y', y]")
     assert verdicts(statements) == [PROVED, CHECKED, PROVED, PROVED, PROVED]
@@ -207,7 +210,7 @@ def test_so3_cayley_is_the_formula_of_the_mathematics_page():
 
 
 def test_casimirs_of_the_realisations_agree():
-    # C∘α = C∘β for every Casimir: the step then keeps it exactly.
+    # A step conserves the Casimir C exactly if C∘α = C∘β.
     for s in (family("so", 4), family("se", 3, -1), family("sp", 4), system("x y z", LOG3)):
         realisation = realise(s)
         for casimir in s.casimirs.values():
@@ -215,7 +218,8 @@ def test_casimirs_of_the_realisations_agree():
                 substitute([casimir], dict(zip(s.coordinates, maps, strict=True)))[0]
                 for maps in (realisation.alpha, realisation.beta)
             ]
-            # exp(a)·exp(b)·exp(−a−b) = 1 is beyond the ring: the log-canonical one is checked at points.
+            # The ring has no relation exp(a)·exp(b)·exp(−a−b) = 1, so for the log-canonical system the equality is only
+            # checked at points.
             expected = PROVED if s.lie_algebra else CHECKED
             assert decide_zero("C∘α = C∘β", [("", images[0] - images[1])]).verdict == expected
 
@@ -245,7 +249,7 @@ def test_what_the_symmetry_gives_is_not_multiplied_out_again():
     statements = check(s, realisation)
     assert (statements[BETA].verdict, statements[BETA].detail) == (PROVED, "as for α, by β(x, p) = α(x, −p)")
     assert verdicts(check(s, broken(realisation))[ALPHA:FORMS]) == [REFUTED] * 3
-    wrong = replace(realisation, beta=tuple(realisation.alpha))  # although its record claims otherwise
+    wrong = replace(realisation, beta=tuple(realisation.alpha))  # although the record says that β(x, p) = α(x, −p)
     assert verdicts(check(s, wrong)[ALPHA:FORMS]) == [PROVED, REFUTED, REFUTED]
 
 

@@ -1,4 +1,4 @@
-"""Choosing a kind: by name, by shape, and what is said when none applies."""
+"""Choice of the kind of a bi-realisation: by name, by the shape of π, and the error if no kind applies."""
 
 import os
 import subprocess
@@ -38,7 +38,7 @@ def test_auto_picks_by_shape_and_explains(coordinates, poisson, kind):
 def test_refusals_carry_the_place_in_the_spec():
     with pytest.raises(SpecError) as caught:
         realise(system("x y z", "{lie_algebra: {name: so(3)}}"), BirealisationChoice("constant"))
-    assert caught.value.diagnostics[0].location.line == 4  # of poisson, for lack of a birealisation
+    assert caught.value.diagnostics[0].location.line == 4  # the line of poisson, because the spec has no birealisation
 
 
 def test_every_kind_of_the_spec_format_has_a_builder():

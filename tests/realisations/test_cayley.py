@@ -1,4 +1,6 @@
-"""The Cayley transform: which algebras and representations are closed under P E P."""
+"""The Cayley transform: the algebras and representations in which P E P belongs to the algebra for all elements P and
+E.
+"""
 
 import pytest
 from geometry.building import family, system, typed
@@ -29,7 +31,7 @@ def refusal(s) -> str:
 
 def test_sl3_is_refused_naming_the_element_that_leaves():
     message = refusal(family("sl", 3))
-    # H_1² H_2 has a trace.
+    # E1 and E2 are diagonal, and their product E1·E1·E2 has a trace, so it is not in sl(3).
     assert "in the 3×3 matrices of sl(3), E1·E1·E2 + E2·E1·E1 leaves the algebra" in message
     assert "in the adjoint 8×8 matrices, E1·E1·E1 leaves the algebra" in message
     assert "exponential" in message
@@ -65,7 +67,7 @@ def test_toda_lattices_of_any_length(sites):
 def test_lagrange_top_is_recognised_as_se3():
     s = system_from_spec(load(bundled_specs() / "lagrange_top.yaml"))
     assert "minus the 4×4 matrices of se(3)" in realise(s, CAYLEY).explanation
-    # the chart is affine in the linear momentum part: α(G) − G has no term quadratic in p
+    # The last three coordinates, the force direction, only get terms that are linear in p.
     assert [str(d).count("p:") for d in realise(s, CAYLEY).displacement[3:]] == [2, 2, 2]
 
 
@@ -76,7 +78,7 @@ def test_spin_chain_is_taken_apart_into_its_spins():
 
 
 def test_parts_may_be_interleaved_and_of_different_kinds():
-    # so(3) on (a, c, e), Heisenberg on (b, d, f), a Casimir g
+    # The algebra is so(3) on (a, c, e), the Heisenberg algebra on (b, d, f), and a Casimir g.
     s = system("a b c d e f g", "{brackets: {a: {c: e, e: -c}, c: {e: a}, b: {d: f}}}")
     assert indecomposable_parts(s.lie_algebra) == [[0, 2, 4], [1, 3, 5], [6]]
     assert proved(s)
@@ -99,13 +101,14 @@ def test_algebras_with_parameters_in_their_constants(brackets):
 
 
 def test_solvable_algebra_with_unequal_weights_is_refused():
-    # (xA)³ is a multiple of A only if the weights have one modulus; the exponential chart has no such condition.
+    # In the adjoint matrices x has the eigenvalues 0, 1 and 2. Its cube is in the algebra only if all eigenvalues
+    # except 0 have the same modulus. The exponential has no such condition.
     message = refusal(system("x y z", "{brackets: {x: {y: y, z: 2*z}}}"))
     assert "in the adjoint 3×3 matrices, x·x·x leaves the algebra" in message
 
 
 def test_two_step_nilpotent_algebras_need_no_family():
-    # free nilpotent of step two on three generators: its centre lies in [g, g]
+    # The free nilpotent algebra of step two with three generators: its centre lies in [g, g].
     s = system("a b c u v w", "{brackets: {a: {b: u, c: v}, b: {c: w}}}")
     assert "two-step nilpotent" in realise(s, CAYLEY).explanation
     assert proved(s)
@@ -117,7 +120,7 @@ def test_three_step_nilpotent_without_representation_is_refused_saying_so():
 
 
 def test_given_matrices_come_first_and_are_used_as_they_are():
-    # sl(2) in its three-dimensional representation is not closed; the fallback finds the adjoint or 2×2 matrices.
+    # These 3×3 matrices of sl(2) are closed, so the search for other matrices is not needed.
     three = "[[[2,0,0],[0,0,0],[0,0,-2]], [[0,1,0],[0,0,2],[0,0,0]], [[0,0,0],[2,0,0],[0,1,0]]]"
     s = system("h e f", f"{{lie_algebra: {{matrices: {three}}}}}")
     assert "given algebra" in realise(s, CAYLEY).explanation or "sl(2)" in realise(s, CAYLEY).explanation
@@ -155,7 +158,7 @@ def test_all_candidates_are_faithful_representations(name, size):
 
 def test_trilinear_form_of_so3_is_minus_the_scalar_product():
     terms, _ = closed_product(family("so", 3).lie_algebra)
-    # P E_i P = −p_i P
+    # For so(3), P E_i P = −p_i P with P = Σ p_j E_j.
     assert {key: str(c) for key, c in terms.items() if key[0] == 0} == {
         (0, 0, 0, 0): "-1",
         (0, 0, 1, 1): "-1",

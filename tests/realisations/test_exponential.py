@@ -45,8 +45,8 @@ def test_axioms_are_proved_for_the_named_algebras(name, size, sign):
         ("x y z", "{x: {y: sqrt(a)*z, z: -y}}", "φ(s)"),  # se(2), a function of a parameter
         ("j u v z", "{j: {u: v, v: -u}, u: {v: z}}", "φ(s)"),  # the oscillator algebra
         ("x y z w", "{x: {y: z, z: w}}", "finite sum of 2 terms"),  # the Engel algebra
-        ("a1 b1 c1 d1 e1", "{a1: {b1: c1, c1: d1, d1: e1}}", "finite sum of 2 terms"),  # filiform
-        ("x y z", "{x: {y: z + b}}", "no even part"),  # affine from here on
+        ("a1 b1 c1 d1 e1", "{a1: {b1: c1, c1: d1, d1: e1}}", "finite sum of 2 terms"),  # a filiform algebra
+        ("x y z", "{x: {y: z + b}}", "no even part"),  # this bracket and the next ones are affine, not linear
         ("x y z", "{x: {y: z + b, z: -y}, y: {z: x}}", "φ(s)"),
         ("q p x y z", "{q: {p: 1}, x: {y: -z, z: y}, y: {z: -x}}", "φ(s)"),
         ("x y z u v w", "{x: {y: z + 1, z: -y}, y: {z: x}, u: {v: w + 1, w: -v}, v: {w: u}}", "φ(s)"),
@@ -95,7 +95,7 @@ def test_so4_is_split_into_its_ideals_over_the_rationals():
 
 @pytest.mark.parametrize(("name", "size"), [("so", 3), ("sl", 2), ("se", 3), ("so", 4), ("aff", 1)])
 def test_alpha_is_the_series_of_b_at_a_point(name, size):
-    # b(−M)x by its series, in 40 digits.
+    # The expected value is the series Σ B_k M^k x/k! with Bernoulli numbers B_k and Mx = π(x)p, in 40 digits.
     s = family(name, size)
     n = s.dimension
     point = {c: Fraction(3 * i + 1, 7) for i, c in enumerate(s.coordinates)}
@@ -113,7 +113,7 @@ def test_alpha_is_the_series_of_b_at_a_point(name, size):
         expected = power.copy()
         for k in range(1, 80):
             power = m * power
-            # b(−z) = Σ B_k z^k/k! with B_1 = −½
+            # Add the term of degree k; mpmath has B_1 = −½, as the series needs.
             expected += (mpmath.bernoulli(k) / mpmath.factorial(k)) * power
         for a, b in zip(values, expected, strict=True):
             assert abs(mpmath.mpf(str(a)) - b) < 1e-24
@@ -139,7 +139,8 @@ def test_cayley_and_exponential_are_different_realisations_of_one_tensor():
         assert series.tower.is_zero(series.terms[1])
         assert series.tower.is_zero(series.terms[3])
         expansions.append(series.tower.expression(series.terms[2]))
-    # Both vanish with H constant on orbits, but neither S_3 nor its vector field is the other's.
+    # Both S_3 would vanish for an H that is constant on coadjoint orbits. For this H they differ, and so do their
+    # Hamiltonian vector fields.
     fields = [hamiltonian_vector_field(s.poisson, gradient(e, s.coordinates)) for e in expansions]
     residuals = [("", a - b) for a, b in zip(*fields, strict=True)]
     assert decide_zero("the same S_3", residuals).verdict == REFUTED

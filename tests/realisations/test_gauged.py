@@ -1,4 +1,6 @@
-"""π_ij = g_i(x_i) A_ij g_j(x_j): recognised however it is written, moved along the flows of its factors."""
+"""Tensors π_ij = g_i(x_i) A_ij g_j(x_j): they are recognised in any notation, and their bi-realisation uses the flows
+of ẋ_i = g_i(x_i).
+"""
 
 import pytest
 from geometry.building import system
@@ -29,7 +31,7 @@ def tensor(coordinates, brackets):
         ("x y z", "{x: {y: b*(1+x**2)*(y**2-a), z: 1+x**2}, y: {z: 3*(y**2-a)}}"),
         ("x y z", "{x: {y: (a*x**2+b*x+c)*y, z: (a*x**2+b*x+c)*z}, y: {z: y*z}}"),
         ("x y", "{x: {y: (x**2 - c)*y**2}}"),  # a parameter of known sign
-        ("x y", "{x: {y: (x-1)*(x-2)*(2*y**2 + 2*y + 5)}}"),  # two real roots, none
+        ("x y", "{x: {y: (x-1)*(x-2)*(2*y**2 + 2*y + 5)}}"),  # a factor with two real roots, and one without
         ("x y", "{x: {y: x**3*y}}"),
         ("x y", "{x: {y: 1/x}}"),
     ],
@@ -62,7 +64,8 @@ def test_a_log_canonical_tensor_gives_the_log_canonical_maps():
 
 @pytest.mark.parametrize("factor", ["(x**2 + 3*x + 1)", "(x**2 + a)", "(x**2 - c)", "(2*x + 1)", "exp(x)", "x**3"])
 def test_the_displacement_is_the_flow_of_the_factor(factor):
-    # β_x = x moved along ẋ = g(x) for the time ½u_x, u_x = p_y with {x, y} = g(x): by RK4 with small steps.
+    # β_x is the flow of ẋ = g(x) for the time ½u_x, where u_x = p_y for {x, y} = g(x). The expected value is computed
+    # by RK4 with small steps.
     s = tensor("x y", f"{{x: {{y: '{factor}'}}}}")
     realisation = realise(s, GAUGED)
     start = {"x": 0.7, "y": 0.0, momentum("x"): 0.0, momentum("y"): 0.3, "a": 1.0, "b": 2.0, "c": 3.0}
@@ -106,9 +109,9 @@ def test_factors_that_are_constant_by_an_identity_are_constants():
 @pytest.mark.parametrize(
     "brackets",
     [
-        "{x: {y: 1 + x*y}}",  # mixes coordinates
-        "{x: {y: x*y, z: x**2*z}}",  # two factors of x
-        "{x: {y: z}}",  # a coordinate of neither
+        "{x: {y: 1 + x*y}}",  # no product of functions of one coordinate
+        "{x: {y: x*y, z: x**2*z}}",  # two different factors of x
+        "{x: {y: z}}",  # depends on neither x nor y
     ],
 )
 def test_other_tensors_are_not_separated(brackets):

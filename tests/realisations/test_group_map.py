@@ -1,4 +1,4 @@
-"""Maps τ from the algebra to the group given by the user."""
+"""Maps τ from a Lie algebra to its group that the spec gives."""
 
 import pytest
 from geometry.building import family, system
@@ -66,7 +66,8 @@ def test_one_sided_maps_are_proved_and_not_symmetric(tau):
 
 
 def test_entries_may_be_given_one_by_one():
-    # canonical coordinates of the second kind on the affine group: τ = exp(p_y b) exp(p_x a)
+    # Canonical coordinates of the second kind on the affine group: τ = exp(p_y b) exp(p_x a) with the generators a and
+    # b.
     s, realisation = of_text("{name: aff(1)}", "[[exp(p_x), p_y], [0, 1]]", "x, y")
     assert [statement.verdict for statement in check(s, realisation)] == [PROVED] * 5
     assert not realisation.symmetric

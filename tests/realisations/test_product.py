@@ -1,4 +1,4 @@
-"""Blocks of π: found, stated, nested."""
+"""Tensors π with blocks: blocks are found, can be given in the spec, and can be nested."""
 
 import pytest
 from geometry.building import system
@@ -74,7 +74,8 @@ def test_a_product_is_stated_by_its_blocks():
 
 
 def test_the_form_of_a_block_keeps_its_matrices():
-    # gl(3) has 3×3 matrices that are closed, which structure constants alone do not tell.
+    # The 3×3 matrices of gl(3) make the Cayley transform possible. The structure constants alone do not give these
+    # matrices.
     names = ", ".join(f"x{i}" for i in range(9))
     s = system(
         names.replace(",", "") + " q p",

@@ -1,4 +1,6 @@
-"""Structures in other coordinates: maps and their inverses, nesting, proofs in the other coordinates."""
+"""Poisson structures that are given in other coordinates: maps and their inverses, nesting, and proofs in these
+coordinates.
+"""
 
 from dataclasses import replace
 
@@ -105,7 +107,7 @@ def test_the_inner_kind_can_be_chosen():
 
 
 def test_auto_recognises_what_the_pull_back_is():
-    # An orthogonal change of basis of so(3) is linear again: no pull-back is needed.
+    # The bracket of so(3) stays linear after a permutation of the coordinates, so no pull-back is needed.
     assert realise(pulled(SO3, "{u: y, v: z, w: x}")).kind == "exponential"
     realisation = realise(pulled(SO3, "{u: x, v: y + x**2, w: z}"))
     assert realisation.explanation.startswith("auto picked pullback, since π is given in the coordinates u, v, w")

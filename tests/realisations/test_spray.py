@@ -1,4 +1,4 @@
-"""Poisson sprays: the two examples of the paper step by step, closed forms, the formal series, what is refused."""
+"""Poisson sprays: the two examples of the paper step by step, closed forms, the formal series, and refusals."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def verdicts(statements):
 
 
 def choice(text, coordinates="x y z", poisson=SO3, hamiltonian="x", order=4):
-    """The system and the choice of a spec."""
+    """Return a system, and the choice of the bi-realisation in its spec."""
     names = ", ".join(coordinates.split())
     spec = loads(
         f"phigen: 1\nname: t\ncoordinates: [{names}]\npoisson: {poisson}\nhamiltonian: {hamiltonian}\norder: {order}\n"
@@ -60,7 +60,7 @@ def choice(text, coordinates="x y z", poisson=SO3, hamiltonian="x", order=4):
 
 
 def given(forces, **options):
-    """The bi-realisation of the spray with these components; systems as in `choice`."""
+    """Return a system, and the bi-realisation of the spray with these components. The options are those of `choice`."""
     s, c = choice(f"{{kind: spray, spray: {forces}}}", **options)
     return s, realise(s, c)
 
@@ -75,12 +75,12 @@ PSI = [Q - HALF * B, P + HALF * A, A, B]
 def test_symplectic_example_flow_form_and_psi():
     s = symbol(TIME)
     flow = [Q + s * B, P - s * A, A, B]
-    assert is_flow(flow, [B, -A, ZERO, ZERO], Z)  # X = ξ_p ∂_q − ξ_q ∂_p
+    assert is_flow(flow, [B, -A, ZERO, ZERO], Z)  # the flow of the spray X = ξ_p ∂_q − ξ_q ∂_p
     assert same(at_time(flow, 1)[:2], [Q + B, P - A])  # β̅
 
     moved = pull_back(canonical(2), flow, Z)
     omega = {key: integrated(w, 0, 1) for key, w in moved.items()}
-    # Ω = ω + dξ_p ∧ dξ_q.
+    # The mean of Φˢ*ω over 0 ≤ s ≤ 1 is Ω = ω + dξ_p ∧ dξ_q.
     corrected = combine((1, canonical(2)), (-1, {(2, 3): number(1)}))
     assert equal(omega, corrected)
     assert equal(pull_back(corrected, PSI, Z), canonical(2))
@@ -99,8 +99,8 @@ def test_symplectic_example_is_what_the_kind_builds():
 
 
 def test_the_form_printed_in_the_paper_is_not_straightened_by_its_psi():
-    # Printed: Ω = ω + ½ dp∧dξ_p − ½ dξ_q∧dq − ⅓ dξ_q∧dξ_p. The flow leaves ξ alone, so that no dp∧dξ_p or dξ_q∧dq can
-    # arise beside those of ω, and ∫ 2s ds = 1, not 1/3.
+    # The paper prints Ω = ω + ½ dp∧dξ_p − ½ dξ_q∧dq − ⅓ dξ_q∧dξ_p. But the flow does not change ξ, so the coefficients
+    # of dp∧dξ_p and dξ_q∧dq are those of ω. And the last coefficient is ∫ 2s ds = 1, not 1/3.
     printed = combine(
         (1, canonical(2)),
         (HALF, {(1, 3): number(1)}),
@@ -116,7 +116,8 @@ def test_psi_of_the_other_sign_is_refuted():
 
 
 def test_psi_is_not_the_identity_to_first_order_but_its_centred_part_is():
-    # The paper says so of ψ; it moves x by −½πp. ψ₀, with ψ = Φ^{−½}∘ψ₀, begins in degree 2.
+    # The paper says that ψ is the identity to first order, but ψ moves x by −½πp. This is true of ψ₀ in ψ = Φ^{−½}∘ψ₀,
+    # where Φ is the flow of the spray.
     assert not same([derivatives([e], momentum("p"))[0] for e in PSI[:1]], [ZERO])
     for s in (system("x y z", SO3), system("x y z", CUBIC)):
         spray = make_spray(s, "flat")
@@ -136,12 +137,14 @@ U = [total(number(MATRIX[i][j]) * W[i] for i in range(N)) for j in range(N)]  # 
 
 
 def natural(sign):
-    """The spray ẋ_j = sign u_j x_j, ṗ_j = −sign u_j p_j: +1 as printed, −1 for ẋ = πp, {x_i, x_j} = a_ij x_i x_j."""
+    """Return the spray ẋ_j = sign u_j x_j, ṗ_j = −sign u_j p_j. The paper prints it with sign = +1. With sign = −1, ẋ =
+    πp for {x_i, x_j} = a_ij x_i x_j.
+    """
     return [sign * (x * u) for x, u in zip(X, U, strict=True)] + [-sign * (p * u) for p, u in zip(PX, U, strict=True)]
 
 
 def exponential_map(factor):
-    """(x_j e^{c u_j}, p_j e^{−c u_j})."""
+    """Return the map (x_j, p_j) ↦ (x_j e^{c u_j}, p_j e^{−c u_j}) with c = ``factor``."""
     return [x * call("exp", factor * u) for x, u in zip(X, U, strict=True)] + [
         p * call("exp", -(factor * u)) for p, u in zip(PX, U, strict=True)
     ]
@@ -150,7 +153,7 @@ def exponential_map(factor):
 def test_quadratic_example_flow_form_and_psi():
     s = symbol(TIME)
     flow = exponential_map(-s)
-    # The paper prints the spray with the other sign, which is that of −π in ẋ = πp.
+    # The paper prints the spray with the opposite sign, for which ẋ = −πp.
     assert is_flow(flow, natural(-1), NAMES)
     sharp = [total(number(MATRIX[i][j]) * X[i] * X[j] * PX[j] for j in range(N)) for i in range(N)]
     assert same(natural(-1)[:N], sharp)
@@ -166,8 +169,8 @@ def test_quadratic_example_flow_form_and_psi():
 
     psi = exponential_map(HALF)
     assert equal(pull_back(omega, psi, NAMES), canonical(N))
-    assert not equal(pull_back(omega, exponential_map(-HALF), NAMES), canonical(N))  # the sign that is printed
-    # β̅_j = x_j e^{−u_j} = x_j (e^{−½u_j})², and ψ keeps u_j.
+    assert not equal(pull_back(omega, exponential_map(-HALF), NAMES), canonical(N))  # the sign in the paper
+    # β̅_j is x_j e^{−u_j} = x_j (e^{−½u_j})², and ψ leaves u_j unchanged.
     assert same(after(U, psi, NAMES), U)
     alpha, beta = psi[:N], [image * call("exp", -(HALF * u)) ** 2 for image, u in zip(psi, U, strict=False)]
     catalogue = realise(system("x y z", LOG3), BirealisationChoice("log-canonical"))
@@ -176,7 +179,7 @@ def test_quadratic_example_flow_form_and_psi():
 
 
 def test_the_printed_signs_belong_to_the_opposite_tensor():
-    # Everything printed is consistent: it is the bi-realisation of −π.
+    # The formulas of the paper are consistent with one another, but they are the bi-realisation of −π.
     flow = exponential_map(symbol(TIME))
     assert is_flow(flow, natural(+1), NAMES)
     opposite = realise(system("x y z", "{log_canonical: [[0, -1, -1], [1, 0, -1], [1, 1, 0]]}"))
@@ -248,7 +251,7 @@ def test_flat_spray_of_a_nilpotent_algebra_is_exact_and_the_exponential_realisat
 
 
 def test_nilpotent_flow_that_moves_the_covector():
-    # Constant π with ṗ_y = p_x²: Φˢ*ω is quadratic in s, Moser's recursion ends.
+    # With constant π and ṗ_y = p_x², the form Φˢ*ω is quadratic in s, and Moser's recursion ends.
     s, realisation = given("[0, p_x**2]", coordinates="x y", poisson="{brackets: {x: {y: 1}}}")
     assert realisation.exact
     assert realisation.symmetric
@@ -305,7 +308,7 @@ def test_exchanged_maps_and_a_wrong_coefficient_are_refuted():
     realisation = realise(s, BirealisationChoice("spray"))
     swapped = replace(realisation, alpha=realisation.beta, beta=realisation.alpha)
     assert verdicts(check(s, swapped)) == [PROVED, REFUTED, REFUTED, PROVED, REFUTED]
-    # Half a flow without ψ₀, which is right in degree 1 only.
+    # The flow for the time −½ without the correction ψ₀ is only right in degree 1.
     spray = make_spray(s, "flat")
     half = [
         spray.space.tower.expression(
@@ -322,7 +325,8 @@ def test_exchanged_maps_and_a_wrong_coefficient_are_refuted():
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("coordinates", "poisson"), SYSTEMS)
 def test_flat_spray_is_karasevs_construction(coordinates, poisson):
-    # ∫ Φˢ*ω ds = Σ d(mean_i) ∧ dp_i and p·(mean − x) = 0, so that Moser's ψ₀ keeps p.
+    # In the flat spray ∫ Φˢ*ω ds = Σ d(mean_i) ∧ dp_i, where mean is the mean of x along the flow, and p·(mean − x) =
+    # 0. So Moser's map ψ₀ leaves p unchanged, as in Karasev's construction.
     s = system(coordinates, poisson)
     degree = 4
     realisation = realise(s, replace(FLAT, degree=degree))
@@ -356,7 +360,7 @@ HAMILTONIANS = ["x**2/2 + y**2/4 + z**2/6", "x*y + z", "x*y*z + y**2", "exp(x) +
 
 
 def terms_of(s, realisation, count):
-    """S_1 … S_count as expressions."""
+    """Return S_1 … S_count as expressions."""
     series = polynomial_series(s.hamiltonian, realisation.alpha, s.coordinates, [], count, symmetric=True)
     return [series.tower.expression(term) for term in series.terms]
 
@@ -372,7 +376,8 @@ def test_series_of_the_flat_spray_equal_those_of_karasev(hamiltonian):
 
 @pytest.mark.parametrize("forces", ["[x*p_y*p_z, p_x**2, 0]", "[p_x*p_y, x**2*p_z**2, (y + z)*p_x*p_z]"])
 def test_two_sprays_differ_in_s3_by_a_gauge_term_cubic_in_the_slope(forces):
-    # α' = α∘φ with φ symplectic, φ = 1 + {·, G} + …, G(x, p) cubic in p; hence S_3' = S_3 + G(x, ∇H) for every H.
+    # The maps of two sprays are related by α' = α∘φ with a symplectic map φ = 1 + {·, G} + …, where G(x, p) is cubic in
+    # p. Hence S_3' = S_3 + G(x, ∇H) for every H.
     covector = covector_names("xyz")
     for hamiltonian in HAMILTONIANS:
         s, other = given(forces, hamiltonian=hamiltonian)
@@ -404,10 +409,10 @@ START = (1.0, 0.5, -0.75)
 def test_poisson_defect_of_a_truncation_is_of_its_degree(degree):
     compilation = compile_text(f"{BODY}birealisation: {{kind: spray, degree: {degree}}}\norder: 4\n")
     defects = [PreciseStep(compilation, {}, h).defect(START) for h in (1 / 64, 1 / 128)]
-    # so(3): α has no term of odd degree beyond 1, so that degree 4 is as good as 5.
+    # For so(3), α has no terms of odd degree above 1, so degree 4 gives the same map as degree 5.
     expected = {3: 4, 4: 6, 5: 6}[degree]
     assert defects[0] / defects[1] >= 0.8 * 2**expected
-    assert defects[1] > 1e-25  # approximate, and said so
+    assert defects[1] > 1e-25  # not only round-off, since the bi-realisation is approximate
 
 
 def test_an_exact_spray_has_no_defect():
