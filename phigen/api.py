@@ -95,16 +95,18 @@ def compile(
     profile: str | None = None,
     device: int | None = None,
 ) -> Any:
-    """Return a solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled spec.
+    """Return a solver, in C or for another target, of the system that ``source`` defines.
+
+    ``source`` is a `System`, a spec, the path of a spec file, the name of a bundled spec, or a compilation.
 
     ``target`` is ``c``, ``numpy``, ``opencl``, ``cuda``, or ``auto``: C if there is a compiler, else NumPy with a
     `PhigenWarning`. With ``opencl`` and ``cuda``, ensembles and lattices run on a device, see `Solver.device`; the
     argument ``device`` is the number of the device to use.
 
     ``order`` overrides the order of the spec, and ``scheme`` (``series``, ``splitting``, ``gauss``, ``auto``) its
-    scheme. ``tangent`` adds `Solver.step_tangent`, and ``adjoint`` adds `Solver.pullback` and `Solver.jacobian`, in
-    addition to the parts that the spec requests. ``profile`` is the profile of the code, ``fast`` by default; the
-    profile in a spec only applies to ``phigen build``.
+    scheme. ``tangent`` adds `Solver.step_tangent`, and ``adjoint`` adds `Solver.pullback` and `Solver.jacobian`; parts
+    that the spec requests are always included. ``profile`` is the profile of the code, ``fast`` by default; the profile
+    in a spec only applies to ``phigen build``.
 
     Compiled C is stored in a cache, under a hash of its content. Returns a `Solver`, or for a lattice a
     `LatticeSolver`. Raises `SpecError`; `LimitError`; `CheckError` if a statement is refuted, e.g. if π is not Poisson;
@@ -152,8 +154,8 @@ def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
     if isinstance(source, System):
         return compile_proved((source.spec or _spec_of(source)).for_running(**options), system=source)
     if not isinstance(source, Spec | str | PathLike) and isinstance(getattr(source, "spec", None), Spec):
-        # Only a LatticeSystem is left. There is no isinstance, since that would import the package of lattices for all
-        # systems.
+        # Any other source with a spec is a LatticeSystem. It is not recognised by isinstance, because importing the
+        # class would load the package of lattices for every system.
         source = source.spec
     if isinstance(source, Spec):
         return compile_proved(source.for_running(**options))
@@ -186,7 +188,9 @@ def solver_of(compilation: Compilation, target: str = "auto", device: int | None
 
 
 def lattice_solver_of(compilation: Compilation, target: str = "auto", device: int | None = None) -> LatticeSolver:
-    """Compile and load the solver of a compiled lattice, and return it. Raises `ToolchainError` as `solver_of`."""
+    """Compile and load the solver of a compiled lattice, and return it. Raises `ToolchainError` if C was requested and
+    cannot be compiled.
+    """
     from phigen.runtime.lattice import LatticeSolver
 
     return LatticeSolver(*_loaded(compilation.program, target, device), compilation.spec)
@@ -227,8 +231,9 @@ def backend_of(files: Mapping[str, str], interface: Interface, target: str = "",
 
 
 def interface_of(program: Program) -> Interface:
-    """Return the names, sizes and features of a program that Python needs to run it; a `LatticeInterface` for
-    lattices."""
+    """Return the `Interface` of a program, for a lattice its `LatticeInterface`: the names, sizes and features of the
+    solver that Python needs to run it.
+    """
     from phigen.runtime.interface import Interface, LatticeInterface
 
     interface = Interface(

@@ -1,9 +1,9 @@
 """The results of compiling one spec: ``Compilation = CompiledSeries | CompiledSplitting | CompiledGauss |
 CompiledLattice``.
 
-All four have the members of `_Compiled` and a ``system``, which raises `SpecError` for a lattice of any size. Code that
-needs one of the four calls `by_series`, `by_splitting`, `by_gauss` or `by_sweeps`, which raise `ValueError` for other
-compilations.
+All four classes have the members of `_Compiled` and a property ``system``; for a lattice of any size, this property
+raises `SpecError`. The methods `by_series`, `by_splitting`, `by_gauss` and `by_sweeps` return a compilation of one
+class, with its type, and raise `ValueError` for compilations of other classes.
 """
 
 from __future__ import annotations
@@ -65,8 +65,9 @@ class _Compiled(ABC):
     def exact(self) -> bool:
         """Whether a step preserves the Poisson structure to round-off, rather than up to a power of h.
 
-        For a series, this means that a step maps α(y, p) to β(y, p), where y is the solution of the implicit equation
-        and p a covector. With forces, a step that is exact in this sense is not a Poisson map; see `poisson`.
+        A step of a series maps α(y, p) to β(y, p), where y is the solution of the implicit equation and p a covector.
+        It preserves the structure to round-off if the maps α, β are exact, rather than truncated in p. With forces, a
+        step that is exact in this sense is not a Poisson map; see `poisson`.
         """
 
     @property
@@ -198,8 +199,7 @@ class _Compiled(ABC):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class _CompiledSystem(_Compiled, ABC):
-    """Base class of the compilations of ordinary systems, whose number of coordinates is fixed, unlike that of
-    lattices."""
+    """Base class of the compilations of ordinary systems, which have a fixed number of coordinates; lattices do not."""
 
     system: System
     gauge: Gauge = field(default_factory=Gauge)
@@ -263,7 +263,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def label(self) -> str:
-        """The method in a few words for users: the name of the bi-realisation, the maps α and β."""
+        """The method in a few words for users: the name of the bi-realisation (the maps α, β)."""
         return self.realisation.label
 
     @property
@@ -398,7 +398,9 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def label(self) -> str:
-        """The method in a few words for users: the unknowns of a step, and whether its structure is exact."""
+        """The method in a few words for users: the unknowns of a step, and whether steps preserve the Poisson
+        structure.
+        """
         return self.gauss.label
 
     @property
@@ -408,7 +410,9 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def degree(self) -> int | None:
-        """The order d of the method. If its structure is not exact, steps are Poisson maps up to O(h^(d+1))."""
+        """The order d of the method. If steps do not preserve the Poisson structure exactly, they preserve it up to
+        O(h^(d+1)).
+        """
         return self.order.order
 
     @property
@@ -420,7 +424,7 @@ class CompiledGauss(_CompiledSystem):
 
     @property
     def structure(self) -> str:
-        """Whether steps preserve the Poisson structure, as the spec says it: ``exact`` or ``to truncation``."""
+        """Whether steps preserve the Poisson structure, in the words of specs: ``exact`` or ``to truncation``."""
         return "exact" if self.gauss.exact else "to truncation"
 
     @property
@@ -449,9 +453,10 @@ class CompiledGauss(_CompiledSystem):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class CompiledLattice(_Compiled):
-    """Compilation of a lattice of any size: its ``cell``, one site with its neighbours, and the plan of a step.
+    """Compilation of a lattice of any size: its ``cell`` (one site with its neighbours), and the plan of a
+    step.
 
-    ``sweeps`` is the plan: the updates of all sites of which a step consists.
+    ``sweeps`` is the plan. A step consists of sweeps, each of which updates all sites.
     """
 
     cell: Cell
@@ -504,14 +509,14 @@ class CompiledLattice(_Compiled):
 
     @property
     def poisson(self) -> bool:
-        """Whether a step is a Poisson map to round-off: there are no forces."""
+        """Whether a step is a Poisson map to round-off: true unless there are forces."""
         return not self.cell.forces
 
     @property
     def described(self) -> dict[str, Any]:
         """The method as plain data, for the output of commands in JSON, with the number of colours of sites.
 
-        ``since`` is the reason if the sizes of the runs require the scheme series, or more colours, else None.
+        Some sizes of runs exclude splittings, or need more colours. The entry ``since`` then has the reason, else None.
         """
         plan = self.sweeps
         return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
@@ -534,7 +539,9 @@ class CompiledLattice(_Compiled):
         splitting: Callable[[CompiledSplitting], T],
         gauss: Callable[[CompiledGauss], T],
     ) -> T:
-        """Raise `SpecError`: a lattice is compiled in its own way, by none of the three functions."""
+        """Raise `SpecError`: the three functions are for schemes of ordinary systems, and this is the compilation of a
+        lattice.
+        """
         raise system_of_lattice(self.spec)
 
     def _repr_latex_(self) -> str:

@@ -51,11 +51,12 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-#: A series of high order is not built to estimate its cost. The operations of a series of this order are a lower bound.
+#: Order of the series whose operations are counted for a lower bound of the cost of a series of higher order. Building
+#: the series of higher order itself would take long.
 PREVIEW_ORDER = 4
 
-#: Specs with at least this number of coordinates are examined for a lattice that is written out site by site; the
-#: lattice must have at least this number of sites.
+#: Least number of sites of a lattice that is recognised in a spec with the equations of all sites. Specs with fewer
+#: coordinates are not examined for this.
 LEAST_LATTICE_SITES = 8
 
 
@@ -200,7 +201,8 @@ def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
 
 
 def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation | None:
-    """Return the bi-realisation of a large system before anything is proved about the system, to find limits early.
+    """Return the bi-realisation of a large system before anything is proved about the system, so that a program that
+    would exceed a limit is refused early.
 
     Returns None if the system is small, if the Casimirs to be subtracted from H (the gauge) decide on the
     bi-realisation, or if there is no bi-realisation; in the last case, the proofs report the reason. Raises
@@ -362,8 +364,9 @@ def _parts(spec: Spec, system: System) -> SplitHamiltonian:
 
 
 def _turns_bodies(spec: Spec, system: System) -> bool:
-    """Whether free rigid bodies may be parts of H: if the spec reconstructs an attitude, it must be the body's
-    attitude."""
+    """Whether free rigid bodies may be parts of H: true, unless the spec reconstructs an attitude that is not the
+    attitude of a rigid body.
+    """
     group = _group(spec, system, "exponential")
     if group is None:
         return True
@@ -450,7 +453,9 @@ def bounded(spec: Spec) -> Iterator[None]:
 
 
 class _Clock:
-    """Stopwatch for the stages of a compilation; ``seconds`` of a stage that is entered several times add up."""
+    """Stopwatch for the stages of a compilation. If a stage is entered several times, ``seconds`` has the sum of its
+    durations.
+    """
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

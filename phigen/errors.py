@@ -58,11 +58,11 @@ class Diagnostic:
 
 
 def _excerpt(line: str, column: int, width: int = 100) -> tuple[str, int]:
-    """Return at most ``width`` characters of a line, around a column that counts from 0, and the column within this
+    """Return at most ``width`` characters of a line around ``column``, and the number of the column within this
     text.
 
-    Characters that a terminal would not show as one character are replaced, so that a caret below the text points at
-    the right character.
+    Columns count from 0. Characters that a terminal would not show as one character are replaced, so that a caret below
+    the text points at the right character.
     """
     start = 0 if len(line) <= width else max(0, min(column - width // 2, len(line) - width))
     part = "".join(c if c.isprintable() else " " if c == "\t" else "�" for c in line[start : start + width])
@@ -148,8 +148,8 @@ class StepError(PhigenError):
     """A step failed; the solver has the state before this step.
 
     Attributes: ``step`` (number of the failing step, from 0), ``status`` (the name of the solver's status, e.g.
-    ``NO_CONVERGENCE``), ``trajectory`` (the results before the failing step, or ``None``), ``members`` (indices of the
-    members of an ensemble that failed).
+    ``NO_CONVERGENCE``), ``trajectory`` (the results before the failing step, or ``None``), ``members`` (for an
+    ensemble, the indices of the failed members).
     """
 
     exit_code = 7

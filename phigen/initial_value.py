@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 #: and ``direction``.
 Event = Callable[[float, Floats], float]
 
-#: If the caller passes no step ``h``: number of steps of the first attempt, and largest number of attempts, each with
-#: half the step of the last one.
+#: For calls without a step ``h``: number of steps of the first attempt, and largest number of attempts. Each attempt
+#: has half the step size of the attempt before.
 _FIRST_STEPS, _MAX_HALVINGS = 64, 16
 
 _REACHED = "The solver successfully reached the end of the integration interval."
@@ -66,7 +66,7 @@ class OdeResult:
 #: Arguments of SciPy's solve_ivp that are refused → the reason, which the error message states.
 _SCIPY = {
     "method": "the method is that of the solver; order= changes its order",
-    "jac": "the solver has its derivatives",
+    "jac": "phigen derives all derivatives itself",
 }
 _SCIPY |= {"args": "parameters are keyword arguments", "vectorized": "solve_ivp calls no Python function"}
 _SCIPY |= dict.fromkeys(["max_step", "first_step", "min_step"], "the step size is fixed: h=")
@@ -168,11 +168,10 @@ class _Problem:
         return self.solver.integrate(self.y0, h, until=span, stride=stride, parameters=self.values, **start)
 
     def chosen(self, rtol: float, atol: float) -> tuple[float, bool]:
-        """Return a step size that reaches the tolerances, and True: with half this step, the last state changed by
-        less.
+        """Return a step size, and whether it reaches the tolerances.
 
-        If no step size reaches the tolerances, returns the smallest one tried, and False. Raises `StepError` if the
-        last attempt fails.
+        It does if steps of half the size change the last state by less than the tolerances. If no step size does, the
+        smallest one that was tried is returned, and False. Raises `StepError` if the last attempt fails.
         """
         h, previous, failure = (self.end - self.begin) / _FIRST_STEPS, None, None
         for _ in range(_MAX_HALVINGS):
@@ -190,10 +189,10 @@ class _Problem:
         return 2 * h, False
 
     def events(self, event_list: Sequence[Event], h: float) -> tuple[list[list[tuple[float, Floats]]], float | None]:
-        """Return the times and states of each event until the end, and the time of the first terminal event, which is
-        the end.
+        """Return the times and states of each event, and the time of the first terminal event, or None if there is
+        none.
 
-        The second result is None if there is no terminal event.
+        The integration ends at the first terminal event, so later events are left out.
         """
         by_event = [self._crossings(event, h) for event in event_list]
         sign, stops = math.copysign(1.0, self.end - self.begin), []
@@ -209,7 +208,7 @@ class _Problem:
         states."""
         direction_of_change = np.sign(getattr(event, "direction", 0)) * np.sign(
             self.end - self.begin
-        )  # SciPy's direction refers to the integration, that of CrossingFinder to increasing time.
+        )  # SciPy counts the direction along the integration, CrossingFinder along increasing time.
         direction = {1: "rising", -1: "falling", 0: "both"}[int(direction_of_change)]
 
         def g(states: Floats, t: Floats) -> Floats:

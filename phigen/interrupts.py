@@ -34,7 +34,7 @@ def _handle(number: int, frame: FrameType | None) -> None:
 
 
 def _imports(frame: FrameType | None) -> bool:
-    """Whether a module is being imported at the present frame.
+    """Whether the code at ``frame``, or one of its callers, is importing a module.
 
     During imports Ctrl-C ends the process at once, since compiled modules would convert `KeyboardInterrupt` to another
     error.

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from phigen.errors import Diagnostic, LimitError, Location
 
-#: Sizes in bytes up to which nothing is checked: to read the free memory takes longer than a step on an array of this
-#: size.
+#: Largest size in bytes that is not checked: reading the free memory takes longer than a step on an array of this size.
 UNCHECKED_BYTES = 2**24
 
 _HINT = "use fewer sites, frames in a file, real: float (half the memory), or phigen.mpi on several machines"

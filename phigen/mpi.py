@@ -36,9 +36,9 @@ from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
 from phigen.writing import replacing
 
-#: Number of steps between two checks that all values are finite; number of steps with functions valid for all arguments
-#: after a failed check. These numbers are those of templates/c/runtime/lattice.c, so that runs on one and on several
-#: processes are bitwise equal.
+#: STRETCH is the number of steps between two checks that all values are finite. If a single step fails, it and the next
+#: steps, FAR_STEPS in all, use functions valid for all arguments. These numbers are those of
+#: templates/c/runtime/lattice.c, so that runs on one and on several processes are bitwise equal.
 STRETCH, FAR_STEPS = 32, 64
 
 #: Arguments of `LatticeSolver.integrate` that are refused for several processes, since they need parts of steps, or
@@ -52,7 +52,7 @@ Given = Any
 
 @dataclass(frozen=True, eq=False)
 class DistributedRun:
-    """Results of a run on several processes, as one of the processes has them.
+    """Results of a run on several processes; each process has an object of its own.
 
     ``t`` and ``energy`` (frames,) refer to the whole lattice. ``x`` (frames, coordinates, planes, …) has the planes
     ``planes[0]`` … ``planes[1]`` − 1 of this process, and is None if frames went to a file. ``waiting`` is the time in
@@ -127,7 +127,9 @@ class DistributedLattice:
         """
         for name in _WHOLE_ONLY:
             if name in more and name not in self.solver.interface.parameters:
-                hint = "integrate in one process, or to whole steps, and call it again from the last state"
+                hint = (
+                    "integrate in one process; or integrate a number of whole steps, and continue from the last state"
+                )
                 raise TypeError(f"{name} is not available on several processes, whose rows are whole steps: {hint}")
         if checkpoints and not output:
             raise ValueError("checkpoints= needs output=, the file with the earlier frames of an interrupted run")
@@ -231,13 +233,15 @@ class _Domain:
     def _share(self, planes: int, reach: int) -> tuple[int, int]:
         """Return the first plane of this process and the plane after its last.
 
-        All processes have nearly the same number of planes, which is a multiple of the number of planes after which the
-        colours of sites repeat.
+        The colours of sites repeat after some number of planes. Each process has a multiple of this number of planes,
+        and all processes have nearly the same number.
         """
         period, count, rank = self.lattice.period, self.comm.size, self.comm.rank
         if planes < count * max(reach, period):
             most = planes // max(reach, period)
-            raise ValueError(f"{planes} planes are too few for {count} processes; {most} would do")
+            raise ValueError(
+                f"{planes} planes are too few for {count} processes; at most {most} processes are possible"
+            )
         units = -(-planes // period)
         first, end = (min(planes, units * r // count * period) for r in (rank, rank + 1))
         return first, end
@@ -376,7 +380,7 @@ class _Domain:
                     sent.append(self.comm.Isend(self.session.planes(field, *mine), neighbour, 2 * field + tag))
                 if theirs[0] < theirs[1]:
                     buffer = np.empty((theirs[1] - theirs[0], *self.sizes[1:]))
-                    # messages from the process ahead have the tag 2 field, messages from the process behind 2 field + 1
+                    # tag of messages from the process ahead: 2 * field, from the process behind: 2 * field + 1
                     requests.append((self.comm.Irecv(buffer, neighbour, 2 * field + 1 - tag), field, theirs, buffer))
         self._sent = sent
         return requests

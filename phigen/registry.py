@@ -27,8 +27,8 @@ class Target:
     ``suffixes`` has the suffixes of all files, the suffix of the main file first. ``default`` marks the targets of
     specs that name none. ``compiled`` says that a compiler is needed.
 
-    ``device`` marks a device, such as OpenCL. The device runs the files of the target ``device``, together with the
-    files of a target for the host.
+    The field ``device`` is true for a device, such as OpenCL. A device runs files of the target named "device", and its
+    solver also contains files in C or NumPy, which run on the processor.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Target:
         return cast(dict[str, str], import_module(self.emitter).emit(program, command, **options))
 
     def expect_offered(self, program: Program) -> None:
-        """Raise `SpecError` if the target cannot express the program, as ``emit`` would."""
+        """Raise `SpecError` if the target cannot express the program; `emit` would raise the same error."""
         refuse = getattr(import_module(self.emitter), "expect_offered", None)
         if refuse is not None:
             refuse(program)
@@ -89,7 +89,7 @@ DEVICES: Mapping[str, Target] = {
     for name, title in (("opencl", "OpenCL"), ("cuda", "CUDA"))
 }
 
-#: Names of the targets that a spec has if it names none, and of the targets that Python can load.
+#: DEFAULT has the names of the targets of a spec that names none, LOADABLE those of the targets that Python can load.
 DEFAULT = tuple(target.name for target in _LISTED if target.default)
 LOADABLE = tuple(target.name for target in _LISTED if target.loader)
 
@@ -116,7 +116,7 @@ def find(name: str) -> Target:
 
 
 def automatic(*, compiler: bool) -> str:
-    """Return the name of the target that ``auto`` stands for, the first that Python can load.
+    """Return the name of the target that ``auto`` stands for: the first target that Python can load.
 
     ``compiler`` says whether there is a C compiler; without one, targets that need it are left out.
     """
@@ -129,12 +129,13 @@ def suffixes(targets: Iterable[str] = TARGETS) -> list[str]:
 
 
 def loadable(targets: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of those of the ``targets`` whose solvers Python can load."""
+    """Return those names in ``targets`` whose solvers Python can load."""
     return tuple(target for target in targets if target in LOADABLE)
 
 
 def target_of(files: Iterable[str], name: str) -> Target:
-    """Return the target in whose language the files of the solver ``name`` are written, by the name of the main
-    file."""
+    """Return the target in whose language ``files`` are written; the name of the main file of the solver ``name``
+    decides.
+    """
     file_names = set(files)
     return next(target for target in _LISTED if f"{name}{target.suffixes[0]}" in file_names)

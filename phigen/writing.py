@@ -20,7 +20,7 @@ _DEVICES = ("/dev/", "/proc/")
 
 @contextmanager
 def naming(path: str | Path) -> Iterator[None]:
-    """Context in which errors of the operating system get this file's name.
+    """Context in which errors of the operating system get ``path`` as the name of the file.
 
     Without it, errors of a full disk name no file, and errors of a temporary file name a file that users do not know.
     """
