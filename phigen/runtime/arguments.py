@@ -23,7 +23,7 @@ _MOST = int(np.iinfo(np.int64).max)
 #: Largest finite number in single precision, the range of states and parameters in C with ``real: float``.
 LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
-#: Largest values of the arguments that select random numbers: those of their integer types in the C.
+#: Largest values of the arguments that select random numbers: the largest values of the integer types that store them.
 _LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
 
 
@@ -53,8 +53,8 @@ def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
     """Return the energy level e that the argument ``gauge`` sets for a lattice with a monitor, and remove this
     argument.
 
-    None, for no such argument, stands for −H of the initial state. Raises `ValueError` for other values than one finite
-    number.
+    Returns None if the argument is missing; e is then −H of the initial state. Raises `ValueError` unless the value is
+    one finite number.
     """
     if not interface.monitored or "gauge" not in by_keyword:
         return None
@@ -74,8 +74,9 @@ def step_size(h: float) -> float:
 
 
 def end(until: float, begin: float, h: float) -> float:
-    """Return the time from ``begin`` to ``until``. Raises `ValueError` if steps of size ``h`` lead away from
-    ``until``."""
+    """Return the time span ``until`` − ``begin``. Raises `ValueError` if steps of size ``h`` lead away from
+    ``until``.
+    """
     span = number(until, "the time until") - begin
     if span * h <= 0:
         raise ValueError(f"until = {until!r} is never reached from {begin!r} by steps of {h!r}")

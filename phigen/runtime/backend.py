@@ -1,4 +1,4 @@
-"""Protocol of back ends. A back end is the loaded solver of one target language, as the classes for users call it."""
+"""Protocol of back ends. A back end is the loaded solver of one target language; the classes for users call it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ class Backend(Protocol):
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> Session:
-        """Return a session, a trajectory that is computed step by step, whose state is x0 (DIM,) at the time t0.
+        """Return a session (a trajectory that is computed step by step) with the state x0 (DIM,) at the time
+        t0.
 
         ``first`` (numbers,) is the initial attitude and position, by default the identity and the origin. ``draws``
         selects the random numbers of the noise.
@@ -44,7 +45,7 @@ class Backend(Protocol):
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:
         """Return the session that `Session.saved` stored as the bytes ``saved``.
 
-        They must come from a back end of the same `identity`.
+        The back end that stored the session must have the same `identity` as this one.
         """
         ...
 

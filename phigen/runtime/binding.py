@@ -1,4 +1,4 @@
-"""Declaration, through ctypes, of the functions of a shared library with the types of their arguments and results."""
+"""Declaration of the functions of a shared library for ctypes, with the types of their arguments and results."""
 
 from __future__ import annotations
 

@@ -21,8 +21,7 @@ _SIGNATURES = {
 }
 
 
-# Signatures of functions that take the time, if the Hamiltonian depends on it; they replace signatures of the same
-# name.
+# Signatures that replace those of the same name if the Hamiltonian depends on the time, which is then an argument.
 _TIMED = {
     "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
     "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),

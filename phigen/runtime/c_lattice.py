@@ -44,8 +44,8 @@ _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "init": (_INT, (_POINTER,) * 6),
 }
 
-#: Signatures of additional functions: for an H that depends on the time, ``_IN_TIME`` on grids and pairs and
-#: ``_GRAPH_IN_TIME`` on graphs; for noise, ``_NOISY``.
+#: Signatures of additional functions. A lattice whose H depends on the time has those of ``_IN_TIME`` or, on a graph,
+#: of ``_GRAPH_IN_TIME``; a lattice with noise has those of ``_NOISY``.
 _PASSED: dict[str, tuple[Any, tuple[Any, ...]]] = {"passed": (_INT, (_POINTER, _DOUBLE, _SIZE))}
 _IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 4 + (_DOUBLE, _POINTER))}
 _GRAPH_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
@@ -95,7 +95,7 @@ _UPDATES_PER_CALL = 1 << 26
 
 
 class SweepStage(ctypes.Structure):
-    """One sweep of a step, an update of all sites, with the data that it reads and changes.
+    """Data that one sweep of a step (an update of all sites) reads and changes.
 
     To update the planes a … b − 1, the sweep reads the planes a − ``behind`` … b − 1 + ``ahead``. ``read`` and
     ``changed`` are bit masks with a bit for each coordinate.
@@ -382,8 +382,8 @@ class CLattice:
         return int(openmp_maximum()) if openmp_maximum else 1
 
     def stages(self) -> list[SweepStage]:
-        """Return the sweeps of a step in order and, without noise, one more sweep, which merges the last with the next
-        first.
+        """Return the sweeps of a step in order. Without noise, one more sweep follows: it makes the last sweep of a
+        step and the first sweep of the next step at once.
 
         Raises `ValueError` if the C has no caller-driven stepping.
         """

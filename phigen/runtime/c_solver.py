@@ -128,7 +128,7 @@ class CSolver:
     def _expect_parameters(self, members: Members) -> None:
         """Raise `BackendError` if no step is possible with the parameters of an ensemble that has no members.
 
-        With a monitor nothing is checked, since its check needs an initial state.
+        With a monitor nothing is checked: whether the monitor is positive depends on an initial state.
         """
         if hasattr(self._c, "monitor"):
             return
@@ -233,8 +233,9 @@ class CSolver:
         """Return the arrays of an ensemble for the C: parameters (members, parameters), times or gauges, and steps
         (members,).
 
-        The list of times or gauges has one entry if H depends on the time, or if Casimirs are subtracted from H, else
-        none. The entry for gauges, the multiples of Casimirs, is None if the C chooses them.
+        A gauge consists of the multiples of Casimirs that are subtracted from H. The list of times or gauges has one
+        entry: the times if H depends on the time, or else the gauges, None if the C chooses them. Without either, the
+        list is empty.
         """
         count, width = len(members), max(1, len(members.parameters))
         packed = np.empty((count, width))

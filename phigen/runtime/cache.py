@@ -100,8 +100,9 @@ def build(files: Mapping[str, str], folder: Path | None = None, *, threads: bool
 
 
 def key_of(library: ctypes.CDLL) -> str:
-    """Return the key in the cache, a hash of sources, compiler, flags and machine, of a library that `load`
-    returned."""
+    """Return the key, in the cache, of a library that `load` returned: a hash of sources, compiler, flags and
+    machine.
+    """
     return Path(library._name).stem.rpartition("-")[0]
 
 
@@ -178,10 +179,10 @@ def _entries(folder: Path) -> Iterator[Path]:
 
 
 def _trim(folder: Path, keep: Path) -> None:
-    """Remove the least recently used entries beyond `MAXIMUM_SIZE`, but not ``keep``, and folders of processes that
-    died.
+    """Remove entries until the cache has at most `MAXIMUM_SIZE`, the least recently used first, but never
+    ``keep``.
 
-    Errors are ignored.
+    Folders that processes left when they died are removed as well. Errors are ignored.
     """
     sizes: list[tuple[float, int, Path]] = []
     with contextlib.suppress(OSError):

@@ -28,8 +28,8 @@ C = TypeVar("C", bound=Course)
 #: A function from states (rows, DIM), and their times (rows,) if H depends on the time, to values (rows,).
 Function = Callable[..., Floats]
 
-#: Default number of steps after which g is evaluated on the array of their states; until then a copy of the session is
-#: stored for each step.
+#: Default number of steps in a block: g is evaluated on the array of the states of a whole block, and until then a copy
+#: of the session is stored for each step.
 BLOCK = 64
 #: Number of intervals into which a step is divided by values of g on a collocation polynomial: enough to find the
 #: extrema of a motion that makes half a turn in a step.
@@ -85,13 +85,13 @@ class CrossingFinder(Generic[C]):
     g is evaluated at the ends of steps and, with a collocation polynomial, at points inside steps. At most one crossing
     is located between two neighbouring points. If g has the same sign at three points and an extremum between them, the
     extremum is located, since g may change its sign twice there. A start with g = 0 counts as a crossing if g leaves
-    zero in the direction.
+    zero in the requested direction.
 
-    ``latest`` is the session after the latest step, ``past`` are copies of it before that step and earlier ones.
-    ``values`` are the values of g, ``points`` of them for each step, from the step with the number ``first`` on. ``t0``
-    is the time of step 0; g receives times if it is ``timed``. ``places`` are the crossings of the latest block of
-    steps: pairs of the number of steps from the start, and a session at the crossing. A ``block`` is the number of
-    steps between two evaluations of g on arrays.
+    ``latest`` is the session after the latest step; ``past`` has copies of the session before that step and before
+    earlier steps. ``values`` are the values of g at the points, of which each step has ``points``; the first value is
+    at the start of step number ``first``. ``t0`` is the time of step 0. If ``timed``, g receives the times as well as
+    the states. ``places`` are the crossings of the latest block of steps: pairs of the number of steps from the start,
+    and a session at the crossing. A ``block`` is the number of steps between two evaluations of g on arrays.
     """
 
     g: Function
@@ -148,8 +148,9 @@ class CrossingFinder(Generic[C]):
     def _interpolated_states(self, session: C) -> Floats:
         """Return states (points, DIM) inside the last step, from the collocation polynomial of the method.
 
-        Returns an empty array if the method has no collocation polynomial. It is also empty if g receives times and a
-        monitor (dt = g dτ) makes steps equal in τ, since the times inside the step are then not known.
+        The array is empty if the method has no collocation polynomial. It is also empty if the function g needs the
+        times of the states, but steps are equal in the rescaled time τ of a monitor: times inside a step are then
+        unknown.
         """
         interpolated = getattr(session, "interpolated", None)
         if interpolated is None or (self.timed and not math.isnan(self._clock(session, math.nan))):
@@ -223,8 +224,8 @@ class CrossingFinder(Generic[C]):
         curvature = a - 2 * b + c
         offset = (a - c) / (2 * curvature) if curvature else 0.0
         gain = abs((a - c) * offset / 4)
-        # An extremum that is this close to 0 is examined: ``gain`` is its distance from b on the parabola through the
-        # three values, and a tenth of the curvature allows for the error of the parabola.
+        # The extremum is examined if b is close to 0. On the parabola through the three values, the extremum differs
+        # from b by ``gain``; a tenth of the curvature allows for the error of the parabola.
         if not abs(b) <= 2 * gain + 0.1 * abs(curvature):
             return None
         j = i - 1 if offset < 0 else i
@@ -291,11 +292,11 @@ class CrossingFinder(Generic[C]):
         return session
 
     def _crossing_between(self, j: int, low: float, at_low: float, high: float, at_high: float) -> tuple[float, C]:
-        """Return the crossing in interval j, between two fractions of it: its number of steps, and a session at the
+        """Return the crossing between two fractions of interval j, as its number of steps and a session at the
         crossing.
 
-        The interval lies between two neighbouring points with values of g. ``at_low`` and ``at_high`` are the values of
-        g at the fractions ``low`` and ``high``.
+        Interval j is that between the points j and j + 1 at which g was evaluated. ``at_low`` and ``at_high`` are the
+        values of g at the fractions ``low`` and ``high``.
         """
         step, part = divmod(j, self.points)
         low, high = (part + low) / self.points, (part + high) / self.points

@@ -20,14 +20,15 @@ from phigen.runtime.timed import EQUAL, reached, steps_until
 Finish = Callable[[Any], tuple[Any, float]]
 
 
-#: A zero within this number of steps after the start does not end a run. A run that starts where another run stopped at
-#: a zero begins within rounding of the zero, and would otherwise stop at once.
+#: A zero within this number of steps after the start does not end a run. Otherwise a run that starts at a zero, where
+#: another run stopped, could stop at once, since rounding may move this zero behind the start.
 START = 1e-9
 
 
 @dataclass(frozen=True)
 class End:
-    """End of a run: after ``steps`` whole steps and, if ``part``, a shorter step, which ``finish`` makes.
+    """End of a run: after ``steps`` whole steps and, if ``part`` is true, one shorter step; ``finish`` makes
+    that step.
 
     ``span`` is the time from the start to the end. ``stopped`` is true if a zero of a function ends the run.
     """

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 
 def to_xarray(trajectory: Trajectory) -> xr.Dataset:
-    """Return a trajectory as a Dataset: ``x`` (t, coordinate), and ``energy``, ``casimir_NAME``, each observable (t).
+    """Return a trajectory as a Dataset with the variables ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and
+    observables (t).
 
     Step size, number of steps and parameters are attributes.
     """

@@ -53,8 +53,8 @@ class Jacobian(NamedTuple):
 class Segment:
     """Part of a run that is differentiated at once: ``count`` steps, which begin after step number ``first``.
 
-    ``rows`` are the numbers of the rows of the trajectory in this part: one after every ``stride`` steps, and the last
-    at its end. ``rows`` is empty if the segment ends between two rows.
+    ``rows`` are the numbers of those rows of the trajectory that lie in this part: one after every ``stride`` of its
+    steps, and one at its end. ``rows`` is empty if the segment ends between two rows.
     """
 
     first: int

@@ -53,7 +53,7 @@ class Interface:
     nonnegative: frozenset[str] = frozenset()  # the parameters that must be 0 or positive
     casimirs: tuple[str, ...] = ()
     time: str = ""  # the name of the time, "" if the Hamiltonian does not depend on it
-    moving: frozenset[str] = frozenset()  # quantities (``energy``, Casimirs) that explicit time or forces change
+    moving: frozenset[str] = frozenset()  # quantities (``energy``, Casimirs) that explicit time or forces make variable
     monitored: bool = False  # whether a monitor rescales time by dt = g dτ: steps are equal in τ, not in t
     attitude: tuple[int, ...] = ()  # the shape of the attitude, () if the spec reconstructs none
     position: bool = False  # whether the spec reconstructs a position too
@@ -131,7 +131,7 @@ class Clock:
         return self.t + (steps - self.counted) * self.h
 
     def set_step(self, h: float, steps: int) -> None:
-        """Change the step size to h after ``steps`` steps; the time of that step is the new origin of `after`."""
+        """Change the step size to h after ``steps`` steps. From then on, `after` counts from the time of that step."""
         if h != self.h:
             self.t, self.h, self.counted = self.after(steps), h, steps
 

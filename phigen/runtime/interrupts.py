@@ -17,9 +17,11 @@ def interruptible(ask: Callable[[int | None], Any]) -> Iterator[None]:
     """Return a context in which Ctrl-C ends a call of C early, and raises `KeyboardInterrupt` at the end of the
     context.
 
-    The function ``ask`` receives the address of a C function, which returns nonzero after Ctrl-C and which the C shall
-    call; at the end of the context ``ask`` receives None. ``ask`` is not called, and Ctrl-C acts as usual, outside the
-    main thread, which alone receives signals, and if the program has its own signal handler.
+    The function ``ask`` receives the address of a C function that returns nonzero after Ctrl-C; the C shall call this
+    function. At the end of the context ``ask`` receives None.
+
+    In other threads than the main thread, which do not receive signals, ``ask`` is not called, and Ctrl-C acts as
+    usual. The same holds if the program has its own signal handler.
     """
     signals: list[int] = []
     first = threading.current_thread() is threading.main_thread()

@@ -66,7 +66,8 @@ if TYPE_CHECKING:
     from phigen.spec.model import Run, Spec
     from phigen.symbolic.expression import Expression
 
-#: Values of the state beyond which a failure may be due to angles above 10⁸, where loops of C have no sin and cos.
+#: If a value of the state exceeds this limit, the message about a failed step mentions that vectorised sin and cos of
+#: the C only accept angles up to 10⁸.
 _LARGE_ANGLE = 5e7
 
 
@@ -242,8 +243,8 @@ class LatticeTrajectory:
         return cast(str, display("page of a lattice trajectory")(self))
 
     def plot(self) -> Figure:
-        """Return a figure of the state over space and time (chains), or on planes of the lattice at some times (larger
-        dimension).
+        """Return a figure of the state: of a chain, over space and time; of other lattices, on planes of the lattice at
+        some times.
 
         Panels below show the errors of conserved quantities. Notebooks show the figure; ``.savefig(path)`` writes it.
         Raises `MissingPackageError` without matplotlib.
@@ -395,13 +396,15 @@ class LatticeTrajectory:
 
 
 class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
-    """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates, *sizes).
+    """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates,
+    *sizes).
 
     Parameters are keyword arguments, or entries of ``parameters={…}``. A parameter at sites is an array (*sizes), at
-    bonds an array (bonds,), or one number for all sites or bonds. Parameters that are not passed have their defaults of
-    the spec, evaluated at the sizes of the state; a list or a file with another number of values raises `SpecError`. A
-    graph also takes ``bonds`` as an argument, an array (bonds, 2) of numbers of sites from 0. Wrong arguments raise
-    `ValueError` or `TypeError`, and a failing step `phigen.StepError`. Several threads may use a solver.
+    bonds an array (bonds,), or one number for all sites or bonds. Parameters that are not passed have the defaults of
+    the spec, evaluated at the sizes of the state; `SpecError` is raised if such a default is a list or a file with
+    another number of values. A graph also takes ``bonds`` as an argument, an array (bonds, 2) of numbers of sites from
+    0. Wrong arguments raise `ValueError` or `TypeError`, and a failing step `phigen.StepError`. Several threads may use
+    a solver.
     """
 
     def __init__(self, backend: LatticeBackend, interface: LatticeInterface, spec: Spec | None = None) -> None:
@@ -487,7 +490,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def carried_out(
         self, plan: IntegrationPlan, of: Sequence[str] = (), **where: Any
     ) -> LatticeTrajectory | LatticeSeries:
-        """Integrate as planned: record the numbers that ``of`` names or, if there are none, the states.
+        """Integrate as planned: record the numbers that ``of`` names or, if ``of`` is empty, the states.
 
         ``where`` are the arguments about files and progress, which `numbered` and `framed` take.
         """
@@ -752,7 +755,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **by_keyword: Any,
     ) -> Floats:
-        """Return the state one step of size ``h`` after ``x`` (coordinates, *sizes) at the time ``t0``.
+        """Return the state after one step of size ``h`` from the state ``x`` (coordinates, *sizes) at the time
+        ``t0``.
 
         Raises `StepError`.
         """
@@ -776,7 +780,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **by_keyword: Any,
     ) -> tuple[Floats, Floats]:
-        """Return the state one step after ``x``, and the derivative of this step multiplied by each of some
+        """Return the state after one step from ``x``, and the products of the derivative of this step with the
         ``vectors``.
 
         Vectors have the shape (count, coordinates, *sizes). The derivative is exact to round-off. Raises `StepError`,
@@ -953,7 +957,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def density(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **by_keyword: Any
     ) -> Floats:
-        """Return the density of H at the sites (*sizes), whose sum is H."""
+        """Return the density of H at the sites (*sizes). The sum over the sites is H."""
         return self._session_at(x, parameters, by_keyword, t).density()
 
     def casimirs(
@@ -1052,7 +1056,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             if violated := arguments.broken_bound(name, array, interface):
                 raise ValueError(f"parameter {name!r} must be {violated} at all {domain}")
             if name == interface.masses and not array.flat[0] > 0:
-                raise ValueError(f"parameter {name!r} must be positive at the first site, about which the others move")
+                raise ValueError(
+                    f"parameter {name!r} must be positive at the first site, the body about which all others move"
+                )
             values[name] = array
         return values | bonds
 

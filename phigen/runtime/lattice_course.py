@@ -1,4 +1,4 @@
-"""Integrations of lattices that can be copied, as sections, retries, and ends and rows inside a step need."""
+"""Integrations of lattices that can be copied. Sections, retries, and ends and rows inside a step need copies."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
 
-#: Number of steps for which copies of a course share one saved state: saving costs as much as some twenty steps of 64
-#: sites.
+#: Number of steps for which copies of an integration share one saved state: saving costs as much as some twenty steps
+#: of 64 sites.
 SHARED_STEPS = 16
 
 
 class LatticeCourse:
     """A lattice being integrated (`phigen.runtime.session.Followed`), with the state (coordinates, *sizes).
 
-    Steps of a copy made by `branch`, and of a course restored from `saved`, have the same bits as an uninterrupted
-    integration. A copy starts its session on first use, since sections make a copy at every step but use few of them.
-    Copies share a saved state for up to `SHARED_STEPS` steps; a copy that is used repeats the steps since that state.
+    The steps of a copy made by `branch`, and of an integration restored from `saved`, have the same bits as those of an
+    uninterrupted integration. A copy starts its session on first use, since sections make a copy at every step but use
+    few of them. Copies share a saved state for up to `SHARED_STEPS` steps; a copy that is used repeats the steps since
+    that state.
     """
 
     def __init__(self, solver: LatticeSolver, beginning: Beginning) -> None:
@@ -42,10 +43,9 @@ class LatticeCourse:
 
     @property
     def sites(self) -> LatticeSession:
-        """The session of the lattice; a course without a session starts it from the saved arrays."""
+        """The session that makes the steps. If the integration has none yet, it is started from the saved arrays."""
         if self._sites is None:
-            # The session begins at the last change of the step size, since times and random numbers are counted from
-            # there.
+            # The session begins at the last change of the step size, from which times and random numbers are counted.
             arrays, clock, steps_before = self._arrays, self._clock, self._before
             draws = replace(self.at.draws, step=self.at.draws.step + steps_before)
             begin = Beginning(np.asarray(arrays["state"]), clock.h, self.at.values, clock.t, draws)
@@ -84,15 +84,16 @@ class LatticeCourse:
 
     def advance(self, h: float, steps: int) -> None:
         """Make ``steps`` steps of size ``h``."""
-        sites = self.sites  # a restored session repeats its steps here, which still have the previous size
+        sites = self.sites  # starts the session if there is none, which repeats steps of the previous size
         if h != self._clock.h:
             self._anchor = {}
             self._clock.set_step(h, self.steps)
         sites.advance(h, steps)
 
     def branch(self) -> LatticeCourse:
-        """Return an independent copy; until it is used, it consists of saved arrays that it shares with other
-        copies."""
+        """Return an independent copy; until its first use, the copy consists of saved arrays that it shares with other
+        copies.
+        """
         steps = self.steps
         if not (self._anchor and 0 <= steps - self._anchor_steps < SHARED_STEPS):
             self._anchor, self._anchor_steps = self.saved(), steps
@@ -117,10 +118,10 @@ class LatticeCourse:
         self.sites.kick(change)
 
     def set_parameters(self, values: Mapping[str, Any]) -> None:
-        """Continue with other parameters, like a course that starts at the present state. Raises `StepError`.
+        """Replace the parameters. The state, the time and the random numbers are unchanged.
 
-        The state, the time and the random numbers are unchanged. With a monitor, the energy level e becomes −H of the
-        state.
+        Compensation terms and predictors are dropped, as at a new start. With a monitor, the energy level e becomes −H
+        of the state. Raises `StepError` if no step is possible with the parameters.
         """
         sites, steps, draws = self.sites, self.steps, self.at.draws
         clock = Clock(self._clock.after(steps), self._clock.h, steps)
@@ -133,7 +134,7 @@ class LatticeCourse:
         self._sites, self._clock, self._before, self._anchor = changed, clock, steps, {}
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays from which `restored` makes this course again."""
+        """Return the arrays from which `restored` makes this integration again."""
         if self._sites is None and not self._ahead:
             return dict(self._arrays)
         sites, clock = self.sites, self._clock
@@ -160,7 +161,8 @@ class LatticeCourse:
 
 
 class ObservedCourse(Retrying):
-    """A course whose `state` is the array of the observables of the spec (observables,), as sections and stops need.
+    """An integration whose `state` is the array of the observables of the spec (observables,), for sections and
+    stops.
 
     A failing step is repeated as several smaller steps, see `Retrying`.
     """
@@ -175,7 +177,7 @@ class ObservedCourse(Retrying):
         return cast("LatticeCourse", self.session).sites
 
     def saved(self) -> dict[str, Any]:
-        """Return the arrays from which `restored` makes this course again."""
+        """Return the arrays from which `restored` makes this integration again."""
         parts = np.array([self._extra, *self.retried])
         return {**cast("LatticeCourse", self.session).saved(), "parts": parts}
 

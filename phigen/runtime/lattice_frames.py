@@ -209,10 +209,10 @@ class Frames:
 
 
 def stream_path(path: str | Path) -> Path | None:
-    """Return the path if its suffix is that of a file to which frames are written one by one; None if the file is
-    written at the end.
+    """Return the path if frames are written to such a file one by one; None if the file is written at the end of the
+    run.
 
-    Raises `ValueError` for suffixes of no known format.
+    The suffix of the path decides. Raises `ValueError` for suffixes of no known format.
     """
     target = Path(path)
     if target.suffix in WHOLE:
@@ -249,8 +249,8 @@ def state_columns(interface: LatticeInterface, sizes: Sequence[int]) -> list[Col
 def write_whole(path: Path, trajectory: LatticeTrajectory) -> None:
     """Write a trajectory as ``.csv`` or ``.zarr``.
 
-    Raises `ValueError` if a state has more numbers than a ``.csv`` may have columns, or if the path is not a Zarr store
-    but exists.
+    Raises `ValueError` if a state has more numbers than a ``.csv`` may have columns, or if the path of a ``.zarr``
+    exists and is not a Zarr store.
     """
     if path.suffix == ".csv":
         write_table(path, trajectory)

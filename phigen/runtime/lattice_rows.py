@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RowSteps:
-    """Positions of the rows of a run: each after ``whole`` (rows,) steps, and a further step of size ``part`` (rows,).
+    """Positions of the rows of a run. Row k is reached by ``whole[k]`` steps and a shorter step of size
+    ``part[k]``.
 
     ``part`` is 0 for rows at whole steps. The first row is the start. If there is an ``end``, it makes the last row.
     With a monitor (dt = g dτ) and rows at given times, only the times ``spans`` (rows,) after the start are known
@@ -53,8 +54,9 @@ class RowSteps:
 
 
 def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSteps:
-    """Return rows at every ``stride``-th of ``steps`` steps, and at the last step or, if there is one, at the
-    ``end``."""
+    """Return rows after every ``stride``-th step, and a last row at the ``end`` or, without an ``end``, after ``steps``
+    steps.
+    """
     if end is None or not end.part:
         whole_rows = row_steps(steps if end is None else end.steps, stride)
         return RowSteps(whole_rows, np.zeros(len(whole_rows)), end)
@@ -65,8 +67,8 @@ def strided(h: float, steps: int, stride: int, end: End | None = None) -> RowSte
 
 
 def timed(h: float, steps: int, spans: Sequence[float], end: End | None = None) -> RowSteps:
-    """Return rows at the times ``spans`` after the start, and at the end: ``end`` or, if None, the last of ``steps``
-    steps.
+    """Return rows at the times ``spans`` after the start, and a last row at the ``end`` or, without an ``end``, after
+    ``steps`` steps.
     """
     last = h * steps if end is None else end.span
     inner = [span for span in spans if abs(last - span) > EQUAL * abs(last)]
@@ -90,7 +92,8 @@ def timed_in_tau(spans: Sequence[float], end: End) -> RowSteps:
 
 @dataclass(frozen=True)
 class Crossed:
-    """A section: the zeros of a function ``g`` of the observables that are crossed in ``direction``.
+    """A section: those zeros of a function ``g`` of the observables at which g changes its sign in
+    ``direction``.
 
     ``text`` is the formula of g.
     """
@@ -146,5 +149,5 @@ class IntegrationPlan:
 
     @property
     def steps(self) -> int:
-        """Number of whole steps up to the end, with the steps of an earlier run that this one continues."""
+        """Number of whole steps up to the end, including the steps of an earlier run that this one continues."""
         return self.rows.steps + (self.past.steps if self.past else 0)

@@ -23,7 +23,8 @@ from phigen.runtime.timed import EQUAL, reached, steps_until
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSession, LatticeSolver
 
-#: Crossings are searched in blocks of steps; largest number of values in the stored states of a block (32 MB).
+#: Largest number of values in the states that are stored together (32 MB) when crossings are searched in a block of
+#: steps.
 MOST_FOLLOWED = 1 << 22
 
 
@@ -64,7 +65,7 @@ class LatticeRun:
     identity: Mapping[str, Any] = field(default_factory=dict)
     count: int = 0
     crossed: list[float] = field(default_factory=list)  # times of the crossings
-    clocks: list[float] = field(default_factory=list)  # physical times since the start, of each row
+    clocks: list[float] = field(default_factory=list)  # physical time since the start, for each row
     numbers: list[float] = field(default_factory=list)
     course: Any = None
     last: Any = None  # the session at the latest row
@@ -106,7 +107,7 @@ class LatticeRun:
         return self.plan.at.h * np.array(self.numbers)
 
     def _store_mark(self, course: ObservedCourse, number: float) -> None:
-        """Store the time and the number of steps of a row, which may be a fraction."""
+        """Store the time of a row and its number of steps, which has a fraction if the row lies inside a step."""
         self.clocks.append(course.time())
         self.numbers.append(number)
 
@@ -141,7 +142,7 @@ class LatticeRun:
         self.count = 1
 
     def _finder(self, arrays: Mapping[str, Any]) -> CrossingFinder[ObservedCourse]:
-        """Return the object that finds crossings of the section; ``arrays`` of a checkpoint, if not empty, restore its
+        """Return the object that finds crossings of the section. If ``arrays`` come from a checkpoint, they restore its
         state.
         """
         plan, section = self.plan, self.plan.section
@@ -174,7 +175,8 @@ class LatticeRun:
             self.crossings.see(crossing_session.sites)
 
     def _reached(self, k: int) -> tuple[ObservedCourse, float]:
-        """Return a lattice session at row k and its number of steps, once the whole steps before the row are made.
+        """Return a lattice session at row k, and its number of steps. The whole steps before the row must have been
+        made.
 
         If the row lies inside a step, a copy of the session makes the shorter step to it.
         """

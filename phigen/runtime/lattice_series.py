@@ -91,8 +91,9 @@ def recordable(interface: LatticeInterface) -> tuple[str, ...]:
 
 
 def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
-    """Return the energy and the observables of a trajectory as a `LatticeSeries`, which has only its first and last
-    state."""
+    """Return the energy and the observables of a trajectory as a `LatticeSeries`. Of the states, only the first and the
+    last are taken over.
+    """
     x, solver = trajectory.x, trajectory.solver
     columns = {"energy": trajectory.energy}
     columns |= {name: trajectory.observed[:, k] for k, name in enumerate(solver.interface.observables)}

@@ -80,7 +80,9 @@ class LiveSession:
         return self
 
     def _go_on(self, values: dict[str, Any], begin: Clock) -> None:
-        """Replace the parameters. Without a monitor, time is then counted from the clock ``begin`` on."""
+        """Store new parameters, and the clock ``begin``, by which time is counted from now on unless there is a
+        monitor.
+        """
         self.parameters = values
         if not self.solver.interface.monitored:
             self._clock = begin

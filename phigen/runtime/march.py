@@ -1,5 +1,6 @@
-"""Long integrations that yield their rows in pieces, after each of which rows can be stored or drawn, or the run
-ended."""
+"""Long integrations that yield their rows in pieces. After each piece the caller can store or draw rows, or end the
+run.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.session import Session
 from phigen.runtime.timed import EQUAL, reached, steps_until
 
-#: A piece ends after about this time in seconds, so that the user sees progress, or at the limits of the next line.
+#: A piece ends after about _SECONDS, so that the user sees progress, or when it has _MOST_STEPS steps or _MOST_ROWS
+#: rows.
 _SECONDS = 0.2
 _MOST_STEPS, _MOST_ROWS = 1 << 20, 1 << 12
 

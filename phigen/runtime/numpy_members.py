@@ -98,7 +98,9 @@ class MemberBatch:
         self._report()
 
     def _begin_run(self, steps: int) -> None:
-        """Apply the corrector, a map at the start of a sequence of steps, if the method has one."""
+        """Apply the corrector of the method, if it has one. A corrector is a map at the start of a sequence of
+        steps.
+        """
         if hasattr(self._module, "_followed") and steps and len(self.who):
             self._before = self.x
             self.x, self._carry = self._module._followed(self._module.BEGIN, self._stages[0], self.x, self._carry)

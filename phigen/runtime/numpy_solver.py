@@ -65,7 +65,9 @@ class AttitudeState(NamedTuple):
 
 
 def _memory_name(stage: int, part: int) -> str:
-    """Return the name, in a saved session, of one of the two arrays from which a stage predicts its next solution."""
+    """Return the name that a saved session gives to one of two arrays, from which a stage predicts its next
+    solution.
+    """
     return f"memory_{stage}_{part}"
 
 
@@ -117,7 +119,7 @@ class NumpySession:
 
     def kick(self, change: Floats) -> None:
         self._stand(*self._module._sum(self._x, self._carry, change[np.newaxis]))
-        if hasattr(self._module, "_with_new_step"):  # the last step still predicts the next, from another state
+        if hasattr(self._module, "_with_new_step"):  # the last step still serves for the prediction, from the new state
             self._memory = [self._module._with_new_step(pair, 1.0) for pair in self._memory]
 
     def _stand(self, x: Floats, carry: Floats) -> None:
@@ -182,7 +184,7 @@ class NumpySession:
             self._commit(*self._attempted_step())
 
     def _run_corrected(self, steps: int) -> None:
-        """Make steps between a corrector, a map at the start of the run, and its inverse at the end.
+        """Make steps, with the corrector of the method before the first step, and its inverse after the last.
 
         If no step succeeds, or a corrector fails, the state is unchanged.
         """
@@ -426,8 +428,9 @@ class NumpySolver:
             raise BackendError("BAD_ARGUMENT", 0, x0, tuple(refused) or tuple(range(len(x0))))
 
     def _gauges(self, x0: Floats, parameters: Mapping[str, Any]) -> Floats | None:
-        """Return, for each member, the multiples of Casimirs that are subtracted from H (members, Casimirs); None if
-        there are none."""
+        """Return the multiples of Casimirs that are subtracted from H, as an array (members, Casimirs); None if there
+        are none.
+        """
         if not self.module.GAUGE:
             return None
         gauges = self.module.gauge(x0, **parameters) if self._gauge is None else self._gauge

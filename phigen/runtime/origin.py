@@ -2,8 +2,9 @@
 
 An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``, followed by the command if that is not ``phigen
 run``. It is stored in an array ``origin`` of a ``.npz``, in an attribute of a Zarr store, and in the metadata of
-figures, films and pages. A ``.csv`` has no place for metadata that all programs skip. Its origin is in the file
-``FILE-metadata.json`` beside it, where the W3C recommendation "Metadata Vocabulary for Tabular Data" puts metadata.
+figures, films and pages. A ``.csv`` cannot contain it, since some programs would read it as data. The origin of a
+``.csv`` is in the file ``FILE-metadata.json`` beside it, where the W3C recommendation "Metadata Vocabulary for Tabular
+Data" puts metadata.
 """
 
 from __future__ import annotations

@@ -109,7 +109,9 @@ def _resized(spec: Spec, run: Run, sizes: Sequence[int] | None) -> Run:
     if spec.lattice.graph:
         raise ValueError(f"{spec.name} is a graph: its bonds say how many sites there are")
     if len(sizes) != len(spec.lattice.indices):
-        raise ValueError(f"sizes must be those of the axes ({', '.join(spec.lattice.indices)}), not {tuple(sizes)!r}")
+        raise ValueError(
+            f"sizes must have one number for each axis ({', '.join(spec.lattice.indices)}), not {tuple(sizes)!r}"
+        )
     numbers = tuple(arguments.count(size, "sizes", 1, limits.SITES) for size in sizes)
     return replace(run, lattice=replace(run.lattice, sizes=numbers))
 

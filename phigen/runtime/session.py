@@ -61,7 +61,7 @@ class Followed(Course, Protocol):
 class Session(Followed, Protocol):
     """A trajectory being computed by a generated solver.
 
-    The states have the same bits, however the steps are divided into calls.
+    The states have the same bits, however the steps are divided into calls of `advance`.
     """
 
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
@@ -118,8 +118,8 @@ class Session(Followed, Protocol):
 def rows_along(
     session: Course, h: float, steps: int, stride: int, progress: Progress | None, see: Callable[[int], object] = id
 ) -> Floats:
-    """Advance a session from its start, and return the states (rows, DIM) after 0, stride, 2·stride, … steps and the
-    last.
+    """Advance a session from its start, and return the states (rows, DIM) after 0, stride, 2·stride, … and all
+    steps.
 
     ``see`` is called with the number of each row while the session is at that row. Raises `BackendError`, whose rows
     end with the state before the failing step.

@@ -289,7 +289,9 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **by_keyword: float,
     ) -> Floats:
-        """Return the state (DIM,) one step of size ``h`` after ``x`` (DIM,) at the time ``t0``. Raises `StepError`."""
+        """Return the state (DIM,) after one step of size ``h`` from the state ``x`` (DIM,) at the time ``t0``. Raises
+        `StepError`.
+        """
         beginning = self._beginning(x, "x", h, parameters, by_keyword, t0, {"seed": seed, "step0": step0})
         session = self._started(beginning)
         try:
@@ -309,11 +311,11 @@ class Solver(Named[Backend, Interface]):
         parameters: Mapping[str, float] | None = None,
         **by_keyword: float,
     ) -> tuple[Floats, Floats]:
-        """Return the state (DIM,) one step after ``x`` (DIM,), and its derivative by ``x`` (DIM, DIM).
+        """Return the state (DIM,) after one step from ``x`` (DIM,), and its derivative by ``x`` (DIM, DIM).
 
-        Row i of the derivative is the gradient of the new coordinate i. It is exact to round-off; the gauge, the
-        multiples of Casimirs that the solver subtracts from H, is held fixed. Raises `StepError`, and `TypeError` if
-        the solver was compiled without ``tangent=True``.
+        Row i of the derivative is the gradient of the new coordinate i. The derivative is exact to round-off. The gauge
+        (the multiples of Casimirs that the solver subtracts from H) is held fixed. Raises `StepError`, and `TypeError`
+        if the solver was compiled without ``tangent=True``.
         """
         beginning = self._beginning(x, "x", h, parameters, by_keyword, t0, {"seed": seed, "step0": step0})
         session = self._started(beginning)

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeTrajectory
     from phigen.spec.model import CorrelationChoice, SpectrumChoice
 
-#: Smallest number of frames for a spectrum: with fewer, the Hann window is zero everywhere.
+#: Smallest number of frames for a spectrum: with fewer, no frequencies are resolved, since the Hann window spreads a
+#: frequency over about four of them.
 LEAST_FRAMES = 4
 #: Times between frames count as equal if they differ by less than this fraction.
 _EQUAL = 1e-6
@@ -34,8 +35,8 @@ class DynamicSpectrum:
 
     ``values`` (*sizes, frequencies) are S over the wave numbers ``q`` of each of the ``axes`` and the frequencies
     ``omega``. Wave numbers are in radians per site, in ascending order from −π; frequencies are ascending too. A wave
-    cos(qr − ωt) contributes at (q, ω) and (−q, −ω). The sum of all values is the mean of Σ f² over sites and time,
-    weighted with the window in time.
+    cos(qr − ωt) contributes at (q, ω) and (−q, −ω). The sum of all values is the mean over sites and times of Σ f², the
+    sum over the coordinates; the window in time weights this mean.
     """
 
     q: tuple[Floats, ...]
@@ -137,7 +138,7 @@ def spectrum(run: LatticeTrajectory, of: Sequence[str], *, after: float | None =
     fields = [_index(run, name) for name in ([of] if isinstance(of, str) else of)]
     _expect_grid(run, "a spectrum")
     if not fields:
-        raise ValueError("a spectrum is of one coordinate or more")
+        raise ValueError("a spectrum needs one coordinate or more")
     frames = equal_times(run.t, run.h, after)
     first, count, sizes = len(run.t) - len(_later(run.t, run.h, after)), len(frames), run.x.shape[2:]
     expect_room("the transform of the frames", 3 * 16 * count * int(np.prod(sizes)))
@@ -209,7 +210,9 @@ def expect_frames(t: Floats, h: float, after: float | None) -> None:
 
 
 def _later(t: Floats, h: float, after: float | None) -> Floats:
-    """Return those of the times ``t`` that are not before ``after``, in the direction of the run, which h gives."""
+    """Return those of the times ``t`` that the run reaches at the time ``after`` or later; if h < 0, these are smaller
+    times.
+    """
     sign = np.sign(h)
     return t if after is None else t[sign * t >= sign * after - 1e-9 * abs(h)]
 
@@ -223,4 +226,4 @@ def _index(run: LatticeTrajectory, name: str) -> int:
 def _expect_grid(run: LatticeTrajectory, argument: str) -> None:
     interface = run.solver.interface
     if interface.graph or interface.pairs:
-        raise ValueError(f"{argument} is along the axes of a grid, and {interface.name} has none")
+        raise ValueError(f"{argument} needs the axes of a grid, and {interface.name} is not a grid")

@@ -18,7 +18,8 @@ from phigen.targets.header import plain
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n[^"]*?(?:\\n(\d+) bytes \((\w+(?:,\w+)?)\))?"')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _HINT = "gcc of version 10 or later, or one named in the environment variable CC, such as CC=arm-none-eabi-gcc"
-#: Names that gcc gives to calls through a pointer, and to functions of OpenMP that call others through a pointer.
+#: Names in gcc's call graph of calls through a pointer, and of functions of OpenMP that call functions through a
+#: pointer.
 _BY_POINTER = ("__indirect_call", "GOMP_")
 _TIMEOUT = 300.0  # time limit of a command of the compiler, in seconds
 
@@ -112,7 +113,8 @@ def _output(command: Sequence[str], folder: Path | None = None) -> str:
 
 
 def _plain(title: str) -> str:
-    """Return the name of a function from its title in gcc's call graph, which begins with a file name if it is static.
+    """Return the name of a function from its title in gcc's call graph. Titles of static functions begin with a file
+    name.
 
     Names such as ``f.part.0``, which gcc gives to parts and copies of a function f, remain.
     """

@@ -196,8 +196,9 @@ def moved_on(session: C, h: float, span: float) -> C:
 
 
 def whole_steps(h: float, span: float) -> int:
-    """Return the number of whole steps in a span of time. A last step that ends after the span only by rounding
-    counts."""
+    """Return the number of whole steps that fit into a span of time. The last step may exceed the span by rounding
+    errors.
+    """
     ratio = span / h
     return round(ratio) if abs(ratio - round(ratio)) <= 1e-12 * max(1.0, abs(ratio)) else max(0, int(np.floor(ratio)))
 

@@ -100,11 +100,12 @@ class Trajectory:
         return self.x[:, self.coordinates.index(coordinate)]
 
     def at(self, times: ArrayLike) -> Floats:
-        """Return the states (times, DIM) at given times, computed by steps of the same method from the nearest row.
+        """Return the states (times, DIM) at given times, computed by steps of the same method from the nearest
+        row.
 
-        States are not interpolated: the last step to a time is as long as the time that remains, so the Casimirs keep
-        their values. With noise, the times must be times of rows. Raises `ValueError` for other times and for times
-        outside of the range of t, and `StepError` if a step fails.
+        States are not interpolated: a shorter last step ends at the given time, so the Casimirs keep their values. With
+        noise, the times must be times of rows. Raises `ValueError` for other times and for times outside of the range
+        of t, and `StepError` if a step fails.
         """
         if self.solver is None:
             raise TypeError("this trajectory was not made by a solver of phigen")

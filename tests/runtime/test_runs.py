@@ -144,7 +144,7 @@ def test_lattice_runs_at_its_sizes_and_at_others(target):
     assert other.x.shape == (2, 2, 16)
     assert other.parameters["k"] == 0.5
     assert other.parameters["B"].shape == (16,)
-    with pytest.raises(ValueError, match="sizes must be those of the axes"):
+    with pytest.raises(ValueError, match="sizes must have one number for each axis"):
         solver.run(sizes=[4, 4])
 
 

@@ -176,8 +176,9 @@ class DeviceSolver:
             frames[1 : rows + 1, part] = stored_rows.transpose(0, 2, 1)
 
     def _kernels(self, *, common: bool) -> Kernels:
-        """Return the compiled kernels: for members that all have the same coefficients (``common``), or coefficients of
-        their own."""
+        """Return the compiled kernels for members that share their coefficients (``common``) or, otherwise, each have
+        their own.
+        """
         if common not in self._compiled:
             defined = {**self._group(), **self.defined, **({f"{self.interface.name}_COMMON": 1} if common else {})}
             self._compiled[common] = Kernels(self.device, self._header, self.interface.name, defined)
@@ -260,7 +261,7 @@ class DeviceSolver:
         first: Floats | None = None,
         draws: Draws = FIRST_DRAWS,
     ) -> Session:
-        """Return a session at x0, a trajectory that the host computes, since the device only integrates ensembles."""
+        """Return a session at x0, which the host computes: the device only integrates ensembles."""
         return self._host.start(x0, parameters, t0, first, draws)
 
     def restored(self, saved: bytes, parameters: Mapping[str, float]) -> Session:

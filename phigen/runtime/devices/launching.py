@@ -15,7 +15,7 @@ from phigen.runtime.interface import Floats
 #: Number of values that a work item adds, or reduces otherwise, in one pass. It alone decides the order of sums.
 _REDUCED = 64
 
-#: Numbers by which kernels receive a reduction. A mean is a sum that is divided afterwards.
+#: Numbers that tell a kernel how to reduce values. A mean is computed as a sum, and divided afterwards.
 _KINDS = {"sum": 0, "mean": 0, "product": 1, "max": 2, "min": 3}
 
 

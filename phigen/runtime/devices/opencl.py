@@ -108,9 +108,10 @@ def device(index: int | None = None) -> OpenCLDevice:
 
 
 def count() -> int:
-    """Return the number of devices of the type (card, processor, …) of the first; sweeps divide their work among these.
+    """Return the number of devices of the same type (card, processor, …) as the first device.
 
-    Raises `MissingPackageError` without pyopencl, `DeviceError` without a driver or a device.
+    A sweep divides its work among these devices. Raises `MissingPackageError` without pyopencl, `DeviceError` without a
+    driver or a device.
     """
     kinds = [d.type for d in _listed(_library())]
     return kinds.count(kinds[0])
