@@ -83,7 +83,7 @@ def square(x: Ball) -> Ball:
 
 
 def top(values: Iterable[Ball]) -> Ball:
-    """Return an interval that contains the maximum of any numbers taken from the given intervals."""
+    """Return an interval that contains the maximum of any numbers, one from each of the given intervals."""
     return reduce(arb.max, values)
 
 
@@ -176,7 +176,7 @@ class Evaluation:
             for k in range(output, -1, -1):
                 for i, slope in self.slopes[k] if not row[k].is_zero() else ():
                     row[i] += row[k] * slope
-            demand(all(row[k].is_zero() for k in self.kinks), "a size is differentiated")
+            demand(all(row[k].is_zero() for k in self.kinks), "the derivative of an absolute value or maximum is used")
             rows.append(row)
             errors.append(sum((mag(d) * e for d, e in zip(row, self.error, strict=False) if not e.is_zero()), ZERO))
         read = [[self.inputs.get((name, i), len(self.x)) for i in range(count)] for name, count in by.items()]
@@ -327,7 +327,7 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
     noise = 2 * (residual_error(reach) + A_size * Y * U * solves)
     q, shaken, share = stalling(stage, each(mag, identity(m) - A * M.inv()), noise, low, high)
     e, rest = column([ZERO] * m), column([ZERO] * m)
-    # Each rule that ends the iteration limits a correction ("now"), the one before, or the ratio of both ("part").
+    # Each rule that ends the iteration limits the last correction ("now"), the one before it, or their ratio ("part").
     for stop in stage["stops"]:
         errors = [worst_of(share * stop["now"] / stop.get("rate", 1))] if "now" in stop else []
         before = [share * stop["before"]] if "before" in stop else []
@@ -347,11 +347,11 @@ def solved(c: Any, stage: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Matrix, ..
 
 
 def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matrix) -> tuple[Ball, Ball, Ball]:
-    """Return how corrections shrink in the norm of the C: the contraction rate, the noise of rounding, a factor of the
-    norm.
+    """Return contraction rate and rounding noise of the corrections in the norm of the C, and 2-norm / norm of
+    the C.
 
-    ``factor`` bounds one correction by the correction before. The norm is the root mean square over the stages of a
-    Gauss method, and the maximum for other methods.
+    ``factor`` bounds one correction by the correction before. The norm of the C is the root mean square over the stages
+    of a Gauss method; for other methods it is the maximum, and the third result is 1.
     """
     m, share = len(stage["equation"]), arb(stage["share"] or 1).sqrt()
     scaled = [[factor[i, j] * high[j, 0] / high[i, 0] for j in range(m)] for i in range(m)]

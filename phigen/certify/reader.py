@@ -109,7 +109,7 @@ class KernelReader:
                 raise RefusedError(f"the C has the statement {statement!r}, which certificates do not cover")
 
     def _index(self, e: ast.expr) -> int:
-        """Append the operations of an expression, unless its value exists, and return the index of the last one."""
+        """Append those operations of an expression that are not in the list yet, and return the index of its value."""
         match e:
             case ast.Constant(str(text)):
                 return self._operation("number", float(text))
@@ -280,7 +280,8 @@ def read(text: str, name: str) -> dict[str, Any]:
     return {"kind": kind, "fractions": fractions, "middles": middles, **facts, "kernels": kernels, "series": series}
 
 
-#: Names of C functions that are read, by kind of step. A solver is of this kind if it has the last function.
+#: Names of C functions that are read, by kind of step. The kind of a solver is the first one whose last function the C
+#: has.
 _FUNCTIONS = {
     "path": ("prepare", "generate", "path_begin", "path_order"),
     "newton": ("prepare", "linearise"),
@@ -408,7 +409,7 @@ def _moves(source: GeneratedC, flow: int) -> list[list[int]]:
     _, body = _expect(source.function(f"flow{flow}"), f"flow{flow}")
     changes = re.findall(r"add\(x, displacement, start, (\d+), change\[(\d+)\]\);", body)
     if len(changes) != body.count(";") - 2:
-        raise RefusedError(f"flow {flow} of the C does more than to add its changes")
+        raise RefusedError(f"flow {flow} of the C does more than add its changes")
     return [[int(i), int(j)] for i, j in changes]
 
 

@@ -15,7 +15,7 @@ from phigen.certify.reader import GeneratedC, PathReader
 #: the rounding error of one addition, at most 1 of these units, with a margin.
 CARRY = 1.01
 
-#: Smallest contraction rate that certificates assume where the C estimates it, to decide when the iteration for a Gauss
+#: Least contraction rate that certificates assume. The C estimates this rate to decide when the iteration for a Gauss
 #: step ends. In runs of the corpus the rate is between 0.05 and 0.5.
 LEAST_RATE = 0.05
 
@@ -89,9 +89,10 @@ class _Gauge(_Parameters):
 
 
 def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int]:
-    """Append the operations that compute the coefficients of a stage or of a row of flows; return their indices.
+    """Append the operations that compute the coefficients of a stage or of a row of flows; return their
+    indices.
 
-    They depend on parameters, step size and time.
+    The coefficients depend on parameters, step size and time.
     """
     step = listing.input("constant", "step")
     h = step
@@ -258,7 +259,9 @@ def _path(
 
 
 def _series(facts: Mapping[str, Any], kernel: Any, listing: Listing, k: int, x: Sequence[int], u: Sequence[int]) -> Any:
-    """Append the Taylor series of a path from x for p = u; return, for each coordinate, its terms from order 1 on."""
+    """Append the Taylor series of the path ṁ = π(m)p from x with p = u; return the terms of each coordinate from order
+    1 on.
+    """
     starts = {f"s{i}": [j] for i, j in enumerate(x)}
     outputs = listing.copy(kernel, coef=prepared(facts, listing, k), p=u, **starts)
     return [outputs[f"s{i}"] for i in range(len(x))]

@@ -39,7 +39,7 @@ PLATFORMS = {
     )
 }
 
-#: Compiler flags. Without fused multiply-add, results on different platforms differ only by their libm. Only the
+#: Compiler flags. Without fused multiply-add, results differ between platforms only because their libm differ. Only the
 #: functions of FMI are exported, and debugging symbols are removed.
 FLAGS = ("-ffp-contract=off", "-fvisibility=hidden", "-s")
 

@@ -27,7 +27,7 @@ from phigen.symbolic.verdict import REFUTED
 if TYPE_CHECKING:
     from phigen.lattice.lattice_system import LatticeSystem
 
-#: Hint in the error for brackets for which no exact Poisson map is known.
+#: Hint of the error message for brackets without exact steps.
 TRUNCATION_HINT = 'structure="to truncation" takes every bracket; its steps are no Poisson maps'
 
 

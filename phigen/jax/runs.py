@@ -175,7 +175,9 @@ def _derived_twice(*_: Any) -> Any:
 
 
 class _Axes:
-    """Numbers of axes that arguments have without `vmap`, from which the axes that `vmap` adds in front are found."""
+    """Finds the axes that `vmap` adds in front of arguments, from the numbers of axes that the arguments have without
+    `vmap`.
+    """
 
     def __init__(self, runs: Propagation, x0: Any, parameters: Mapping[str, Any]) -> None:
         self._leading = x0.ndim - runs.axes

@@ -66,9 +66,11 @@ def check(compilation: Compilation) -> Iterator[Statement]:
 
 
 def _series_statements(attitude: Attitude, compilation: CompiledSeries) -> Iterator[Statement]:
-    """Yield the statements for a step from the series S_1, S_2, …: on the attitude increment, and on its rate ∇S_1."""
+    """Yield the statements for a step from the series S_1, S_2, …: those on the attitude increment, and one on its rate
+    ∇S_1.
+    """
     system, group, chart = compilation.system, attitude.group, compilation.realisation
-    # With forces, α and β are taken at p = ∇S_h + hζ, but the attitude increment is that of ∇S_h alone.
+    # With forces, α and β are evaluated at p = ∇S_h + hζ, but the attitude increment is that of ∇S_h alone.
     pushed = system.forces is not None and any(not z.is_zero for z in system.forces.covector)
     if group.matrices:
         yield from _matrix_statements(system, chart, attitude)
@@ -134,10 +136,11 @@ def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: E
 
 
 def path_statement(system: System, group: Group) -> Statement:
-    """Return the statement that a momentum is constant along the path ṁ = π(m)p with ġ = g·p or ġ = p·g.
+    """Return the statement that the momentum Ad*_g m is constant along the path ṁ = π(m)p, whose ends are α and
+    β.
 
-    It is the momentum in space if m is the momentum in the body, and the momentum in the body if m is that in space. α
-    and β are the ends of such a path.
+    If m is the momentum in the body, ġ = g·p, and Ad*_g m is the momentum in space. If m is the momentum in space, ġ =
+    p·g, and Ad*_g m is the momentum in the body.
     """
     m, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
     slope = hamiltonian_vector_field(system.poisson, p)
@@ -159,9 +162,10 @@ def path_statement(system: System, group: Group) -> Statement:
 
 
 def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) -> Iterator[Statement]:
-    """Yield the statements on the attitude for a splitting H = Σ H_k: each ∇H_k is constant along the flow of H_k.
+    """Yield the statements on the attitude for a splitting H = Σ H_k: each ∇H_k is constant along the flow of
+    H_k.
 
-    A last statement says that the parts add up to H, with Casimirs that were subtracted from H.
+    The last statement says that the sum of all parts, and of the Casimirs that were subtracted from H, is H.
     """
     system, splitting, group = compilation.system, compilation.splitting, attitude.group
     elements = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
@@ -198,8 +202,8 @@ def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) ->
 
 
 def _stays(system: System, turning: Turning) -> Iterator[tuple[str, Expression]]:
-    """Yield the rates of the coordinates of free rigid bodies along flows of those terms that a part has besides the
-    bodies.
+    """Yield the rates of the coordinates of free rigid bodies along the flows of the other terms of the same
+    part of H.
 
     All rates must be 0.
     """
@@ -224,7 +228,7 @@ def exponential_statement(system: System, group: Group, turning: Turning, name: 
     """Return the statement that each factor 1 + E of the attitude increment solves dE/dt = (1 + E)P with E = 0 at t =
     0.
 
-    P is the matrix of ∇H_i for that term H_i of the Hamiltonian to which the factor belongs.
+    Each factor belongs to a term H_i of the Hamiltonian; P is the matrix of ∇H_i.
     """
     residuals = []
     for factor, factor_element in zip(turning.factors, factor_elements(system, group, turning), strict=True):
@@ -236,9 +240,10 @@ def exponential_statement(system: System, group: Group, turning: Turning, name: 
 
 
 def _matrix_statements(system: System, chart: BiRealisation, attitude: Attitude) -> Iterator[Statement]:
-    """Yield two statements for attitudes that are matrices: they represent the bracket, and the increment belongs to p.
+    """Yield the statements for attitudes that are matrices: the matrices of the group represent the bracket, and the
+    attitude increment is the exponential, or the Cayley transform, of the matrix of p.
 
-    The increment must be the exponential, or the Cayley transform, of p.
+    The second statement is left out if steps follow paths.
     """
     algebra = system.lie_algebra
     assert algebra is not None
@@ -284,10 +289,10 @@ def ends_statement(system: System, beta: Vector) -> Statement:
 
 
 def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: Vector, beta: Vector) -> Statement:
-    """Return the statement Ad*_g₁ β = Ad*_g₀ α: the increment, the Cayley transform τ of the matrix P, conserves
-    momentum.
+    """Return the statement Ad*_g₁ β = Ad*_g₀ α: the attitude increment τ conserves momentum.
 
-    It is decided on the elements (1 ± P/2) E_i (1 ∓ P/2), where E_i are the matrices of the basis.
+    τ is the Cayley transform of the matrix P. The statement is decided on the elements (1 ± P/2) E_i (1 ∓ P/2), where
+    E_i are the matrices of the basis.
     """
     p, n = covector_symbols(system.coordinates), range(algebra.dimension)
     sign = 1 if group.spatial else -1
@@ -313,12 +318,12 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
 def element_statements(
     group: Group, group_element: Vector, p: Vector, start: Vector, end: Vector, *, cayley: bool, positive: Sequence[str]
 ) -> Iterator[Statement]:
-    """Yield two statements on the attitude increment ``group_element``: it is the element of p, and it conserves
+    """Yield two statements on the attitude increment ``group_element``: it is exp(p), and it conserves
     momentum.
 
-    It conserves the momentum in space if x is the momentum in the body, and the momentum in the body if x is that in
-    space. ``start`` and ``end`` are the states before and after a step; the attitude before the step is any quaternion.
-    With ``cayley`` the element is the Cayley transform of p, else its exponential.
+    With ``cayley`` the increment is the Cayley transform of p instead. If x is the momentum in the body, the momentum
+    in space is conserved; if x is the momentum in space, the momentum in the body. ``start`` and ``end`` are the states
+    before and after a step; the attitude before the step is any quaternion.
     """
     covectors = [p[i] for i in group.rotation], [p[i] for i in group.translation]
     increment = direction(*covectors, cayley=cayley)

@@ -73,7 +73,8 @@ class OutOfTimeError(BaseException):
 
 
 def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Agreement]:
-    """Yield comparisons of both derivations: of S_1 … S_``terms`` (by default of the method), then of ∇S_h, α and β.
+    """Yield comparisons of both derivations: of S_1 … S_``terms``, by default all terms of the method, then of ∇S_h, α
+    and β.
 
     ∇S_h of the program is compared only if no further S_i is needed for it. If steps follow paths, α and β have no
     closed form, and are compared only through the S_i. Raises `LimitError` after ``seconds``, or if a polynomial has
@@ -239,7 +240,8 @@ class _Derivation:
     def _at_origin(self) -> list[Pair]:
         """Return the pairs to compare for α(x, 0) = x and β(x, 0) = x.
 
-        The comparison of Taylor coefficients of positive degree in p does not include this.
+        These equations are compared separately, since otherwise only Taylor coefficients of positive degree in p are
+        compared.
         """
         chart, origin = self._compilation.realisation, dict.fromkeys(self._dictionary.covector, 0)
         return [

@@ -14,9 +14,10 @@ from phigen.symbolic.verdict import REFUTED, Statement
 
 
 def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
-    """Return the statements on a lattice, by group: on π, Casimirs, forces, noise, invariants, and pair interactions.
+    """Return the statements on a lattice, by group: on π, Casimirs, forces, noise, invariants, and pair
+    interactions.
 
-    The other groups are missing if a statement on π is refuted.
+    If a statement on π is refuted, only the group on π is returned.
     """
     groups = {"Poisson tensor": proofs.tensor(cell)}
     if any(s.verdict == REFUTED for s in groups["Poisson tensor"]):
