@@ -22,8 +22,8 @@ from phigen.spec.model import Run
 #: Default number of blocks for the standard error. With 20 blocks, the standard error itself has a
 #: relative standard deviation of 1/sqrt(2·19) = 0.16.
 BLOCKS = 20
-#: Least length of blocks, in correlation times τ, for a reliable error. Means of blocks of length L give 1 − τ/L times
-#: the true variance of the mean; at this length they underestimate it by 10 %.
+#: Least length of blocks for a reliable error, in correlation times τ. The variance of the mean is estimated from
+#: blocks; with blocks of length L the estimate is 1 − τ/L times the true variance. At this length it is 10 % too small.
 LEAST_LENGTH = 10.0
 #: An observable counts as conserved, up to the error of the method, if its values differ by less than this fraction of
 #: their size. Then its mean counts as resolved, whatever the length of the blocks.
@@ -36,7 +36,8 @@ class Average:
 
     ``error`` is the standard error of the mean, NaN if there are fewer than two blocks. ``correlation_time`` is the
     integrated autocorrelation time in the time unit of the run. Error and correlation time are estimated from blocks.
-    ``resolved`` says that the blocks are much longer than the correlation time; otherwise both estimates are too small.
+    ``resolved`` says that the blocks are much longer than the correlation time; otherwise the error and the correlation
+    time are too small.
     """
 
     mean: float

@@ -98,11 +98,12 @@ def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, strid
 def pieces_of(
     method: str, field: Field, x0: Floats, h: float, rows: Iterable[float]
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Yield the rows of a run in parts: arrays of step numbers (rows,) and of the states (rows, DIM) at these steps.
+    """Yield the rows of a run in parts: arrays of step numbers (rows,), and of states (rows, DIM) at these
+    steps.
 
-    ``rows`` are the increasing step numbers, from 0 on, at which states are wanted. A number may have a fraction: that
-    state is computed by a shorter step from the last whole step, and the run continues from the whole step. If the
-    method fails, the run ends with the last finite row.
+    ``rows`` are the requested step numbers, increasing, from 0 on. A number may have a fraction: then the state is
+    computed by a shorter step from the last whole step, and the run continues from the whole step. If the method fails,
+    the run ends with the last finite row.
     """
     step, _ = METHODS[method]
     x = np.array(x0, dtype=np.float64)

@@ -21,7 +21,8 @@ from phigen.symbolic.expression import Expression
 #: Names of the three quantities that are reported for the energy: the energy if it is conserved; otherwise the energy
 #: minus the work done, or, if the work is not computed, the change of the energy.
 ENERGY, BALANCE, CHANGE = "energy", "energy balance", "change of the energy"
-#: Largest number of steps times sites of a run whose work is integrated: this repeats the run step by step.
+#: The work done along a run is integrated if the number of steps times the number of sites is at most this, because the
+#: integration repeats the run step by step.
 MAX_BALANCED_SITE_STEPS = 20_000_000
 
 

@@ -82,7 +82,7 @@ def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any]
 
 
 def _field(spec: Spec, name: str) -> LatticeSolver:
-    """Return a solver of the lattice whose vector field is σ π∇g, that of a noise source of the spec."""
+    """Return a solver of the lattice. Its vector field is σ π∇g, the term of the noise source ``name``."""
     source = spec.noise[name]
     quiet = replace(spec, hamiltonian=source.amplitude * source.hamiltonian, noise={}, forces=SpecForces(), order=2)
     quiet = replace(quiet, casimirs={}, invariants={}, runs={}, terms=None, composition="auto", scheme="auto")

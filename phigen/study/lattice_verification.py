@@ -34,8 +34,8 @@ from phigen.symbolic.arrays import Floats, evaluate
 MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
 #: Limit for the ratio of the largest energy error in the last quarter of a run to that in the first three quarters.
 GROWTH = 4.0
-#: Largest accepted relative errors of the Poisson identity on a small lattice, and of its tangent map against finite
-#: differences of order 6.
+#: Largest accepted relative errors on a small lattice. IDENTITY: of the Poisson identity. DIFFERENCES: of tangent maps,
+#: compared with finite differences of order 6.
 IDENTITY, DIFFERENCES = 1e-12, 1e-9
 #: Largest number of sites for which gradients are measured on the whole lattice.
 MOST_GRADED = 16384
@@ -45,7 +45,7 @@ MAX_ROUNDING = 1e-11
 SOME = (32, 6, 4)
 #: Number of Wiener paths in measurements of the strong order, counted over all sites, with ``quick`` and without.
 FEW_PATHS, MANY_PATHS = 32, 96
-#: Sentence below the table of results on the errors of Casimirs at every site.
+#: Sentence on the errors of Casimirs, printed below the table of results.
 WORST_SITE = "The error of a Casimir at every site is that at the site where it changed most."
 
 
@@ -163,8 +163,8 @@ def _without_noise(subject: _Subject) -> _Subject:
 def _order(subject: _Subject, *, quiet: bool = False) -> Check:
     """Return the check of the observed order of a lattice.
 
-    The order follows from two step sizes, one half of the other, with the smallest errors that are larger than
-    rounding. ``quiet`` says that the noise of the spec was removed.
+    The order is the logarithm, to the base 2, of the quotient of the errors with steps h and h/2. Of several h, the one
+    with the smallest errors that exceed rounding counts. ``quiet`` says that the noise of the spec was removed.
     """
     name = "observed order, without the noise" if quiet else "observed order"
     step = subject.compilation.program.step.swept
@@ -367,7 +367,7 @@ def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> 
 
 
 def _few_sizes(subject: _Subject) -> list[int]:
-    """Return sizes of a small lattice that the solver accepts, and on which its boundary seams are those of the run."""
+    """Return sizes of a small lattice. The solver accepts them, and the lattice has the boundary seams of the run."""
     interface = subject.solver.interface
     least = 3 if len(interface.axes) < 3 else 2
     if subject.compilation.cell.relation == PAIRS:  # if all sites interact, each site of the run is taken at most once
@@ -439,7 +439,8 @@ class _SmallLattice:
 
 
 def _with_finite_brackets(cell: Cell, small_lattice: _SmallLattice) -> tuple[_SmallLattice, str]:
-    """Return the lattice, in which values 0 of parameters that make π infinite are replaced; and a note on them.
+    """Return the lattice, and a note on replaced parameters: those that make π infinite because their value is
+    0.
 
     The note, such as ", m = 0.1 for 0", is added to the name of a check; it is "" if nothing was replaced.
     """
@@ -477,8 +478,8 @@ def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Fl
 def _picked(cell: Cell, start: Start, sizes: Sequence[int]) -> Any:
     """Return the numbers of random sites of the run, from which the sites of a small lattice are taken.
 
-    If all sites interact in pairs, they are the first site and other sites, without repetition and in their order:
-    relative coordinates of bodies depend on the order, and the first body must have a mass.
+    If all sites interact in pairs, the first site of the run is always among them, no site is taken twice, and their
+    order is that of the run: relative coordinates of bodies depend on the order, and the first body must have a mass.
     """
     sites, count = int(np.prod(start.sizes)), int(np.prod(sizes))
     if cell.relation == PAIRS:

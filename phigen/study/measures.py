@@ -25,16 +25,18 @@ ROUGH = 1e-8
 #: Relative displacement of a coordinate, from which the effect of rounding errors of the state on π is estimated.
 _SHARE = 1e-6
 
-#: Numbers of steps, 4, 6, 8, 12, 16, 24, …, for measurements of the order; the number after the next is the double.
+#: Numbers of steps for measurements of the order: 4, 6, 8, 12, 16, 24, … For most numbers the list has the double too.
 _REFINEMENTS = tuple(f * 2**k for k in range(9) for f in (4, 6))
 
 
 @dataclass(frozen=True)
 class Observed:
-    """Observed order: the median slope of the last three halvings of the step in the asymptotic range, else NaN.
+    """Observed order of a method, with the errors from which it follows.
 
-    ``pairs`` lists step sizes with errors relative to the solution, ``floor`` is the error of the reference solution.
-    ``exact`` says that no error is larger than the floor.
+    ``order`` is log₂(error with step h/error with step h/2), the median for the three smallest steps in the asymptotic
+    range; NaN if no steps are in this range. ``pairs`` lists step sizes with errors relative to the solution, ``floor``
+    is the error of the reference solution or of rounding. ``exact`` says that all errors are so close to the floor that
+    no order can be observed.
     """
 
     order: float

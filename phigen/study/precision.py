@@ -19,8 +19,8 @@ COARSER, FINER = 6, 7
 #: ROUNDS: number of repetitions of a measurement of time, of which the fastest counts. LEAST_SECONDS: least duration of
 #: a repetition, which may contain several runs. MOST_SECONDS: a run that takes longer is the last one of its method.
 ROUNDS, LEAST_SECONDS, MOST_SECONDS = 5, 2e-3, 0.05
-#: Numbers of steps of the part of the run that is studied. They are tried in this order until the order of the solver
-#: is visible, since in long parts the errors may grow too fast.
+#: Only the beginning of a run is studied. These numbers of steps are tried for it in this order until the errors show
+#: the order of the solver, because the errors may grow too fast in a long run.
 SPANS = (4096, 256, 16)
 #: The order is determined from errors between ABOVE_FLOOR times the error of the reference, and ASYMPTOTIC.
 ABOVE_FLOOR, ASYMPTOTIC = 30.0, 0.02
@@ -129,9 +129,11 @@ def error_of(state: Floats, target: Floats) -> float:
 
 
 def slope(errors: Mapping[int, float], floor: float) -> float:
-    """Return the observed order from ``errors`` by the number of steps; NaN if no errors are in the asymptotic range.
+    """Return the observed order, from the ``errors`` by number of steps.
 
-    It is the median of log₂ of the quotients of errors for the last three halvings of the step in that range.
+    The order is log₂ of the quotient of the errors with n and 2n steps, the median for the three largest n in the
+    asymptotic range, where errors are neither rounding errors nor very large. It is NaN if this range contains no such
+    n.
     """
     # If the error grows from one number of steps to the next, it is rounding error.
     floor = max([floor, *(b for a, b in pairwise(errors.values()) if a < b and a < SMALL)])

@@ -23,8 +23,8 @@ WINDOWS = 10
 
 #: Entry for the largest error in a window without rows.
 _NOTHING = -1.0
-#: Windows are compared only if each coordinate that has turning points in the run has at least this number of them, one
-#: oscillation, in the first window.
+#: Windows are compared only if the first window contains an oscillation of each coordinate that oscillates. The
+#: coordinate must have at least this number of turning points in the window.
 _TURNS = 2
 
 
@@ -119,8 +119,8 @@ class Watch:
             "broken": np.zeros((), dtype=bool),
         }
         self._powers = powers(system)
-        # instant: the last time, and the power with its derivatives there; work: the work so far, and its estimated
-        # error
+        # instant: the last time, and at this time the power and its derivatives. work: the work so far, and its
+        # estimated error.
         if self._powers:
             self.state |= {"instant": np.full(1 + len(self._powers), np.nan), "work": np.zeros(2)}
             self.state |= {"change": np.zeros(())}
@@ -168,7 +168,7 @@ class Watch:
         for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
             with np.errstate(invalid="ignore"):  # no warning if the initial value is not finite: then errors are NaN
                 np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
-        if self._powers:  # work is 0 at the start, so that "start" is the initial energy for the change of H too
+        if self._powers:  # the work at the start is 0, so that state["start"] has the initial H
             changes = self._units()[0].errors(energies, float(state["start"][0]))
             state["change"] = np.maximum(state["change"], np.max(changes))
         self._see_turns(x, windows)

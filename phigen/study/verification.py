@@ -32,8 +32,8 @@ from phigen.symbolic.expression import Expression
 ORDER_SLACK = 0.3
 #: An observed strong order may be smaller than the stated one by at most this. It is measured on few paths.
 STRONG_SLACK = 0.2
-#: The observed power of h for the modified Hamiltonian may be too small by at most this fraction of the increase that
-#: its last correction should bring.
+#: With its last correction, the modified Hamiltonian should be constant up to a higher power of h than without it. The
+#: observed power may be too small by at most this fraction of the increase.
 MODIFIED_SLACK = 0.6
 #: Largest accepted error of exact properties of a step, relative to their terms: Poisson defect, reversibility,
 #: agreement of targets.
@@ -503,9 +503,10 @@ def single_checks(
 
 
 def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
-    """Yield the checks that changes of H̃ with m corrections decrease like h^(p+m), or h^(p+2m) if symmetric.
+    """Yield the checks that changes of H̃ with m corrections decrease like h^(p+m).
 
-    H̃ is the modified Hamiltonian of the method, p its order. There are no checks if H̃ is not available.
+    H̃ is the modified Hamiltonian of the method, p its order. For symmetric methods the power is p + 2m. There are no
+    checks if H̃ is not available.
     """
     try:
         series = backward.modified(subject.compilation, subject.parameters, gauge)

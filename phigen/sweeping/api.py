@@ -133,9 +133,10 @@ def _run_of(
 
 
 def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fraction]:
-    """Return the values of ``parameters``, the argument for parameters with one value for all members, as fractions.
+    """Return ``parameters``, the values of parameters that are the same for all members, as fractions.
 
-    Raises the errors of wrong arguments, and `ValueError` for values that violate the bound of a parameter.
+    Raises `TypeError` or `ValueError` for wrong names or values, among them values that violate the bound of a
+    parameter.
     """
     arguments.expect_known(parameters, {p.name: 0.0 for p in spec.parameters})
     values = {name: arguments.number(value, f"parameter {name!r}") for name, value in parameters.items()}

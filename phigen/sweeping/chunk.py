@@ -1,6 +1,7 @@
-"""Work of a process of a sweep on one chunk of members: integrate them, evaluate the results, and store these.
+"""Computation of one chunk of members of a sweep: the runs, their results, and the entries in the store.
 
-The process receives the path of the store and the number of the chunk. The store contains the solver and the plan.
+This is the work of a process, which receives the path of the store and the number of the chunk. The store contains the
+solver and the plan.
 """
 
 from __future__ import annotations
@@ -91,8 +92,8 @@ def _exclusive_lock(name: str) -> Iterator[None]:
 def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Floats]:
     """Return the results and the statuses of members, as arrays (members, …) by the name of the result.
 
-    ``varied`` has their values of the varied quantities. ``numbers`` are their numbers in the sweep, by which each has
-    its own path of the noise.
+    ``varied`` has the values of the varied quantities for the members. ``numbers`` are the numbers of the members in
+    the sweep; each number selects a path of the noise.
     """
     plan, count = job.plan, len(numbers)
     # A value that all members have in common gets the shape (), so that the solver computes coefficients of steps once.

@@ -34,8 +34,9 @@ class SweepError(PhigenError):
 def connected(scheduler: str | None, workers: int) -> Iterator[tuple[Any, int]]:
     """Return a context that yields a Dask client, and the number of threads of its workers.
 
-    The client is one of the cluster at the address ``scheduler`` or, if it is None, of ``workers`` processes of this
-    machine, which end with the context. Raises `SweepError` if no scheduler answers.
+    The client belongs to the cluster at the address ``scheduler``. If ``scheduler`` is None, it belongs to a new
+    cluster of ``workers`` processes of this machine, which end with the context. Raises `SweepError` if no scheduler
+    answers.
     """
     distributed, dask = imported("distributed"), imported("dask")
     if scheduler is not None:

@@ -100,9 +100,9 @@ def _body(text: str) -> str:
 
 
 def _differences_of_run(job: store.Job, plan: Plan, spec: Spec) -> list[str]:
-    """Return phrases for differences in the settings of the run that a plan does not contain.
+    """Return phrases for differences in those settings of the run that are not in the plan.
 
-    Workers read these settings from the spec: the section, and the initial state and arrays of a lattice.
+    They are the section, and the initial state and arrays of a lattice; workers read them from the spec.
     """
     if "crossings" not in plan.keep and not plan.sizes:
         return []

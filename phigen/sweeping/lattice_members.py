@@ -64,8 +64,8 @@ def _start(job: Job, draw: int) -> Start:
 def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Any]:
     """Return the results and the statuses of members, as arrays (members, …) by the name of the result.
 
-    ``varied`` has their values of the varied quantities. ``numbers`` are their numbers in the sweep, by which each has
-    its own path of the noise.
+    ``varied`` has the values of the varied quantities for the members. ``numbers`` are the numbers of the members in
+    the sweep; each number selects a path of the noise.
     """
     plan, count, shape = job.plan, len(numbers), (len(job.plan.coordinates), *job.plan.sizes)
     results: dict[str, Any] = {"status": np.full(count, _REFUSED, dtype=np.uint8)}

@@ -29,9 +29,10 @@ class Plan:
 
     ``initial``, ``h``, ``t0`` and ``parameters`` are the values of quantities that are not varied. ``axes`` are the
     ranges of the varied quantities; values along axes without a size are drawn at random with ``seed``. ``noise`` is
-    the seed of the noise, of which each member has another path. ``members`` is the number of random members or of the
-    rows of a file, 0 for a grid; then the only dimension is ``member``. ``listed`` names the columns of the file. For a
-    lattice, which has ``sizes``, workers compute the initial state from the spec, and ``initial`` is not used.
+    the seed of the noise, of which each member has another path. ``members`` is 0 for a grid; otherwise it is the
+    number of random members or of the rows of a file, and the only dimension is ``member``. ``listed`` names the
+    columns of the file. ``sizes`` are the sizes of a lattice, () for other systems. For a lattice, workers compute the
+    initial state from the spec, and ``initial`` is not used.
     """
 
     name: str
@@ -168,7 +169,7 @@ def _spaced(axis: Axis, share: Floats) -> Floats:
 def _uniform(seed: int, column: int, first: int, count: int) -> Floats:
     """Return ``count`` uniform random numbers for one quantity, ``column``, of the members from ``first`` on.
 
-    The number of a member depends on seed, column and member only, not on the division into chunks.
+    A random number depends on the seed, the quantity and the member only, not on the division into chunks.
     """
     stream = np.random.Philox(key=[seed, column])
     stream.advance(first // 4)  # the generator makes four numbers at a time

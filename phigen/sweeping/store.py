@@ -93,7 +93,7 @@ class Job:
 
 
 def digest_of(plan: Plan, solver: Mapping[str, Any]) -> str:
-    """Return a hash of the plan, except the division into chunks, and of the solver, which identifies the results."""
+    """Return a hash that identifies the results: of the solver, and of the plan without the division into chunks."""
     facts = {**plan.as_json(), "chunk": None}
     return hashlib.sha256(json.dumps([facts, solver], sort_keys=True).encode()).hexdigest()[:16]
 
@@ -140,7 +140,8 @@ def _fill(path: Path, plan: Plan, solver: Mapping[str, Any], listed: Mapping[str
 
     def along(name: str, values: Any) -> None:
         about = {"_ARRAY_DIMENSIONS": [name]}
-        # The array has no fill value: readers would take the default, 0, for missing data.
+        # The array has no fill value, since the default is 0, and readers take elements with the fill value for missing
+        # data.
         root.create_array(name, data=np.asarray(values), fill_value=None, attributes=about)
 
     for axis in plan.grid if not plan.members else ():

@@ -103,8 +103,8 @@ class FlatLattice:
 class LatticeProblem(Problem):
     """Tuning problem of a lattice with given sizes and parameter arrays.
 
-    ``seer`` is the solver that evaluates energies. ``whole`` are the sizes of the lattice in the run, which is larger
-    if a smaller lattice is measured instead.
+    ``seer`` is the solver that evaluates energies. ``whole`` are the sizes in the run of the spec. They are larger than
+    the sizes in the problem if methods are measured on a smaller lattice.
     """
 
     cell: Cell = field(kw_only=True)
@@ -129,7 +129,7 @@ class LatticeProblem(Problem):
 
     @property
     def evens_out(self) -> bool:
-        """Whether monitors may be tried, which is never so for lattices."""
+        """Whether monitors may be tried: never for lattices."""
         return False
 
     def energies(self, states: Floats) -> Floats:

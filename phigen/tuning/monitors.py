@@ -1,4 +1,7 @@
-"""Search for a monitor for a spec without one: a function g, such that steps of equal size in τ, dt = g dτ, adapt.
+"""Search for a monitor for a spec without one.
+
+A monitor is a positive function g of the state. Steps of equal size in the time τ, where dt = g dτ, are then shorter
+in t where g is small.
 
 Candidates are powers of the distances in denominators, roots and logarithms of H, powers of the speed |π∇H|, and
 ``log`` if H splits into two parts. The gain of a monitor is the ratio of the numbers of steps without and with it, over
@@ -49,13 +52,13 @@ MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
 #: Largest number of characters of a monitor, so that users can read and modify it. It suffices for two distances in
 #: space.
 MOST_LETTERS = 160
-#: HIGHEST: largest order at which monitors are compared. FEWEST: number of steps that a run may at least have, times
-#: MOST. SECONDS: largest duration of a run in seconds.
+#: HIGHEST: largest order at which monitors are compared. FEWEST: MOST · FEWEST steps are allowed for every run.
+#: SECONDS: largest duration of a run in seconds.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
 #: Share of the time until the deadline that is reserved for the runs, which follow all builds.
 MEASURING = 0.25
-#: Largest number of halvings of a step; and largest number of steps of a run, as a multiple of the number of steps
-#: without a monitor.
+#: HALVINGS: largest number of halvings of a step. MOST: largest number of steps of a run with a monitor, as a multiple
+#: of the number of steps without one.
 HALVINGS, MOST = 30, 64
 
 
@@ -79,8 +82,9 @@ class Trial:
 class Monitors:
     """Results of the search for a monitor, over a ``span`` of time.
 
-    ``plain`` is the result without a monitor. ``found`` has the results with monitors, that with the shortest time
-    first; steps of different schemes differ in cost. ``refused`` has the reasons why others were not built.
+    ``plain`` is the result without a monitor. ``found`` has the results with monitors, that with the shortest computing
+    time first, since steps of different schemes differ in cost. ``refused`` has the reasons why other monitors were not
+    built.
     """
 
     span: float
@@ -147,9 +151,9 @@ def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expre
 
 
 def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
-    """Return the smallest value of ``b`` along the motion, divided by the median.
+    """Return the quotient of the smallest value of ``b`` along the motion and its median.
 
-    The quotient is small for a distance that becomes small in close encounters, so that these distances come first.
+    It is small for a distance that becomes small in close encounters; such distances come first in the list of bases.
     """
     (values,) = evaluate([b], columns)
     return float(np.min(values) / np.median(values))

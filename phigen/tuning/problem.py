@@ -61,7 +61,7 @@ class Problem(ABC):
     @property
     @abstractmethod
     def evens_out(self) -> bool:
-        """Whether monitors may be tried, which choose a time τ in which the motion has a more uniform speed."""
+        """Whether monitors may be tried. With a monitor, the motion has a more uniform speed in the time τ."""
 
     def method(self, solver: Backend) -> Candidate:
         """Return the method of a solver, which makes runs from the initial state of this problem."""

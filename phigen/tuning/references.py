@@ -24,10 +24,11 @@ KNOWN = 1e-12
 
 @dataclass
 class Reference:
-    """A reference solution: a call with a spacing and a count returns the states (count + 1, DIM) at its multiples.
+    """A reference solution. A call with (spacing, count) returns the states (count + 1, DIM) at multiples of the
+    spacing.
 
-    They are computed by ``method`` with steps of at most ``step``. ``uncertainty`` is the distance from the solution by
-    a second method, relative to the largest coordinate.
+    The states are computed by ``method`` with steps of at most ``step``. ``uncertainty`` is the distance from the
+    solution by a second method, relative to the largest coordinate.
     """
 
     method: CompiledMethod

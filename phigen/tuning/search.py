@@ -113,7 +113,10 @@ def step_for(points: Sequence[Point], accuracy: float, order: int) -> float | No
 
 
 def _extrapolated_step(points: Sequence[Point], accuracy: float, order: int) -> float | None:
-    """Return the step for the accuracy by extrapolation from the smallest step; None if rounding errors exceed it."""
+    """Return the step for the accuracy by extrapolation from the smallest step.
+
+    The result is None if rounding errors are larger than the accuracy.
+    """
     last = points[-1]
     if at_floor(points) or accuracy < max(ROUNDING, last.rounding):
         return None

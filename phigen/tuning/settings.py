@@ -68,7 +68,7 @@ class Setting:
 
     @property
     def family(self) -> Setting:
-        """This setting with order 0, by which methods that differ in the order only are recognised."""
+        """This setting with order 0. Settings that differ only in the order have the same family."""
         return replace(self, order=0)
 
     @property

@@ -26,12 +26,13 @@ CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
 #: FINALISTS: number of best methods that are confirmed and timed. BEHIND: their largest cost relative to the best one.
 #: ROUNDS: number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
-#: Share of the time budget after which only methods that the result needs are confirmed.
+#: After this share of the time budget, methods are no longer tested in longer runs. If none has passed this test yet,
+#: the tests continue until one passes, with one step for each method.
 CONFIRMED = 1.0
 #: Share of the time budget after which no further round of timings begins. A round takes about a tenth of the budget.
 TIMED = 1.1
-#: Share of the time budget after which no monitor and no automatic scheme is tried. If the search has used up the
-#: budget, half of the budget remains for monitors.
+#: Share of the time budget after which no monitor and no automatic scheme is tried. It is larger than 1: even if the
+#: search has used up the budget, another half of the budget remains for monitors.
 MONITORED = 1.5
 #: Costs that differ by less than this factor count as equal, and the simpler method is preferred.
 EQUAL = 1.1

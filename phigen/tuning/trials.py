@@ -98,8 +98,8 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
     """Return the function that measures the largest distance of a run from a reference solution.
 
     States are compared at about `MARKS` times; the distance is relative to the largest coordinate. It is extrapolated
-    to the horizon: with the measured power of time, but for methods with ``bounded`` energy errors (Poisson maps)
-    linearly, unless the distance clearly grows faster. The power is between 1 and 2.
+    to the horizon by a power of time. This is the measured power, at least 1 and at most 2. For methods with
+    ``bounded`` energy errors (Poisson maps) it is 1, unless the distance clearly grows faster.
     """
 
     def measure(method: CompiledMethod, h: float, span: float) -> Point | None:

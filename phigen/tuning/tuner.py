@@ -19,9 +19,9 @@ from phigen.tuning.search import Curve
 from phigen.tuning.settings import SPLITTING, Setting, direct, own_setting
 from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
 
-#: Shares of the time budget. SEARCHING: after this share no build starts. The others are durations: of one round of
-#: builds; of the build of a candidate of the first round, as expected; of the scan of one candidate (measurements with
-#: several steps); and of one reference solution.
+#: Shares of the time budget. SEARCHING: after this share no build starts. The others are durations. BUILDING: of one
+#: round of builds. GUESSING: a candidate whose build would take longer is left out of the first round. SCANNING: of the
+#: measurement of one candidate with several steps. REFERRING: of one reference solution.
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
 #: Shares of the time budget after which no candidate, and no classical method, is measured.
 SCANNED, COMPARED = 0.9, 0.85
