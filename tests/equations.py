@@ -18,7 +18,9 @@ def charged_particle(s: Sequence[Any]) -> list[Any]:
 
 
 def guiding_centre(s: Sequence[Any]) -> list[Any]:
-    """x' = (u B* + b × ∇(μ|B| + φ))/(b·B*), u' = -B*·∇(μ|B| + φ)/(b·B*), B* = B + u curl b, κ = ½."""
+    """Return the right-hand side of guiding-centre motion: x' = (u B* + b × ∇(μ|B| + φ))/(b·B*), u' = -B*·∇(μ|B| +
+    φ)/(b·B*), where B* = B + u curl b and B = (-κy, κx, 1) with κ = ½.
+    """
     x, y, z, u = s
     kappa, mu, k = mpmath.mpf(1) / 2, mpmath.mpf("0.3"), mpmath.mpf("0.2")
     B = mpmath.sqrt(1 + kappa**2 * (x * x + y * y))
@@ -33,19 +35,21 @@ def guiding_centre(s: Sequence[Any]) -> list[Any]:
 
 
 def maxwell_bloch(s: Sequence[Any]) -> list[Any]:
-    """x' = y, y' = x z, z' = -x y."""
+    """Return the right-hand side of the Maxwell–Bloch equations x' = y, y' = x z, z' = -x y."""
     x, y, z = s
     return [y, x * z, -x * y]
 
 
 def sir(s: Sequence[Any]) -> list[Any]:
-    """Kermack and McKendrick's equations, β = ½, γ = 1/5."""
+    """Return the right-hand side of the SIR model of Kermack and McKendrick, with the rates β = ½ and γ = 1/5."""
     infections, recoveries = s[0] * s[1] / 2, s[1] * mpmath.mpf("0.2")
     return [-infections, infections - recoveries, recoveries]
 
 
 def ablowitz_ladik3(s: Sequence[Any]) -> list[Any]:
-    """i qn' = (1 - |qn|²) (q(n+1) + q(n-1)) - 2 qn on a ring of three sites."""
+    """Return the right-hand side of the Ablowitz–Ladik equations i qn' = (1 - |qn|²) (q(n+1) + q(n-1)) - 2 qn on a ring
+    of three sites, for the real and imaginary parts of qn.
+    """
     q = [mpmath.mpc(s[0], s[1]), mpmath.mpc(s[2], s[3]), mpmath.mpc(s[4], s[5])]
     result = []
     for n in range(3):
@@ -56,19 +60,21 @@ def ablowitz_ladik3(s: Sequence[Any]) -> list[Any]:
 
 
 def nambu_pendulum(s: Sequence[Any]) -> list[Any]:
-    """theta' = p, p' = -sin(theta), V' = p sin(theta)."""
+    """Return the right-hand side of theta' = p, p' = -sin(theta), V' = p sin(theta)."""
     theta, p, _ = s
     return [p, -mpmath.sin(theta), p * mpmath.sin(theta)]
 
 
 def engel_geodesics(s: Sequence[Any]) -> list[Any]:
-    """h1' = h2 h3, h2' = -h1 h3, h3' = -h1 h4, h4' = 0."""
+    """Return the right-hand side of h1' = h2 h3, h2' = -h1 h3, h3' = -h1 h4, h4' = 0."""
     h1, h2, h3, h4 = s
     return [h2 * h3, -h1 * h3, -h1 * h4, 0 * h4]
 
 
 def sklyanin_gyrostat(s: Sequence[Any]) -> list[Any]:
-    """Sa' = 2 S0 (S × ∇H)a·(-1) + …: from {Sa, Sb} = 2 S0 Sc, {S0, Sa} = 2 (Jb - Jc) Sb Sc, J = (1, 3/2, 5/2)."""
+    """Return the right-hand side of the gyrostat with Sklyanin's brackets {Sa, Sb} = 2 S0 Sc, {S0, Sa} = 2 (Jb - Jc) Sb
+    Sc for cyclic a, b, c, with J = (1, 3/2, 5/2).
+    """
     S0, S1, S2, S3 = s
     J12, J23, J31 = mpmath.mpf(-1) / 2, mpmath.mpf(-1), mpmath.mpf(3) / 2
     g1, g2, g3 = S1 + mpmath.mpf("0.1"), S2 / 2 + mpmath.mpf("0.2"), S3 / 3
@@ -81,12 +87,12 @@ def sklyanin_gyrostat(s: Sequence[Any]) -> list[Any]:
 
 
 def toda3(s: Sequence[Any]) -> list[Any]:
-    """ai' = ai (b(i+1) - bi), bi' = 2 (ai² - a(i-1)²)."""
+    """Return the right-hand side of the Toda equations ai' = ai (b(i+1) - bi), bi' = 2 (ai² - a(i-1)²)."""
     a1, a2, b1, b2, b3 = s
     return [a1 * (b2 - b1), a2 * (b3 - b2), 2 * a1 * a1, 2 * (a2 * a2 - a1 * a1), -2 * a2 * a2]
 
 
-#: The right-hand sides above, by the names of the systems of the corpus.
+#: Right-hand sides of equations of motion, by the names of systems of the corpus.
 FIELDS: Mapping[str, Field] = {
     "ablowitz_ladik3": ablowitz_ladik3,
     "charged_particle": charged_particle,
@@ -103,8 +109,8 @@ FIELDS: Mapping[str, Field] = {
 
 
 def extrapolated(field: Field, x: Sequence[Any], time: Any, pieces: int, rows: int) -> list[Any]:
-    """Return the state at ``time``, by the explicit midpoint rule with extrapolation in h² (Gragg, Bulirsch, Stoer),
-    which has order 2·``rows``.
+    """Return the state at ``time`` by the explicit midpoint rule with extrapolation in h² (Gragg, Bulirsch, Stoer). Its
+    order is 2·``rows``.
 
     The time is divided into ``pieces`` equal intervals. In each interval the results with 2, 4, … 2·``rows`` substeps
     are extrapolated. The precision is the current one of mpmath.

@@ -7,7 +7,8 @@ from contextlib import contextmanager
 
 import pytest
 
-#: Message of the operating system if a file reaches this limit. A full disk gives "No space left on device".
+#: Message of the operating system if a file would exceed the largest allowed size. A full disk gives "No space left on
+#: device" instead.
 FULL = "File too large"
 
 

@@ -13,7 +13,9 @@ MATHML = {"math", "mrow", "mi", "mn", "mo", "mfrac", "msup", "msub", "msubsup", 
 
 
 class Page(HTMLParser):
-    """A parsed page: its elements with their attributes, ids, headings and texts; ``errors`` is what is wrong."""
+    """A parsed page: its elements with their attributes, ids, headings and texts. ``errors`` lists what violates the
+    rules.
+    """
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
@@ -56,7 +58,7 @@ class Page(HTMLParser):
             self.texts.setdefault(self._open[-1], []).append(data)
 
     def all(self, tag: str) -> list[dict[str, str]]:
-        """Return the attributes of all elements with a tag."""
+        """Return the attributes of all elements with the given tag."""
         return [attributes for name, attributes in self.elements if name == tag]
 
     def _expect_harmless(self, tag: str, attributes: dict[str, str]) -> None:

@@ -230,19 +230,19 @@ class PreciseStep:
 
     @precisely
     def __call__(self, x: Sequence[Any]) -> list[Any]:
-        """Φ(x)."""
+        """Return Φ(x), the state after one step from x."""
         for stage in self._stages:
             x = stage.solve(x)
         return list(x)
 
     def poisson(self, x: Sequence[Any]) -> Any:
-        """The matrix π(x)."""
+        """Return the Poisson matrix π(x)."""
         at = {**self._parameters, **dict(zip(self.coordinates, x, strict=True))}
         return _columns(values(self._poisson, at), self.n, self.n).T
 
     @precisely
     def tangent(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
-        """Φ(x) and DΦ(x)."""
+        """Return Φ(x), the state after one step from x, and the tangent map DΦ(x)."""
         product = mpmath.eye(self.n)
         for stage in self._stages:
             x, tangent = stage.solve_with_tangent(x)
@@ -251,7 +251,7 @@ class PreciseStep:
 
     @precisely
     def defect(self, x: Sequence[Any]) -> float:
-        """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| at x."""
+        """Return the largest entry of DΦ π DΦᵀ − π∘Φ at x relative to that of π∘Φ; it is 0 for a Poisson map."""
         image, tangent = self.tangent(x)
         return relative_defect(tangent, self.poisson(x), self.poisson(image))
 
@@ -261,7 +261,7 @@ class _Stage:
         realisation, self.coordinates = compilation.realisation, compilation.system.coordinates
         self.n, self._parameters = len(self.coordinates), dict(parameters)
         slope = _slope(compilation, h)
-        hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # column by column
+        hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # the Hessian, by columns
         self._momenta = [*slope, *hessian]
         both = [*realisation.alpha, *realisation.beta]
         names = [*self.coordinates, *realisation.covector]
@@ -298,7 +298,7 @@ class _Stage:
 
 
 def _slope(compilation: Compilation, h: Fraction) -> list[Expression]:
-    """Return the expressions of ∇S_h for a number h."""
+    """Return expressions for the gradient of the generating function S_h, with a number as the step size h."""
     # The stages of a composition are steps of order 2, which need S_1 only.
     system, terms = compilation.system, compilation.order.terms if len(compilation.program.fractions) == 1 else 1
     realisation = compilation.realisation

@@ -12,7 +12,7 @@ from typing import Any
 from phigen.spec.problems import Problems
 from phigen.spec.yaml_source import Mapping, Node, Scalar, Sequence, decode, read
 
-#: Replacements, as YAML text: each is wrong at most keys.
+#: Replacements, as YAML text. Most keys refuse each of them.
 VALUES = (
     "[]", "{}", "0", "-1", "nan", ".nan", ".inf", "1e400", "x", '""', "true", "null", "[[]]", "{a: {}}", "[null]",
     "1.5", "'7'", "²", "[1, [2]]", "{random: normal}", "2026-01-01", "missing.csv", "missing.npy", "-.inf", "1/0",

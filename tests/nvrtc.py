@@ -1,5 +1,5 @@
-"""Compilation of device code on machines without a graphics card, by the wheels of NVIDIA's runtime compiler NVRTC and
-of its assembler.
+"""Compilation of device code without a graphics card, with NVIDIA's runtime compiler NVRTC and assembler ptxas from
+Python wheels.
 """
 
 import ctypes

@@ -102,7 +102,7 @@ def _extrapolate(field: Callable[[list[Any]], list[Any]], state: list[Any], big:
 
 
 class PreciseSystem:
-    """π and the vector field of a system, in many digits."""
+    """A Poisson system in many digits: values of π, and solutions of the equation ṁ = π(m)p of a path."""
 
     def __init__(self, compilation: Compilation, parameters: Mapping[str, float]) -> None:
         system = compilation.system
@@ -121,7 +121,7 @@ class PreciseSystem:
         return {**self.parameters, **dict(pairs)}
 
     def poisson(self, x: Sequence[Any]) -> Any:
-        """The matrix π(x)."""
+        """Return the Poisson matrix π(x)."""
         return mpmath.matrix(self.n, self.n) + _square(values(_flat(self.system.poisson), self.at(x)), self.n)
 
     def path(self, x: Sequence[Any], p: Sequence[Any]) -> tuple[list[Any], list[Any]]:
@@ -179,7 +179,7 @@ class PrecisePathStep(PreciseSystem):
         return mpmath.matrix(generated[: self.n]), _square(generated[self.n :], self.n)
 
     def __call__(self, x: Sequence[Any]) -> list[Any]:
-        """Φ(x)."""
+        """Return Φ(x), the state after one step from x."""
         with mpmath.workdps(PATH_DIGITS):
             state = [mpmath.mpf(v) for v in x]
             for h in self.steps:
@@ -208,7 +208,7 @@ class PrecisePathStep(PreciseSystem):
         raise ArithmeticError("no convergence")
 
     def solve(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
-        """Φ(x) and DΦ(x)."""
+        """Return Φ(x), the state after one step from x, and the tangent map DΦ(x)."""
         with mpmath.workdps(PATH_DIGITS):
             state, tangent = [mpmath.mpf(v) for v in x], mpmath.eye(self.n)
             for h in self.steps:
@@ -220,7 +220,7 @@ class PrecisePathStep(PreciseSystem):
             return state, tangent
 
     def defect(self, x: Sequence[Any]) -> float:
-        """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ| at x."""
+        """Return the largest entry of DΦ π DΦᵀ − π∘Φ at x relative to that of π∘Φ; it is 0 for a Poisson map."""
         with mpmath.workdps(PATH_DIGITS):
             image, tangent = self.solve(x)
             return relative_defect(tangent, self.poisson(x), self.poisson(image))

@@ -49,7 +49,7 @@ def files(compilation: Compilation, target: str) -> Mapping[str, str]:
 
 
 def single_file(compilation: Compilation) -> Mapping[str, str]:
-    """Return the generated C in the form with a single file."""
+    """Return the generated C with header and source in one file."""
     return _once(compilation, "single file", lambda: emit(compilation.program, "c", COMMAND, single_file=True))
 
 

@@ -61,8 +61,9 @@ QUICK = (
 )  # fmt: skip
 
 
-#: Systems that resemble others in steps, bi-realisations and functions, of both few and many coordinates. Tests with
-#: the mark `corpus` include them only with `--corpus`. Golden files show changes of their C and NumPy.
+#: Systems that add little to tests: other systems, some with few coordinates, have the same kinds of steps,
+#: bi-realisations and functions. Tests with the mark `corpus` include them only with `--corpus`. Golden files show
+#: changes of their C and NumPy.
 ALIKE = (
     "charged_particle", "cyclotron", "dzhanibekov", "engel_geodesics", "gaussian_moments", "guiding_centre",
     "harmonic_oscillator", "kowalevski_top", "predator_prey", "quaternion_top", "rigid_body_dual", "rigid_body_paper",
@@ -115,13 +116,13 @@ def plain(specification: spec.Spec) -> spec.Spec:
 
 
 def compile_anew(text: str, order: int | None = None, scheme: str | None = None, **more: Any) -> Compilation:
-    """Compile a spec, given as YAML without its first two keys, with no cache, as tests need that modify phigen
-    itself.
+    """Compile a spec, given as YAML without its first two keys. The compilation is not cached, as some tests modify
+    phigen itself.
     """
     return compile_spec(plain(spec.loads(f"phigen: 1\nname: t\n{text}")), order=order, scheme=scheme, **more)
 
 
-#: Compile such a spec once and cache the compilation.
+#: Compile a spec, given as YAML without its first two keys, and cache the compilation.
 compile_text = cache(compile_anew)
 
 

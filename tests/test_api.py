@@ -191,7 +191,9 @@ def test_a_text_in_place_of_a_file_hears_what_reads_it(lines):
 
 
 def test_formulas_are_those_of_the_method():
-    """The formulas of α, β and S_i for log-canonical brackets are sympy objects, for instance with derivatives."""
+    """`phigen.formulas` returns α, β and S_i for log-canonical brackets as sympy expressions, which can be
+    differentiated and simplified.
+    """
     formulas = phigen.formulas(from_sympy(), order=4)
     (x, y), (a, b) = formulas.system.coordinates, formulas.covector
     assert formulas.degree is None

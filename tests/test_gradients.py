@@ -53,7 +53,7 @@ def test_network_with_the_bracket_stays_on_the_leaf_without_learning_anything(mo
     monkeypatch.setattr(module, "LONG", 100.0)
     monkeypatch.setattr(module, "HELD_OUT", 10.0)
     monkeypatch.setattr(module, "RECORDS", 8)
-    # Other tests check gradients of flows and of solvers, so this test replaces the two functions that train by them.
+    # Other tests check gradients of flows and of solvers, so this test replaces the two functions that train models.
     monkeypatch.setattr(module, "fitted", lambda records: module.TRUE)
     monkeypatch.setattr(module, "trained", lambda run, weights, *_: (weights, [0.0]))
     with jax.enable_x64(True):

@@ -1,4 +1,4 @@
-"""``phigen.solve_ivp`` compared with SciPy's."""
+"""Results of ``phigen.solve_ivp`` agree with those of ``scipy.integrate.solve_ivp``."""
 
 from functools import cache
 

@@ -135,8 +135,8 @@ def nested(depth):
 
 
 def test_derivatives_keep_no_room_for_terms_that_they_do_not_have():
-    """Derivatives of flint reserve memory for as many terms as the polynomial has that they are derived from: here that
-    would be 550 MB instead of 5.
+    """A derivative of a polynomial in flint reserves memory for as many terms as the polynomial has, here 550 MB
+    instead of 5. phigen must not keep this memory.
     """
     many = names(255)
     tower = Tower(many)
@@ -173,7 +173,7 @@ def test_rings_and_collected_polynomials_of_nested_functions_are_given_up_where_
     tower = Tower([*PLANE[0], STEP], [text.hamiltonian], PLANE[0])
     series = PolynomialSeries(tower, (tower.convert(text.hamiltonian),))
     term_counts = [len(collected_form(series, PLANE[0], [STEP], 10**6))]
-    for most in (10_000, 2_000):  # with these limits the Hessian is too large, then the polynomials too
+    for most in (10_000, 2_000):  # too few for the Hessian, then for the polynomials too
         monkeypatch.setattr(limits, "CELLS", most)
         term_counts.append(len(collected_form(series, PLANE[0], [STEP], 10**6)))
     assert term_counts == [2, 1, 0]
@@ -231,13 +231,13 @@ def test_equal_columns_of_matrices_are_looked_at_once(monkeypatch):
 
 
 def test_a_step_whose_matrices_are_too_large_is_composed_or_refused_before_they_are_made(monkeypatch):
-    """The estimated number of operations exceeds 0.6 of the true number. Above the limit, steps of order 2 are
-    composed, or the spec is refused.
+    """The number of operations is estimated before matrices are computed; the estimate exceeds 0.6 of the true number.
+    Above the limit a composition of steps of order 2 is used, or the spec is refused.
     """
     text = loads(log_canonical(10))
     direct = compile_spec(text).program
     true = cost(direct.step.linearise.roots)
-    few = 4 * 10**3 - 1  # systems of this size with fewer operations are not counted
+    few = 4 * 10**3 - 1  # with a limit of 4n³ or more, operations are not counted
     assert few > 0.6 * true
     for most, stages in ((true, 1), (few, 5)):
         monkeypatch.setattr(discretisation, "MOST_OPERATIONS", most)
@@ -270,7 +270,9 @@ def test_the_equations_of_a_path_are_counted_too(monkeypatch):
 
 
 def test_an_elimination_that_is_too_long_for_a_function_is_a_loop(monkeypatch):
-    """The operations of the elimination, and not n³ alone, decide: for n = 200 the value of n³ is millions."""
+    """An elimination with more operations than the limit is a loop, not unrolled code. A comparison with n³ alone would
+    allow millions of operations for n = 200.
+    """
     direct = compile_spec(loads(fput(8)), order=2).program.step
     assert direct.eliminate is not None
     monkeypatch.setattr(limits, "OPERATIONS", cost(direct.eliminate.roots) // 2)

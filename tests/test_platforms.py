@@ -87,7 +87,9 @@ def test_c_compiles_for_other_systems(target, sources):
 
 @pytest.mark.slow
 def test_aarch64_gives_what_this_machine_gives(tmp_path):
-    """An emulated ARM processor gives the same results: Newton's iteration, and blocks of steps in SIMD lanes."""
+    """An emulated ARM processor gives the same results as this machine, for Newton's iteration and for blocks of steps
+    in SIMD lanes.
+    """
     emulator, at = tool("qemu-aarch64-static"), setting(compiled("maxwell_bloch"))
     write(tmp_path, {**files(compiled("maxwell_bloch"), "c"), "main.c": MAIN})
     numbers = [f"-DSTART={','.join(map(repr, at.x))}", f"-DSTEP={at.h!r}"]

@@ -203,7 +203,9 @@ def kind_tests(tree: ast.AST) -> list[int]:
 
 
 def all_kind_tests() -> dict[str, list[int]]:
-    """Return the lines that test kinds, for each module of phigen that has one."""
+    """Return the lines that test the kind of a step, a plan or a compilation, for each module of phigen with such a
+    line.
+    """
     files = sorted((ROOT / "phigen").rglob("*.py"))
     asked = {str(p.relative_to(ROOT)): kind_tests(parsed(p)) for p in files}
     return {name: lines for name, lines in asked.items() if lines}
@@ -230,7 +232,9 @@ def test_conditions_in_the_runtime_in_javascript_do_not_grow():
 
 
 def test_regular_expressions_read_what_is_listed():
-    """Only the listed modules import ``re``, so no other one edits generated text by regular expressions."""
+    """Only the modules in `REGULAR_EXPRESSIONS` import ``re``, so no other module edits generated text by regular
+    expressions.
+    """
     files = [path for room in ("targets", "ir", "lanes") for path in sorted((ROOT / "phigen" / room).rglob("*.py"))]
     users = {str(p.relative_to(ROOT)) for p in files if re.search(r"^import re$", p.read_text("utf-8"), re.MULTILINE)}
     assert users == REGULAR_EXPRESSIONS.keys()

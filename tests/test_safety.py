@@ -17,7 +17,7 @@ from phigen.errors import ToolchainError
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 _location = importlib.util.spec_from_file_location("make_safety", DOCS / "make_safety.py")
 safety = importlib.util.module_from_spec(_location)
-sys.modules[safety.__name__] = safety  # the decorator dataclass looks for the module here
+sys.modules[safety.__name__] = safety  # dataclasses look up their module here
 _location.loader.exec_module(safety)
 
 #: The page docs/safety.md. The tables in it are compared except for numbers that depend on the compiler.

@@ -60,7 +60,7 @@ def run(command: Sequence[str | Path], folder: Path, **environment: str) -> str:
 
 
 def write(folder: Path, texts: Mapping[str, str]) -> None:
-    """Write files into a folder; ``texts`` has their contents by name."""
+    """Write files into a folder; ``texts`` maps their names to their contents."""
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
 

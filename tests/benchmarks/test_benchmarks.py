@@ -89,8 +89,8 @@ def test_exact_flows_are_known_and_left_out():
 
 
 def test_kernels_of_lattices_by_hand_make_the_steps_of_the_generated_ones():
-    """Kernels written by hand make the same steps as generated ones. A different order of the parts, a wrong sign or
-    angle would make the comparison meaningless.
+    """Lattice kernels written by hand make the same steps as generated ones. Otherwise the comparison of their times
+    would mean nothing.
     """
     for sites, size in ((lattices.XXZ, 16), (lattices.CUBE, 4)):
         by_hand = lattices.Kernel(sites, size, True).method(0)
@@ -183,7 +183,7 @@ def scanned(best: float) -> Scan:
 
 def test_a_best_setting_at_the_end_of_its_grid_extends_the_grid():
     scan = scanned(best=5.5)
-    assert scan.best_at_coarse_end()  # the first step of the scan is 2
+    assert scan.best_at_coarse_end()  # the scan begins at step 2, below the best 5.5
     scan.extend_coarser()
     assert not scan.failure()
     cheapest = min(scan.results.values(), key=lambda r: r.seconds)

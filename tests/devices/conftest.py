@@ -13,5 +13,5 @@ def c_without_contraction(compiled_solvers):
     """Compile C without fused multiply-add, so that each product and sum is rounded as on devices."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(toolchain, "TUNING_FLAGS", ("-ffp-contract=off",))
-        patch.setenv("CC", "gcc -g0")  # another command: the compiler flags are cached for each command
+        patch.setenv("CC", "gcc -g0")  # another name than gcc: accepted flags are cached by command
         yield

@@ -81,7 +81,7 @@ def test_faults_of_a_card_are_reported_and_lose_no_members(cupy, monkeypatch):
 
     monkeypatch.setattr(cupy_by_hand.RawKernel, "__call__", launch)
     np.testing.assert_array_equal(device.ensemble(x0, 0.1, 5), expected)
-    assert launches == [(1,)] * 7  # launches: coefficients, all members, one half, four quarters
+    assert launches == [(1,)] * 7  # coefficients; then all members, one half, four quarters
     launches.clear()
     failing += [cupy_by_hand.CUDADriverError("CUDA_ERROR_ILLEGAL_ADDRESS: an illegal memory access")]
     with pytest.raises(

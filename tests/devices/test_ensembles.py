@@ -193,7 +193,7 @@ def test_a_launch_without_memory_is_divided(body, x0, monkeypatch):
 
     monkeypatch.setattr(device.device, "launch", limited)
     np.testing.assert_array_equal(device.ensemble(x0, 0.1, 20), expected)
-    assert sizes == [1, 100, 50, 50]  # first one work item for the coefficients
+    assert sizes == [1, 100, 50, 50]  # work items: coefficients, all members, two halves
 
 
 def test_a_lost_device_leaves_the_members_that_are_done(body, x0, monkeypatch):
@@ -264,7 +264,7 @@ def test_sizes_of_kernels_are_those_of_the_generated_code(name, options):
 
 
 def test_steps_that_a_card_runs_slowly_are_warned_of(body, x0, monkeypatch):
-    """A warning appears if the driver reports that the kernel uses memory besides registers."""
+    """If the driver reports that the kernel uses memory besides registers, running an ensemble gives a warning."""
     device, _ = body
     again = pickle.loads(pickle.dumps(device))
     monkeypatch.setattr(again.device, "is_card", True)

@@ -54,7 +54,7 @@ def test_functions_of_phi_are_accurate_up_to_the_limit_of_their_range(real):
         for value, row in zip(points, out, strict=False):
             w = mpmath.sqrt(abs(value)) / 2
             condition = 1 + (abs(w / mpmath.sin(w)) if value > 16 else 0)  # condition number of cot
-            for order, term in ((0, 0), (1, 0.125 / abs(value))):  # φ′ has a term 1/(8s)
+            for order, term in ((0, 0), (1, 0.125 / abs(value))):  # rounding of the term 1/(8s) in φ′
                 expected = special.precisely(mpmath.mp, order, mpmath.mpf(float(value)))
                 bound = 40 * condition ** (order + 1) * abs(expected) + 4 * term
                 assert abs(row[order] - expected) < np.finfo(kind).eps * bound

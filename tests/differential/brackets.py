@@ -164,9 +164,7 @@ def nothing(source: random.Random) -> Structure:
 
 
 def chain(source: random.Random) -> Structure:
-    """Draw canonical brackets of 8 to 24 pairs. The largest systems exceed the limit up to which the C uses
-    SIMD lanes.
-    """
+    """Draw canonical brackets of 8 to 24 pairs; the C of the largest systems has no SIMD lanes."""
     n = source.choice([8, 17, 19, 20, 21, 22, 24])
     q, p = symbols(f"q{k}" for k in range(n)), symbols(f"p{k}" for k in range(n))
     pi = sympy.zeros(2 * n)

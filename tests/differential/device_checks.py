@@ -14,7 +14,7 @@ from phigen.api import lattice_solver_of, solver_of
 #: One in ONE_IN seeds is tested on a device, as kernels take a second to compile.
 ONE_IN = 50
 
-#: Compile kernels without optimisation, in a fifth of the time.
+#: Option that compiles kernels without optimisation, in a fifth of the time.
 os.environ.setdefault("PYOPENCL_BUILD_OPTIONS", "-cl-opt-disable")
 
 

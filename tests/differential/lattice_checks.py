@@ -120,8 +120,8 @@ class Trial:
 
     @cached_property
     def field(self) -> Callable[[float, Floats], Floats]:
-        """Right-hand side of the equations of motion without noise, for states as vectors; with a monitor, the
-        derivative along τ.
+        """Right-hand side of the equations of motion without noise, for states as vectors. With a monitor it is the
+        derivative along the fictitious time τ.
         """
         rate, shape = self.system.rates(self.values), (len(self.system.fields), self.system.count)
 

@@ -251,7 +251,9 @@ def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
 
 
 def _observed(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """Return the system, in half of the cases with observables, which may depend on time and parameters."""
+    """Return the system with observables in half of the cases, otherwise unchanged. Observables may depend on time and
+    parameters.
+    """
     if source.random() < 0.5:
         return drawn
     symbols = [*drawn.structure.coordinates, *(Symbol(name) for name in drawn.parameters), *([TIME] * drawn.timed)]
@@ -504,7 +506,7 @@ def _extras(source: random.Random, drawn: Ordinary) -> Ordinary:
 
 
 def _chosen(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """Return the system, in some cases with `scheme: auto`."""
+    """Return the system with `scheme: auto` in a tenth of the cases, otherwise unchanged."""
     scheme = drawn.options.get("scheme", "series")
     if source.random() > 0.1 or "structure" in drawn.options or drawn.monitor == "log" or scheme == "splitting":
         return drawn
@@ -516,7 +518,7 @@ _NOT_OF_GAUSS = ("birealisation", "composition", "coordinates_from", "reconstruc
 
 
 def _collocated(source: random.Random, drawn: Ordinary) -> Ordinary:
-    """Return the system, in a quarter of the cases with the scheme gauss."""
+    """Return the system with the scheme gauss in a quarter of the cases, otherwise unchanged."""
     if source.random() > 0.25 or drawn.noise or drawn.monitor == "log":
         return drawn
     options = {k: v for k, v in drawn.options.items() if k not in _NOT_OF_GAUSS}

@@ -196,8 +196,8 @@ def _expect_flow(
 
 
 def noise(trial: Trial) -> None:
-    """Check noise with increments in proportion to the step size. Then the limit of small steps is the flow of the
-    vector field plus those of the noise sources, and errors decrease with order 2.
+    """Check noise by increments in proportion to the step size. The solution then converges, with order 2, to that of a
+    deterministic equation: the vector field plus the noise sources.
     """
     system, draws = trial.system, trial.solvers["c"].interface.draws
     pushes = trial.random.normal(size=len(system.sources)) * 0.5
@@ -522,7 +522,7 @@ def _always(trial: Trial) -> bool:
 
 
 def _is_plain(trial: Trial) -> bool:
-    """Whether runs have no final corrector; a corrector adds rounding errors at each output."""
+    """Whether the method has no corrector, which is applied at each output and adds rounding errors there."""
     return not trial.compilation.program.step.corrected
 
 

@@ -20,7 +20,7 @@ _ATTEMPTS = 6
 
 
 class System(Protocol):
-    """A random system: a lattice, or an ordinary one."""
+    """A random system: a lattice, or a system with named coordinates ("ordinary")."""
 
     seed: int
     kind: str

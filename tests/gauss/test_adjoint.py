@@ -42,8 +42,8 @@ poisson: {canonical: {q: [x, y], p: [u, v]}}
 hamiltonian: (u**2 + v**2)/2 - k/sqrt(x**2 + y**2)
 monitor: (x**2 + (1 + b)*y**2)**(3/4)
 """
-#: Spec, order and start: a momentum map, its coefficients with parameters, direct products of algebras, time and
-#: forces, logarithms; then a step that is a Poisson map to truncation only, and a monitor.
+#: Spec, order and start by name: a momentum map, one with parameters in its coefficients, direct products of algebras,
+#: time and forces, logarithms; then a step that is a Poisson map only up to its truncation error, and a monitor.
 KINDS = {
     "top": (TOP, 16, [0.9, 0.5, 0.8, 0.6, 0.1, 0.8]),
     "mixed": (MIXED, 4, [0.4, -0.8, 0.5, 0.3, 0.7]),
@@ -147,8 +147,8 @@ def test_gradients_of_members_are_those_of_single_runs(target):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
-    """A run that exceeds the memory of the tape is split into segments. The first step of a segment has no predictor,
-    so results may differ by rounding only.
+    """A reverse pass that exceeds the memory of the tape is split into segments. The first step of a segment has no
+    predictor, so results may differ by rounding only.
     """
     integrator, x, bar = method("mixed", target), start("mixed"), weights((4, 5))
     whole = integrator.pullback(x, H, 30, bar, 10)
@@ -173,8 +173,9 @@ def test_transpose_of_a_step_that_fails_leaves_the_state():
 
 @pytest.mark.parametrize("name", ["so4_manakov", "henon_heiles"])
 def test_reverse_sweeps_start_from_those_of_the_step_after(name, monkeypatch):
-    """The sweeps for the cotangents of the stages start from the cotangents of the following step. This prediction,
-    also in the frame of another step, saves a fifth of the sweeps and changes only rounding.
+    """The reverse pass solves for the cotangents of the stages by fixed-point sweeps that start from those of the
+    following step, transformed to another frame if there is one. This saves a fifth of the sweeps and changes only
+    rounding.
     """
     compilation = compile_spec(spec_of(name).overridden(order=16, scheme="gauss", adjoint=True))
     x0, h, steps = np.array([float(v) for v in first_run(compilation).initial]), 2.0 if "so4" in name else 0.5, 10

@@ -35,8 +35,9 @@ def hat(v):
 @pytest.mark.parametrize("target", ["c", "small", "numpy"])
 @pytest.mark.parametrize("sign", ["minus", "plus"])
 def test_momentum_in_the_other_frame_is_constant_for_large_steps(sign, target):
-    """The attitude takes the momentum to the other frame, where it is constant for any step size. `gauge: auto`
-    subtracts a multiple of a Casimir from a quadratic H, and the attitude includes the rotation by this multiple.
+    """The attitude transforms the momentum between body and space frame; in the other frame the momentum is constant
+    for any step size. This includes the rotation that `gauge: auto` causes when it subtracts a multiple of a Casimir
+    from a quadratic H.
     """
     profile = "profile: small\n" if target == "small" else ""
     text = BODY.format(sign=sign, more="") + profile
@@ -48,7 +49,9 @@ def test_momentum_in_the_other_frame_is_constant_for_large_steps(sign, target):
 
 @pytest.mark.parametrize("sign", ["minus", "plus"])
 def test_attitude_and_position_have_the_order_of_the_method(sign):
-    """Errors decrease with the order of the method, compared with a solution of ġ = gΩ or ġ = Ωg by DOP853."""
+    """Errors of attitude g and position decrease with the order of the method, compared with a solution of ġ = gΩ or ġ
+    = Ωg by DOP853, where Ω is the matrix of the angular velocity.
+    """
     compilation = compile_text(MOTION.format(sign=sign), 4)
     method, start = solver(compilation, "c"), np.array([*START, 0.4, -0.6, 0.3])
     left = sign == "plus"

@@ -1,4 +1,6 @@
-"""Fixed-point sweeps stop late enough: the mean energy of many members of an ensemble does not drift."""
+"""The fixed-point sweeps of a Gauss step stop late enough: the mean energy of many members of an ensemble does not
+drift.
+"""
 
 from dataclasses import replace
 
@@ -30,8 +32,8 @@ def energy(x):
 
 @pytest.mark.parametrize(("profile", "members"), [("fast", 128), pytest.param("small", 512, marks=pytest.mark.slow)])
 def test_mean_energy_does_not_drift(profile, members, monkeypatch):
-    """The standard error of the mean energy error is 5e-15 in SIMD batches of members, and 2.4e-15 with the profile
-    small, where stages are in a loop.
+    """The mean energy error of the members is zero within its standard error: 5e-15 in SIMD batches of members, and
+    2.4e-15 with the profile small, which computes the stages in a loop.
 
     With the weaker stopping criterion that suffices for single trajectories, the mean would drift by −9e-14 in batches
     and by 2e-14 in loops.

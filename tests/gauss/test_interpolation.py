@@ -27,8 +27,8 @@ casimirs: {C: x**2/2 + y**2/2 + z**3/3}
 scheme: gauss
 structure: to truncation
 """
-#: Systems with group elements, with logarithms of coordinates and with time, and one whose step is a Poisson map to
-#: truncation only; each with its step size.
+#: Systems, each with its step size: with group elements, with logarithms of coordinates, with time, and one whose step
+#: is a Poisson map only up to its truncation error.
 CASES = {
     "so4": (lambda: compiled("so4_manakov", 8, "gauss"), 0.5),
     "logarithms": (lambda: compiled("volterra5", 8, "gauss"), 0.2),
@@ -63,7 +63,7 @@ def test_polynomial_leads_from_the_start_of_the_step_to_its_end(case):
         assert last == pytest.approx(session.state(), abs=2e-15)
         inside.append(middle)
         session.kick(np.zeros(len(x0)))
-        assert session.interpolated([0.5]) is None  # the kicked state is not the end of the last step
+        assert session.interpolated([0.5]) is None  # a kick invalidates the polynomial
     script = f"s.integrate({h}, 4);"
     inside.append(javascript(compilation, f"x0: {x0.tolist()}", script, "[...s.interpolate([0.3])[0]]"))
     for other in inside[1:]:

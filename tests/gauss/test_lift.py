@@ -1,5 +1,5 @@
-"""Group elements relative to a frame that changes from step to step, in C with stages in SIMD lanes: the step is the
-same, with fewer products.
+"""Gauss steps on Lie–Poisson spaces with a frame: a quaternion F, updated in each step, for which the momentum is F* k
+F. The step is the same as without frames, but with fewer products. In C the stages are in SIMD lanes.
 """
 
 import ctypes
@@ -19,18 +19,19 @@ from phigen.scheme.lowering import operation_counts
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.verdict import REFUTED
 
-#: so(3) and constant brackets, with parameters and time; then so(3) with the opposite sign and shifted momenta.
+#: A system with so(3) and constant brackets, with a parameter and the time.
 MIXED = """coordinates: [x, y, z, q, p]
 parameters: {a: 0.4}
 time: t
 poisson: {brackets: {x: {y: z, z: -y}, y: {z: x}, q: {p: 1}}}
 hamiltonian: x**2/2 + y**2/3 + a*z**2 + p**2/2 + q**2/2 + cos(q)*x + a*sin(q + t)*y*z
 """
+#: A system with so(3) of the opposite sign and shifted momenta.
 SHIFTED = """coordinates: [x, y, z]
 poisson: {brackets: {x: {y: -z - 2, z: y}, y: {z: 1 - x}}}
 hamiltonian: exp(x/3) + y**2*z/5 + sin(z)
 """
-#: Systems whose steps use frames, with the step size.
+#: Systems whose steps use quaternion frames, with the step size.
 CASES = {
     "rigid_body": (lambda **more: with_order_16(spec_of("rigid_body"), **more), 0.8),
     "so4_manakov": (lambda **more: with_order_16(spec_of("so4_manakov"), **more), 3.0),
@@ -63,14 +64,16 @@ def test_copies_of_the_quaternions_are_found(family, size, count):
 
 @pytest.mark.parametrize(("name", "most"), [("rigid_body", 28), ("so4_manakov", 56), ("spin_chain5", 136)])
 def test_products_of_a_stage_are_few(name, most):
-    """One stage needs 28, 56 and 136 products; without frames it would need 43, 91 and 211."""
+    """With frames the right-hand side of a stage needs at most 28, 56 and 136 products; without frames it would need
+    43, 91 and 211.
+    """
     assert operation_counts(CASES[name][0]().program.step.lifted.slope.roots)["multiplications"] <= most
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_steps_are_those_of_the_frame_at_1(name):
-    """Steps agree with those of solvers with tangents, which use the identity as the frame in each step and whose
-    tangent maps show that steps are Poisson maps.
+    """Steps agree with those of solvers with tangent maps. These solvers use no frames, and their tangent maps show
+    that steps are Poisson maps.
     """
     make, h = CASES[name]
     compilation, reference = make(), make(tangent=True)
@@ -90,7 +93,7 @@ def test_states_on_the_axes_have_frames(start):
 
 
 def test_other_coordinates_are_right_where_momenta_vanish():
-    """At zero momentum the frame F has |F|² = 0. The scale by which changes of other coordinates are measured does not
+    """A momentum of zero has the frame F = 0. The scale by which changes of other coordinates are measured does not
     depend on |F|².
     """
     make, h = CASES["mixed"]
@@ -100,7 +103,9 @@ def test_other_coordinates_are_right_where_momenta_vanish():
 
 @pytest.mark.parametrize("scale", [1e-7, 1e7])
 def test_sweeps_do_not_depend_on_the_size_of_the_state(scale):
-    """A state scaled by a factor takes as many sweeps, with the step divided by the factor, since H is quadratic."""
+    """For a quadratic H, a run with the state multiplied and the step divided by the same factor takes as many
+    fixed-point sweeps.
+    """
     counts = []
     for factor in (1.0, scale):
         raw = RawC(CASES["rigid_body"][0]())
@@ -130,8 +135,8 @@ def test_states_between_steps_and_after_kicks_are_right():
 
 
 def test_kicks_do_not_cost_sweeps():
-    """After a kick there is a new frame, aligned with the old one, so the increments of the last step still predict the
-    next step.
+    """A kick gives a new frame, which is aligned with the old one, so that the stage values of the last step still
+    predict the next step.
     """
     make, h = CASES["so4_manakov"]
     counts = []
@@ -150,7 +155,7 @@ def test_kicks_do_not_cost_sweeps():
 @pytest.mark.parametrize("name", ["so4_manakov", "spin_chain5"])
 def test_casimirs_do_not_drift(name):
     """Over many steps the errors of Casimirs grow like the square root of the number of steps, as rounding errors do,
-    although frames and states are updated separately.
+    although frame and state are updated separately.
     """
     make, h = CASES[name]
     steps = 40_000

@@ -54,7 +54,7 @@ def test_members_in_lanes_follow_their_own_trajectories(text, order):
     method = solver(compile_text(text + f"order: {order}\n"), "c")
     draws = np.random.default_rng(order)
     starts = draws.uniform(0.3, 1.0, (11, len(method.coordinates)))
-    starts[3] = 0.0  # an equilibrium of the oscillator, where the state gives no scale
+    starts[3] = 0.0  # the state is 0 and gives no scale for the stopping criterion
     steps, a = draws.uniform(0.05, 0.1, 11), draws.uniform(0.5, 1.0, 11)
     frames = method.ensemble(starts, steps, 60, stride=20, parameters={"a": a})
     for m in range(11):
@@ -64,8 +64,8 @@ def test_members_in_lanes_follow_their_own_trajectories(text, order):
 
 @pytest.mark.parametrize("text", [DRIVEN, COMET])
 def test_batches_follow_the_time_and_energy_level_of_each_member(text):
-    """Members have different start times or energy levels. In the first batch of four members two fail, and the others
-    continue without SIMD.
+    """Each member of a batch has its own start time or energy level. In the first batch of four members two fail, and
+    the other members continue without SIMD.
     """
     method = solver(compile_text(text + "order: 4\n"), "c")
     draws = np.random.default_rng(3)

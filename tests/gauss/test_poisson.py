@@ -1,5 +1,5 @@
-"""Gauss steps with exact structure are Poisson maps for steps of any size. Steps with `structure: to truncation` are
-not, and phigen says so.
+"""Gauss steps with `structure: exact` are Poisson maps for steps of any size. Steps with `structure: to truncation` are
+Poisson maps only up to the truncation error, and phigen says so.
 """
 
 import re
@@ -60,7 +60,9 @@ def of(spec, order, target="numpy", **more):
 
 
 def defect(method, x, h, poisson):
-    """Return the largest entry of DΦ π DΦᵀ − π∘Φ relative to that of π∘Φ. DΦ is exact to round-off."""
+    """Return the largest entry of DΦ π DΦᵀ − π∘Φ relative to that of π∘Φ, for one step Φ from x. It is at round-off for
+    a Poisson map.
+    """
     following, tangent = method.step_tangent(x, h)
     after = poisson(following)
     return np.abs(tangent @ poisson(x) @ tangent.T - after).max() / np.abs(after).max()
@@ -122,8 +124,8 @@ def test_matrix_algebras_step_by_poisson_maps(name):
 
 @pytest.mark.slow
 def test_algebras_without_known_matrices_step_by_poisson_maps():
-    """Structure constants of so(5) in a scaled basis, in which phigen does not recognise the matrices of so(5): it
-    finds a quotient of the enveloping algebra instead.
+    """In a scaled basis of so(5) phigen does not recognise the matrices; it uses a quotient of the enveloping algebra
+    instead, and steps are still Poisson maps.
     """
     lie, factors = named("so", 5), [1, 2, -1, 3, 1, 2, 1, -1, 3, 2]
     brackets = {
@@ -287,8 +289,8 @@ def test_lattices_are_refused():
 
 
 def test_verify_measures_the_defect_of_a_step_to_truncation(tmp_path):
-    """`phigen verify` reports the defect of a step to truncation, of one order more than the method, and requires
-    nothing else of it.
+    """For `structure: to truncation`, `phigen verify` reports that the defect DΦ π DΦᵀ − π∘Φ is O(h^(order+1)), and
+    requires no Poisson map.
     """
     from click.testing import CliRunner
 

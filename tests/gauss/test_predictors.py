@@ -1,5 +1,5 @@
-"""Predictors of the stages: steps take few sweeps in C, JavaScript and NumPy, also after kicks and changes of the step
-size.
+"""Predictors of the stages of a Gauss step: steps take few fixed-point sweeps in C, JavaScript and NumPy, also after
+kicks and changes of the step size.
 """
 
 from collections.abc import Callable, Sequence
@@ -44,8 +44,8 @@ SO4, SE3 = Case("so4_manakov", 12, 4), Case("kowalevski_top", 8, 2)
 
 
 def sweeps_in_c(case: Case, sizes: Sequence[float], kick: float, compilation: Compilation) -> list[int]:
-    """Return the number of sweeps in each step, for steps of the given sizes. Before each step but the first, ``kick``
-    is added to all coordinates.
+    """Return the number of fixed-point sweeps in each step, for steps of the given sizes. Before each step but the
+    first, ``kick`` is added to all coordinates.
     """
     raw, counts = RawC(compilation), [0]
     change = np.full(raw.n, kick)
@@ -99,8 +99,8 @@ TARGETS: list[Callable[..., list[int]]] = [sweeps_in_short_c, sweeps_in_fast_c, 
 
 @pytest.mark.parametrize("count", TARGETS)
 def test_steps_of_regular_motion_take_few_sweeps(count):
-    """With a predictor steps take about three and eight sweeps; with the last state alone they would take eight and
-    ten.
+    """With a predictor, steps on so(4) and se(3) take about three and eight fixed-point sweeps; without one they would
+    take eight and ten.
     """
     for case, limit in [(SO4, 3.1), (SE3, 8.0)]:
         assert np.mean(count(case, [case.h] * STEPS)) <= limit
@@ -115,8 +115,8 @@ def test_steps_after_kicks_are_predicted_by_the_last_step(count):
 
 @pytest.mark.parametrize("count", TARGETS)
 def test_steps_of_a_new_size_are_predicted_by_the_last_step_of_the_old_one(count):
-    """The first step of a new size is predicted by the last step of the old size, and the second one by steps of the
-    new size only.
+    """The first step of a new size is predicted by the last step of the old size, and the second step by the first step
+    of the new size only.
     """
     for case in SO4, SE3:
         shorter = 0.3 * case.h
@@ -127,7 +127,7 @@ def test_steps_of_a_new_size_are_predicted_by_the_last_step_of_the_old_one(count
 
 
 def targets_and_compilations(case):
-    """Return the compilation for each target: NumPy, fast C, and short C."""
+    """Return the compilations to test, by the name of their target: NumPy, fast C, and C of profile small."""
     return {"numpy": case.compilation, "c": case.compilation, "short c": small(case.compilation)}
 
 

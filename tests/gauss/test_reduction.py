@@ -1,5 +1,5 @@
-"""Gauss steps whose sweeps iterate momenta only: positions follow from the momenta by the square of the matrix of
-coefficients.
+"""Gauss steps whose fixed-point sweeps iterate momenta only: positions follow from the momenta by the square of the
+matrix of coefficients, as in Nyström methods.
 """
 
 from fractions import Fraction
@@ -65,7 +65,7 @@ def test_unknowns_that_depend_on_themselves_are_iterated_all():
 @pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("text", [HENON + "4", HENON + "12", HENON + "16", NAMBU])
 def test_reduced_sweeps_solve_the_equations_of_all_unknowns(text):
-    """C with reduced sweeps agrees with NumPy, which iterates all unknowns."""
+    """C, which iterates momenta only, agrees with NumPy, which iterates all unknowns."""
     x = [0.3, 0.4, 0.0] if "theta" in text else [0.0, 0.1, 0.49, 0.0]
     compilation = compile_text(text)
     ends = [solver(compilation, target).integrate(x, 0.4, 50).x[-1] for target in ("c", "numpy")]

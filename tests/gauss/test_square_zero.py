@@ -1,5 +1,6 @@
-"""Lie algebras with an ideal whose products vanish (square-zero): functionals on a subalgebra replace the part of a
-group element in the ideal. The step is the same, with fewer unknowns.
+"""Gauss steps for Lie algebras with a square-zero ideal, in which all products vanish, such as the translations in
+se(3). Instead of the part of a group element in the ideal, a stage has linear functionals on the subalgebra as
+unknowns. The step is the same, with fewer unknowns.
 """
 
 import random
@@ -97,9 +98,7 @@ def test_momenta_follow_the_equations_at_any_unknowns(name):
 
 @pytest.mark.parametrize("target", ["numpy", "c", "small"])
 def test_steps_are_those_of_group_elements(target, monkeypatch):
-    """States agree with those of steps by whole group elements, at the ends of steps and in between. In between they
-    use increments in the frame of the end of the step; these predict the next step as well.
-    """
+    """States at the ends of steps and in between agree with those of steps that iterate whole group elements."""
     states = []
     for ideal in (square_zero_ideal, lambda algebra: ()):
         monkeypatch.setattr(realisation, "square_zero_ideal", ideal)

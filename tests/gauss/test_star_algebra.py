@@ -71,8 +71,8 @@ def test_change_of_basis_with_parameters():
 
 
 def test_algebras_of_matrices_have_one_of_matrices():
-    """so(5) preserves a form on R⁵, so the star algebra is that of 5×5 matrices. sl(3) and se(4) preserve no form and
-    act on vectors and covectors.
+    """so(5) preserves a form on R⁵, so its star algebra is that of 5×5 matrices. sl(3) and se(4) preserve no form, so
+    their star algebras act on vectors and covectors.
     """
     algebras = {name: of_matrices(named(*name)) for name in (("so", 5), ("sl", 3), ("se", 4))}
     assert {name: a and (a.dimension, a.sound) for name, a in algebras.items()} == {
@@ -103,8 +103,8 @@ def table_of(lie):
 
 
 def in_basis_of(lie, rows, back):
-    """Return the algebra, with its centre enlarged, in a new basis. ``rows`` has the new basis vectors in the old
-    basis, and ``back`` is the inverse matrix.
+    """Return the direct sum of a Lie algebra and a centre, in a new basis. ``rows`` has the new basis vectors in the
+    old basis, and ``back`` is the inverse matrix.
     """
     n, m = lie.dimension, len(rows)
     old = {at: [*row, *[Fraction(0)] * (m - n)] for at, row in table_of(lie).items()}
@@ -119,7 +119,9 @@ def in_basis_of(lie, rows, back):
 
 
 def scaled(lie, seed, centre=0):
-    """Return the sum of the algebra and a centre, in its old basis with vectors permuted and multiplied by integers."""
+    """Return the direct sum of a Lie algebra and a centre, in its old basis with vectors permuted and multiplied by
+    integers.
+    """
     m, source = lie.dimension + centre, random.Random(seed)
     places, factors = source.sample(range(m), m), [source.choice([1, 2, -1, 3]) for _ in range(m)]
     rows = [[Fraction(factors[i] * (places[i] == j)) for j in range(m)] for i in range(m)]
@@ -128,7 +130,7 @@ def scaled(lie, seed, centre=0):
 
 
 def rebased(lie, seed, centre=0):
-    """Return the sum of the algebra and a centre, in a basis with random integer coefficients."""
+    """Return the direct sum of a Lie algebra and a centre, in a basis with random integer coefficients."""
     m, source = lie.dimension + centre, random.Random(seed)
     rows = [[Fraction(int(i == j)) for j in range(m)] for i in range(m)]
     back = [list(row) for row in rows]

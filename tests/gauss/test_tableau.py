@@ -30,8 +30,8 @@ def test_nodes_have_more_digits_than_are_used():
 
 @pytest.mark.parametrize("stages", STAGES)
 def test_mixing_is_symplectic_without_rounding(stages):
-    """The rounded coefficients satisfy μ_ij + μ_ji = 1 exactly. With the stages in reverse order they also satisfy the
-    condition of a symmetric (self-adjoint) method exactly.
+    """The rounded coefficients μ_ij = a_ij/b_j satisfy μ_ij + μ_ji = 1, the condition of symplecticity, exactly. They
+    also satisfy the condition of a symmetric (self-adjoint) method exactly.
     """
     for precision, digits in ((DOUBLE, np.float64), (SINGLE, np.float32)):
         table = tableau(stages, precision)
@@ -53,8 +53,8 @@ def test_stages_integrate_polynomials(stages):
 
 @pytest.mark.parametrize("stages", [2, 4, 8])
 def test_prediction_extrapolates_slow_signals(stages):
-    """For f = cos(ωt) the increments at the stages of the next step, predicted by the values of the last step, have
-    small errors.
+    """For a slow signal f = cos(ωt), the integrals of f up to the stages of the next step, predicted by the values of
+    the last step, have small errors.
     """
     method, omega = tableau(stages), 0.5
     c, b = np.array(method.nodes), np.array(method.weights)
@@ -64,8 +64,8 @@ def test_prediction_extrapolates_slow_signals(stages):
 
 @pytest.mark.parametrize("stages", STAGES)
 def test_continuation_is_exact_for_polynomials(stages):
-    """For f = t^k with k < s, and t counted from the end of the last step, the predicted increments at the stages of
-    the next step are c^{k+1}/(k+1).
+    """For f = t^k with k < s, the number of stages, and t counted from the end of the last step, the predicted
+    integrals up to the stages of the next step are exactly c^{k+1}/(k+1).
     """
     method = tableau(stages)
     c, b = np.array(method.nodes), np.array(method.weights)

@@ -78,9 +78,7 @@ def test_steps_begin_at_the_origin_and_close_to_it(size):
 
 
 def test_time_and_forces_enter_at_the_stages():
-    """For a driven pendulum with friction all targets are equal, and their errors are those of the order of the
-    method.
-    """
+    """A driven pendulum with friction: all targets agree, and errors are those expected of the order."""
     compilation = compile_text(FORCED, 8)
     final_states = ends(compilation, [0.3, 0.4], 0.2)
     exact = solver(compile_text(FORCED, 16), "c").integrate([0.3, 0.4], 0.1, 2 * STEPS).x[-1]
@@ -106,8 +104,8 @@ def test_tangents_are_equal_and_those_of_the_step(name):
 
 @pytest.mark.parametrize("target", ["numpy", "c", "small"])
 def test_a_step_that_is_too_large_fails_soon(target):
-    """If sweeps do not contract, the step fails long before the maximal number of sweeps, and the state is the last
-    valid one.
+    """If the fixed-point sweeps do not contract, the step fails long before the maximal number of sweeps, and the state
+    is the last valid one.
     """
     method = methods(compiled("henon_heiles", 8, "gauss"))[target]
     with pytest.raises(StepError) as failed:
@@ -191,8 +189,8 @@ def gauged(text, order):
 
 
 def test_long_steps_take_few_sweeps():
-    """Long steps of a stiff body take few sweeps, since `gauge: auto` subtracts a multiple of C from H, stages are
-    predicted, and sweeps end at rounding.
+    """Long steps of a stiff body take few fixed-point sweeps, since `gauge: auto` subtracts a multiple of C from H,
+    stages are predicted, and sweeps end at rounding.
     """
     compilation = gauged(STIFF, 16)
     (sweeps,) = javascript(compilation, "x0: [1, 1, 1]", "s.integrate(0.01, 200);", "[s.evaluations/200]")

@@ -1,5 +1,5 @@
-"""Velocities of group elements as collected sums over momenta in the frame: the same as by coordinates, with fewer
-products.
+"""The velocity ξ of a group element, Ġ = Gξ, collected as sums over the momenta of the frame elements. The values are
+the same as if computed from the coordinates, with fewer products.
 """
 
 import pytest
@@ -37,5 +37,5 @@ def test_collected_velocities_are_those_by_coordinates(name):
 
 
 def test_products_of_a_stage_are_few():
-    """On so(4) collected sums over both copies of so(3) leave 91 products in a stage; by coordinates there are 95."""
+    """On so(4) the collected sums leave at most 91 products in a stage; computed from the coordinates there are 95."""
     assert compiled("so4_manakov", 8, "gauss").program.about.operations["multiplications"] <= 91

@@ -1,4 +1,6 @@
-"""Functions of kernels and the passes over them; tests compare the text of a function before and after a pass."""
+"""Functions of kernels in the loop IR, and the passes over them; tests compare the text of a function before and after
+a pass.
+"""
 
 from textwrap import dedent
 

@@ -40,8 +40,8 @@ def made(name):
 
 @pytest.mark.parametrize("name", ["spin_chain5", "lagrange_top", "kepler", "lotka_volterra"])
 def test_transposes_that_recompute_the_start_of_a_flow_agree_with_those_from_the_start(name):
-    """A transpose that starts at the end of a flow recomputes the start, and returns the same cotangents as one that
-    starts there. The step size and the cotangents are arbitrary.
+    """A transpose that starts from the state at the end of a flow recomputes the state at the start, and returns the
+    same cotangents as the transpose that reads the state at the start.
     """
     program, rng = made(name), np.random.default_rng(5)
     step, n = program.step, program.dimension

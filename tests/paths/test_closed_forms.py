@@ -1,4 +1,4 @@
-"""Karasev's construction by paths compared with closed forms: both have the same order and keep Casimirs. For linear
+"""Steps by Karasev's paths compared with steps by closed forms: both have the same order and keep Casimirs. For linear
 brackets paths give the exponential map.
 """
 

@@ -23,10 +23,10 @@ TURNING = BODY.replace("x1**2/2 + x2**2/4 + x3**2/6", "x1 + x2*x3/50")
 SYSTEMS = {
     "pole": (POLE, (0.3, 0.2), 0.05, 48, (0.1, 0.1)),  # some members reach the pole of x' = x²
     "logarithm": (LOGARITHM, (0.9, 0.1), 0.05, 60, (-0.12, 0.05)),  # the last members start at x < 0
-    "root": (ROOT, (0.9, -0.5, 0.3), 0.05, 24, (-0.07, 0.02, 0.0)),  # x runs into 0
+    "root": (ROOT, (0.9, -0.5, 0.3), 0.05, 24, (-0.07, 0.02, 0.0)),  # x reaches 0, where √x is singular
     "kink": (KINK, (-0.8, 0.3), 0.05, 60, (0.1, 0.0)),  # paths cross x = 0, where their series diverges
-    "turning": (TURNING, (0.2, 0.5, -0.7), 6.0, 40, (0.0, 0.01, 0.0)),  # one rotation in a step: its path is split
-    "turned": (TURNING, (0.2, 0.5, -0.7), 2.5, 60, (0.0, 0.01, 0.0)),  # needs more terms than lanes have
+    "turning": (TURNING, (0.2, 0.5, -0.7), 6.0, 40, (0.0, 0.01, 0.0)),  # about one rotation in a step: paths are split
+    "turned": (TURNING, (0.2, 0.5, -0.7), 2.5, 60, (0.0, 0.01, 0.0)),  # series need more terms than the SIMD code has
 }
 
 
@@ -110,5 +110,5 @@ def test_blocks_of_steps_on_paths_keep_casimirs_to_roundoff():
     raw = RawC(compilation)
     raw.init((0.1, 1.0, 0.1))
     assert raw.integrate(0.1, 20_000) == 0
-    assert raw.counters[1] < 2.2 * raw.counters[0]  # a block takes few passes, single steps would take more
+    assert raw.counters[1] < 2.2 * raw.counters[0]  # blocks take few passes; single steps would take more
     assert abs(raw.x @ raw.x - 1.02) < 2e-15

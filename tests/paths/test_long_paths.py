@@ -10,7 +10,7 @@ from phigen import StepError
 
 EPS = np.finfo(float).eps
 
-#: Systems with linear H, by coordinates, bracket, H, start and step size. Then p = h ∇H is constant, and a step is the
+#: Systems with linear H: coordinates, bracket, H, start and step size. Then p = h ∇H is constant, and a step is the
 #: exact flow for any length of the path.
 LONG = [
     ("[x, y, z]", "{matrix: [[0, -z, y], [z, 0, -x], [-y, x, 0]]}", "3*x - y + 2*z", (0.3, -0.8, 0.5), 9.0),
@@ -145,8 +145,8 @@ def test_steps_too_large_for_the_equation_fail_cleanly():
 
 @pytest.mark.parametrize("target", slow_but(["c"], TARGETS))
 def test_steps_where_the_approximate_matrix_gains_little_are_solved_in_time(target):
-    """The approximate Newton matrix is exact up to O(h²). With these step sizes an iteration with it gains less than a
-    digit, and the solver must still converge.
+    """The approximate Newton matrix is exact up to O(h²). With these large step sizes an iteration with it gains less
+    than a digit, and the solver must still converge.
     """
     solve = solver(by_paths("rigid_body", 4), target)
     for h in (0.95, 1.0, 1.05, 1.1):

@@ -161,7 +161,8 @@ def test_observed_order_is_the_stated_one(name, order):
 
 @pytest.mark.parametrize("composition", COMPOSITIONS, ids=lambda c: f"{c.name}-{c.order}")
 def test_fractions_of_a_composition_satisfy_the_order_conditions_to_roundoff(composition):
-    # The conditions checked are those on power sums: Σγ = 1, Σγ³ = 0, Σγ⁵ = 0, …. The fractions are a palindrome.
+    # Of the order conditions this test checks those on power sums: Σγ = 1, Σγ³ = 0, Σγ⁵ = 0, …. The fractions γ are
+    # symmetric under reversal.
     fractions = composition.fractions
     assert fractions == fractions[::-1]
     assert abs(sum(fractions) - 1) < 4 * EPS

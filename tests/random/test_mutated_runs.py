@@ -22,7 +22,7 @@ from phigen.spec import loads
 
 SEEDS = int(os.environ.get("PHIGEN_RANDOM_SEEDS", "1"))
 SAMPLE, MOST_RUNS = 150, 5
-#: Top-level keys that contain only texts and names; their mutants are not run.
+#: Top-level keys that contain only texts and names; mutants of their values are not run.
 TEXTS = {"title", "description", "references", "license", "name", "phigen", "targets", "sweeps"}
 
 Path_ = tuple[Any, ...]

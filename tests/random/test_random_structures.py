@@ -27,7 +27,7 @@ DRAWS = slow_but(product(KINDS, [0]), product(KINDS, range(SEEDS)))
 
 @cache
 def system_of(kind, seed, order):
-    """Return the compilation of a random system, and the draw."""
+    """Return the compilation of a random system, and the random system itself."""
     drawn = draw(kind, seed)
     return compile_text(drawn.text, order), drawn
 

@@ -299,7 +299,7 @@ def test_a_full_disk_is_told_and_nothing_is_lost(spec, cluster, tmp_path, small_
         def full(members, failed):
             chunks_made.append(members)
             if len(chunks_made) == 2:
-                client.run(setattr, sys, "dont_write_bytecode", True)  # as in full_disk.py
+                client.run(setattr, sys, "dont_write_bytecode", True)  # no truncated modules, as in full_disk.py
                 client.run(resource.setrlimit, resource.RLIMIT_FSIZE, (64, resource.RLIM_INFINITY))
 
         try:
@@ -565,7 +565,9 @@ sweeps:
 
 @pytest.mark.slow
 def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path, monkeypatch):
-    """Each draw adds its number to the seeds of the run, for the state and for the parameter at sites."""
+    """Draw k of a sweep adds k to the seeds of the run: that of the initial state and that of the parameter at
+    sites.
+    """
     from phigen.lattice.states import start_of
 
     spec = specs.loads(CHAIN)

@@ -33,8 +33,8 @@ def test_a_variable_and_its_reciprocal_cancel(up, down, left):
 
 
 def test_a_root_found_after_the_reciprocal_of_its_square_stands_for_it():
-    """If a root appears after the reciprocal of its square, the ring uses the root for both, also where that reciprocal
-    occurs inside another reciprocal. The value stays the same.
+    """If √q appears after 1/q, the ring writes 1/q by the root, also where 1/q occurs inside another reciprocal. The
+    value stays the same.
     """
     x, y = symbol("x"), symbol("y")
     q = 1 + x**2
