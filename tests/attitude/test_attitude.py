@@ -121,12 +121,12 @@ def made(case, order=2):
 
 
 def spec_of(text):
-    """Return the spec with this text, to which the first keys of every spec are added."""
+    """Return the spec with this text, to which the keys phigen and name are added."""
     return specs.loads(f"phigen: 1\nname: t\n{text}")
 
 
 def compiled_text(text):
-    """Return the compilation of a spec, from a text without its first keys."""
+    """Return the compilation of a spec with this text, to which the keys phigen and name are added."""
     return compile_spec(spec_of(text))
 
 
@@ -152,7 +152,7 @@ def statements(compilation):
 def test_elements_leave_the_other_momentum_as_it_is_and_turn_as_h_says(case):
     verdicts = statements(made(case))
     assert verdicts
-    # These statements relate sines of an angle to those of half the angle, and are only checked at points.
+    # The statements on splittings relate sines of an angle to those of half the angle, and are only checked at points.
     if "split" in case:
         assert all(s.holds for s in verdicts)
         assert [s.verdict for s in verdicts].count(PROVED) >= 2

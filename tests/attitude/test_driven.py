@@ -99,8 +99,8 @@ def final(case, n, order=2, target="numpy"):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("case", "order"), [(c, k) for c in CASES for k in (2, 4) if k == 2 or c in HIGHER])
 def test_momentum_and_attitude_have_the_order(case, order):
-    """With the force term hζ in the element of the attitude, or without it in the momentum, the attitude of a damped
-    body would have an error of order 0.
+    """If the group element that updates the attitude contained the term hζ of a force covector ζ, or if the momentum
+    lacked it, the attitude of a damped body would have an error of order 0.
     """
     errors = []
     for n in (16, 32):
@@ -134,7 +134,7 @@ def test_the_attitude_is_that_of_the_state_where_an_increment_is_refused():
 @pytest.mark.parametrize("case", CASES)
 def test_members_have_the_bits_of_runs_alone(case, target):
     """Each member has its own step size, start time, path of the noise and attitude. Stored rows have the bits of
-    single runs, and the last attitude agrees to round-off without stored rows.
+    single runs. Without stored rows, the last attitude agrees to round-off.
     """
     integrator, count = solver(made(case), target), 3
     rng = np.random.default_rng(1)

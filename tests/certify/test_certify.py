@@ -54,8 +54,8 @@ from phigen.runtime import cache as compiled
 from phigen.spec import loads
 from phigen.spec.model import Spec
 
-#: Systems for each kind of step, with changes of the default problem: an explicit step, Newton's method for four kinds
-#: of brackets, a time, a Casimir gauge, a splitting, a monitor, and paths.
+#: Systems for each kind of step, with changes of the default domain or step: an explicit step, Newton's method for four
+#: kinds of brackets, a time, a Casimir gauge, a splitting, a monitor, and paths.
 SYSTEMS: dict[str, dict[str, Any]] = {
     "pendulum_euler": {},
     "pendulum": {"domain": [[-1, 1], [-1.5, 1.5]]},
@@ -74,22 +74,22 @@ SYSTEMS: dict[str, dict[str, Any]] = {
     "charged_particle": {},
 }
 
-#: The largest accepted ratio of the bound to the observed error, in the coordinate where the ratio is smallest;
-#: elsewhere 12. The ratio is large if many terms cancel, because the bound adds their absolute values.
+#: For each system, the largest accepted ratio of the bound to the observed error (12 if not listed), in the coordinate
+#: where this ratio is smallest. The ratio is large if many terms cancel, because the bound adds their absolute values.
 VACUOUS = {"kepler_eccentric": 40}
 
 
 def problem(name: str) -> tuple[StepProblem, dict[str, str]]:
-    """Return the problem of a certificate for a system of the corpus, with the changes in `SYSTEMS`, and the C
-    files.
+    """Return what a certificate is to prove for a system of the corpus (domain, step, parameters and more), with the
+    changes in `SYSTEMS`, and the C files.
     """
     stated, files = problem_of_spec(spec_of(name))
     return dataclasses.replace(stated, **SYSTEMS.get(name, {})), files
 
 
 def problem_of_spec(spec: Spec) -> tuple[StepProblem, dict[str, str]]:
-    """Return the problem of a certificate for a spec, and the C files. The domain is a box of ±1 % around the start of
-    the first run.
+    """Return what a certificate is to prove for a spec, and the C files. The domain is a box of ±1 % around the start
+    of the first run.
     """
     compilation = compile_spec(spec, profile="small")
     files = emit(compilation.program, "c", "phigen certify")
@@ -392,7 +392,8 @@ def test_coefficients_of_series_fall_as_the_rest_assumes() -> None:
     for name in SERIES:
         sizes = [abs(float(c)) for c in COEFFICIENTS[name]]
         assert all(size <= 2.0 ** (1 - n) for n, size in enumerate(sizes)), name
-        # Coefficients with factorials decrease further; those of phi do not, since its nearest pole is 4π².
+        # The coefficients of the other functions decrease like inverse factorials. Those of phi decrease like powers of
+        # 1/(4π²), since its nearest pole is 4π².
         if not name.startswith("phi"):
             assert sizes[TERMS - 2] + sizes[TERMS - 1] < 2.0**-TERMS
 

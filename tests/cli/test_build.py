@@ -65,7 +65,7 @@ def test_listed_specs_are_left_out_of_folders(phigen, write):
     assert "1 spec left out by generated/left_out.txt" in result.stderr
     assert sorted(p.name for p in Path("generated").iterdir()) == ["a", "left_out.txt"]
     assert phigen("build", "specs", "--check").exit_code == 0
-    assert phigen("build", "specs/b.yaml").exit_code == 0, "a spec that is named is built"
+    assert phigen("build", "specs/b.yaml").exit_code == 0, "a spec that the command names is built"
     assert Path("generated/b/b.c").exists()
     forgotten = phigen("build", "specs", "--check")
     assert forgotten.exit_code == 5

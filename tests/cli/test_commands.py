@@ -1,4 +1,6 @@
-"""The commands that show, prove and run."""
+"""``phigen check``, ``show``, ``run``, ``new``, ``schema``, ``list`` and ``demo``: what they print and write, and their
+exit codes.
+"""
 
 import csv
 import json
@@ -19,7 +21,7 @@ from phigen.scheme import discretisation
 SPECS = resources.bundled_specs()
 
 
-# -- check
+# -- phigen check
 
 
 def test_check_groups_statements_and_never_says_just_ok(phigen):
@@ -105,7 +107,7 @@ def test_check_refutes_the_wrong_sign_of_the_paper(phigen, in_tmp):
     assert "refuted              {α_i, α_j} = π_ij∘α" in result.stdout
 
 
-# -- show
+# -- phigen show
 
 
 def test_show_prints_the_series_of_mathematics(phigen, in_tmp):
@@ -126,8 +128,8 @@ def test_show_log_canonical_s3_and_modified_hamiltonian(phigen):
 
 
 def test_terms_that_are_too_many_are_told_and_the_others_shown(phigen, in_tmp, monkeypatch):
-    """Generated code evaluates the series as a graph of shared subexpressions. Its printed form ends before the first
-    term that is too long when expanded.
+    """The printed series ends before the first term that is too long when expanded. Generated code does not expand
+    terms: it evaluates the series as a graph of shared subexpressions.
     """
     monkeypatch.setattr("phigen.spec.limits.SERIES_TERMS", 8)
     series = json.loads(phigen("show", SPECS / "henon_heiles.yaml", "--order", 6, "--json").stdout)
@@ -201,8 +203,8 @@ def test_modified_hamiltonian_in_latex_is_refused_where_it_is_not_computed(phige
 
 
 def test_show_names_each_correction_once(phigen):
-    """The first correction of H is −S_3 of the untruncated series. With --modified it is computed by the general
-    algorithm. In both cases it is printed once, as H_2.
+    """For order 2 the modified Hamiltonian has the correction H_2 = −S_3. With --modified 1 a general algorithm
+    computes this correction. In both cases it is printed once, in the same way.
     """
     pages = [
         phigen("show", SPECS / "lotka_volterra.yaml", "--order", "2", *m).stdout for m in ([], ["--modified", "1"])
@@ -226,7 +228,7 @@ def test_show_says_that_the_maps_of_a_path_are_series(phigen):
         assert all(line.endswith(("+ …", "+ \\cdots")) for line in maps)
 
 
-# -- run
+# -- phigen run
 
 
 def summary(phigen, *args):
@@ -315,7 +317,7 @@ def test_output_of_unknown_kind_is_refused_before_the_work(phigen, write):
     assert phigen("run", write("a.yaml"), "-o", "x.xls").exit_code == 2
 
 
-# -- new, schema, list, demo
+# -- phigen new, phigen schema, phigen list, phigen demo
 
 
 @pytest.mark.slow

@@ -30,7 +30,7 @@ runs:
   falling: {initial: [1, 0], step: 0.1, steps: 140, section: p, direction: falling}
   both: {initial: [1, 0], step: 0.1, steps: 140, section: q, direction: both}
 """
-#: A rigid body with a monitor: its steps are equal in the fictitious time τ, and its physical time t has no closed
+#: A rigid body with a monitor g: its steps are equal in the time τ with dt = g dτ, so its physical time t has no closed
 #: form.
 BODY = """phigen: 1
 name: slowed
@@ -77,7 +77,7 @@ def test_a_run_ends_where_an_expression_vanishes_first_to_roundoff(phigen, swing
     rows = table("a.csv")
     assert rows[:, 0] == pytest.approx([0, 0.3, 0.6, 0.9, np.pi / 3], abs=1e-11)
     assert rows[-1, 1] == pytest.approx(0.5, abs=2e-16)
-    ran(phigen, swing, "--run", "back", "-o", "b.csv")  # the expression of stop vanishes at the start, too
+    ran(phigen, swing, "--run", "back", "-o", "b.csv")  # the run also starts at a zero of stop, which does not end it
     assert table("b.csv")[-1, 0] == pytest.approx(-np.pi, abs=1e-11)
     never = phigen("run", swing, "--run", "never", "-t", "numpy", "-o", "c.csv")
     assert "the expression of stop: has no zero on the run" in never.stderr
@@ -119,8 +119,8 @@ def test_states_at_given_times(phigen, swing):
     ids=["csv", "npz", "monitor", "attitude"],
 )  # fmt: skip
 def test_a_finished_run_is_extended_as_if_it_had_not_ended(phigen, write, text, suffix):
-    """An extended run keeps the gauge and the energy level e = −H(x₀) of its start, and its errors are those of the
-    whole run.
+    """An extended run goes on with the gauge of its start or, with a monitor, with the energy level e = −H(x₀) of its
+    start x₀. Its errors are those of the whole run.
     """
     spec = write("spec.yaml", text)
     whole = ran(phigen, spec, "--until", 3, "-o", f"a.{suffix}", "--json")
@@ -520,7 +520,7 @@ runs: {r: {sizes: [4], initial: {q: 1, p: 0}, step: 0.1, steps: 100}}
 def test_a_stop_of_the_command_line_is_that_of_the_spec(phigen, write, text, run, name):
     command = ("run", write("a.yaml", text), "--run", run, "-t", "numpy")
     result = phigen(*command, "--steps", 100, "--stop", f"max({name}, -1) - 1/2", "--json")
-    # The chain is integrated with order 4.
+    # The chain is integrated with order 4, hence the larger tolerance.
     assert json.loads(result.stdout)["time"] == pytest.approx(np.pi / 3, abs=1e-5)
     assert "the expression of stop: has no zero on the run" in phigen(*command, "--stop", f"{name} - 2").stderr
     for wrong, words in (("1/2", "depends neither"), (f"{name} -", "ends too early"), (f"{name}s", "did you mean")):

@@ -42,9 +42,7 @@ finally:
 @pytest.mark.thin(3, of_all=1)
 @pytest.mark.parametrize("name", ["pendulum", "toda3", "fput"])
 def test_build_imports_no_numerical_library(name, tmp_path):
-    """``phigen build`` works without NumPy, because the import of NumPy takes as long as the compilation of a small
-    system.
-    """
+    """``phigen build`` imports no NumPy, because this import takes as long as the compilation of a small system."""
     code = "import sys; from phigen.cli import main; main()"
     command = [sys.executable, "-X", "importtime", "-c", code, "build", name, "-t", "c", "-q", "-o", str(tmp_path)]
     process = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -112,7 +110,7 @@ def test_exceeded_limit_is_3(phigen, write):
 
 @pytest.mark.parametrize("kind", [IndexError, EOFError])
 def test_internal_error_is_4_and_asks_for_a_report(phigen, write, monkeypatch, kind):
-    """An EOFError is an internal error, too, although click treats it as ^D at a prompt."""
+    """Every unexpected exception is an internal error, even an EOFError, which click treats as ^D at a prompt."""
 
     def broken(*args, **kwargs):
         raise kind("nobody expected this")

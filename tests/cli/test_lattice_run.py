@@ -255,7 +255,7 @@ def killed(phigen, chain, tmp_path, monkeypatch):
 
 
 def files_beside(chain):
-    """Return the contents of the files in the folder of a spec, by name, without the spec."""
+    """Return the contents of all files in the folder of a spec except the spec, by file name."""
     return {path.name: path.read_bytes() for path in chain.parent.iterdir() if path != chain}
 
 

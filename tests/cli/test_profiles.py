@@ -51,8 +51,8 @@ def test_sweeps_are_made_in_the_profile_that_is_asked_for(phigen, write, monkeyp
 
 
 def test_large_lattices_are_shared_between_threads():
-    """Lattices above a number of sites use several threads. The C runtime sets this number, a smaller one for lattices
-    with pairs.
+    """Lattices with more than 4096 sites use several threads, and lattices with pairs those with more than 512 sites.
+    The C runtime has the same limits.
     """
     about = {"name": "t", "coordinates": ("q",), "order": 2, "parameters": {}, "positive": frozenset(), "casimirs": ()}
     chain = LatticeInterface(**about, axes=("i",))

@@ -141,8 +141,8 @@ def test_functions_that_are_called_by_others_belong_to_the_chain(monkeypatch):
     ],
 )  # fmt: skip
 def test_solvers_of_all_kinds_have_a_bound(name, options):
-    """Functions with vectors align their frames at run time. gcc then prints an upper bound of the size of the frame,
-    which counts as a bound.
+    """Functions with vectors align their frames at run time. For these gcc prints an upper bound of the size of the
+    frame, which suffices for a bound of the stack.
     """
     program = compile_spec(load(bundled()[name]), **options).program
     bound = stack_bound(emit(program, "c", ""), name, "-O2")

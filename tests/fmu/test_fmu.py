@@ -166,7 +166,7 @@ def states_of_c(steps, folder):
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("version", [2, 3])
 def test_bits_are_those_of_the_c(free, version, tmp_path):
-    """The communication steps consist of whole steps, and the last one also of a shorter step, as in the C."""
+    """Communication steps of whole solver steps have the bits of the C. So has one that ends with a shorter step."""
     with running(free[1][version], tmp_path) as instance:
         by_unit = []
         for k in range(3):
@@ -181,8 +181,8 @@ def test_bits_are_those_of_the_c(free, version, tmp_path):
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_communication_steps_that_do_not_divide_leave_the_grid_alone(free, version, tmp_path):
-    """Communication points may lie between two steps. At a later common point the state is the same as without these
-    points. Casimir and norm of the quaternion are constant at all points.
+    """One run has communication points between two steps of the solver. At the last point, which both runs have, the
+    states are equal. Casimir and norm of the quaternion are constant at all points.
     """
     with running(free[1][version], tmp_path / "a") as even, running(free[1][version], tmp_path / "b") as odd:
         even.step(0.0, 1.0)
@@ -366,7 +366,9 @@ def test_command_writes_both_versions_without_a_compiler(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif("PHIGEN_ALL_PLATFORMS" not in os.environ, reason="zig makes C libraries first, some minutes")
+@pytest.mark.skipif(
+    "PHIGEN_ALL_PLATFORMS" not in os.environ, reason="zig first compiles C libraries, which takes minutes"
+)
 def test_zig_makes_libraries_for_other_platforms():
     pytest.importorskip("ziglang")
     _, files = unit("satellite")

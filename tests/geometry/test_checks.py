@@ -1,4 +1,4 @@
-"""Statements on systems: proofs of the corpus, and refutations that must not be missed."""
+"""Statements on systems, such as the Jacobi identity: proved for the corpus, and refuted for wrong systems."""
 
 import pytest
 from geometry.building import family, system

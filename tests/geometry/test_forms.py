@@ -1,4 +1,4 @@
-"""Each form of a spec gives the brackets it promises."""
+"""Each form of the key ``poisson`` gives the brackets that it stands for."""
 
 import pytest
 from geometry.building import family, system, texts

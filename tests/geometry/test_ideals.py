@@ -1,4 +1,4 @@
-"""Decomposition of Lie algebras into commuting ideals that no basis element may belong to."""
+"""Decomposition of Lie algebras into commuting ideals, which need not be spanned by elements of the basis."""
 
 import pytest
 from geometry.building import family, system

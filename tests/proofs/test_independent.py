@@ -1,4 +1,4 @@
-"""The second derivation by sympy: it agrees with the compiler for the corpus, and refutes compilers with deliberate
+"""The second derivation of the series, by sympy: it agrees with the compiler for the corpus, and refutes deliberate
 errors.
 """
 
@@ -118,7 +118,7 @@ def test_other_bi_realisations_are_what_sympy_derives(name):
     expect_equal(compile_text(SYSTEMS[name]), 4)
 
 
-# -- planted bugs
+# -- deliberate errors
 
 
 def test_a_wrong_factor_in_the_recursion_is_refuted(monkeypatch):
@@ -134,7 +134,9 @@ def test_a_wrong_factor_in_the_recursion_is_refuted(monkeypatch):
 
 
 def test_a_wrong_series_of_paths_is_refuted(monkeypatch):
-    """The mean of a path is patched to have 1/j! instead of 1/(j + 1)! in the terms that are compared."""
+    """In the series of Karasev's paths, the mean over a path is patched to have 1/j! instead of 1/(j + 1)! in the terms
+    that are compared.
+    """
     text = BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: karasev\n"
     assert set(verdicts(compile_text(text), 3).values()) == {PROVED}
     monkeypatch.setattr(karasev, "factorial", lambda n: max(n - 1, 1))

@@ -1,4 +1,4 @@
-"""The three axioms: proved for bi-realisations of the catalogue, refuted for wrong ones that resemble them."""
+"""The axioms of bi-realisations: proved for those of the catalogue, refuted for wrong ones that resemble them."""
 
 from dataclasses import replace
 
@@ -262,7 +262,7 @@ def test_large_bi_realisations_are_checked_at_points(monkeypatch):
     assert statements[ALPHA].detail.startswith("3 points, exactly")
     assert verdicts(check(s, broken(realisation))[ALPHA:FORMS]) == [REFUTED] * 3
     assert verdicts(check(s, replace(realisation, beta=realisation.alpha))[ALPHA:FORMS]) == [CHECKED, REFUTED, REFUTED]
-    exponential = family("so", 3)  # α is not rational
+    exponential = family("so", 3)  # its α is not rational
     assert verdicts(check(exponential, realise(exponential))) == [PROVED] * 5
 
 

@@ -1,4 +1,6 @@
-"""The exponential: closed forms found from structure constants, in any basis, with parameters and cocycles."""
+"""The exponential bi-realisation: closed forms found from structure constants, in any basis, with parameters and
+cocycles.
+"""
 
 from dataclasses import replace
 from fractions import Fraction

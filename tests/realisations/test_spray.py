@@ -76,7 +76,7 @@ def test_symplectic_example_flow_form_and_psi():
     s = symbol(TIME)
     flow = [Q + s * B, P - s * A, A, B]
     assert is_flow(flow, [B, -A, ZERO, ZERO], Z)  # the flow of the spray X = ξ_p ∂_q − ξ_q ∂_p
-    assert same(at_time(flow, 1)[:2], [Q + B, P - A])  # β̅
+    assert same(at_time(flow, 1)[:2], [Q + B, P - A])  # the map β̅, with β = β̅∘ψ
 
     moved = pull_back(canonical(2), flow, Z)
     omega = {key: integrated(w, 0, 1) for key, w in moved.items()}
@@ -116,8 +116,8 @@ def test_psi_of_the_other_sign_is_refuted():
 
 
 def test_psi_is_not_the_identity_to_first_order_but_its_centred_part_is():
-    # The paper says that ψ is the identity to first order, but ψ moves x by −½πp. This is true of ψ₀ in ψ = Φ^{−½}∘ψ₀,
-    # where Φ is the flow of the spray.
+    # The paper says that ψ is the identity to first order. But ψ moves x by −½πp. It is ψ₀ that is the identity to
+    # first order, where ψ = Φ^{−½}∘ψ₀ and Φ is the flow of the spray.
     assert not same([derivatives([e], momentum("p"))[0] for e in PSI[:1]], [ZERO])
     for s in (system("x y z", SO3), system("x y z", CUBIC)):
         spray = make_spray(s, "flat")
@@ -308,7 +308,7 @@ def test_exchanged_maps_and_a_wrong_coefficient_are_refuted():
     realisation = realise(s, BirealisationChoice("spray"))
     swapped = replace(realisation, alpha=realisation.beta, beta=realisation.alpha)
     assert verdicts(check(s, swapped)) == [PROVED, REFUTED, REFUTED, PROVED, REFUTED]
-    # The flow for the time −½ without the correction ψ₀ is only right in degree 1.
+    # The flow of the spray for the time −½, without the correction ψ₀, is only right in degree 1.
     spray = make_spray(s, "flat")
     half = [
         spray.space.tower.expression(

@@ -83,7 +83,7 @@ def raced(tmp_path_factory):
             live = gathered(compilation, None, run, specification.parameters_of(run), ())
             code, names, section = script(live), CURVES[:-1], live_section(compilation, live)
         if not live.solvers:
-            pytest.skip(f"it has no panel: {live.why_not}")
+            pytest.skip(f"the system has no panel: {live.why_not}")
         data = re.search(r'id="live-data"[^>]*>(.*?)</script>', section, re.DOTALL)[1]
         sources = [(templates() / "report" / name).read_text(encoding="utf-8") for name in names]
         path = folder / f"{specification.name}.mjs"

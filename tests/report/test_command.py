@@ -14,8 +14,9 @@ from phigen.study import verification
 @pytest.fixture
 def phigen(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    # Figures are slow and have their own tests, so the page is made as if matplotlib were not installed. Only this
-    # look-up is replaced: a module that is first imported during a test would keep any other replaced function.
+    # Figures are slow and have their own tests, so the page is made as if matplotlib were not installed. The patch
+    # replaces the look-up of matplotlib and not a function of phigen: modules that are first imported during a test
+    # would keep the replacement.
     monkeypatch.setattr("phigen.report.drawable.find_spec", lambda name: None)
     return lambda *args: CliRunner().invoke(group, ["report", *map(str, args)], prog_name="phigen")
 

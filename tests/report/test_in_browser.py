@@ -231,7 +231,7 @@ def test_panels_of_the_corpus_begin_with_half_of_a_step_that_works(browser, tmp_
     start = solver.integrate(chosen["start"], chosen["h"], 50, **parameters)
     wide = solver.integrate(chosen["start"], 2 * chosen["h"], 50, **parameters)
     assert np.isfinite(start.x).all()
-    assert np.isfinite(wide.x).all(), "twice the first step is taken too"
+    assert np.isfinite(wide.x).all(), "a step of twice the size works, too"
     click(browser, "play")
     assert told(browser, "ours")["steps"] == 100
     nothing = "Nothing is conserved" in path.read_text(encoding="utf-8")

@@ -45,7 +45,7 @@ def bare(compilation, **more):
     )
 
 
-# -- one page with everything, of a hostile spec
+# -- the page with all sections, of a spec whose texts try to inject scripts
 
 
 def test_page_is_sound_html_that_loads_nothing(html):
@@ -152,7 +152,7 @@ def test_a_long_spec_is_cut():
     assert f"the first {pages.SOURCE} of 500000 characters" in text
 
 
-# -- parts
+# -- parts of the page
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
-/* A solver of the generated API, written by hand: the rotation of (q, p) with frequency omega, beside a constant c.
-   A step fails where |q| would exceed limit. */
+/* A solver with the API of generated C, written by hand: the harmonic oscillator (q, p) with the frequency omega, and a
+   constant coordinate c. A step fails if |q| would exceed limit. */
 #ifndef OSCILLATOR_H
 #define OSCILLATOR_H
 #include <stddef.h>

@@ -53,9 +53,7 @@ SECTIONS.append(("nambu_pendulum", "c"))
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("name", "target"), slow_but(SECTIONS, [*SECTIONS, *product(["guiding_centre"], TARGETS)]))
 def test_crossings_lie_on_the_section_and_on_the_leaf(name, target):
-    """The section is an oblique plane through the middle of the orbit, the set where g vanishes, so that no symmetry of
-    the system helps.
-    """
+    """The section g = 0 is an oblique plane through the middle of the orbit, so that it has no special position."""
     it, at = solver(compiled(name), target), setting(compiled(name))
     steps = {"guiding_centre": 60, "rigid_body": 400}.get(name, 1000)
     rows = it.integrate(at.x, at.h, steps, parameters=at.parameters)
@@ -99,8 +97,8 @@ KINDS = {
 @pytest.mark.thin(3)
 @pytest.mark.parametrize(("kind", "target"), slow_but(product(KINDS, ["numpy"]), product(KINDS, TARGETS)))
 def test_every_kind_of_step_is_cut_and_ends_where_a_function_vanishes(kind, target):
-    """Each crossing lies within the step in which g changes its sign, and g vanishes there to round-off. A terminal
-    event of `solve_ivp` and an end of a run by ``stop`` are the first crossing, with the attitude at this time.
+    """Each crossing lies within the step in which g changes its sign, and g vanishes there to round-off. A run that
+    ends by a terminal event of `solve_ivp`, or by ``stop``, ends at the first crossing, with the attitude at this time.
     """
     text, start, i = KINDS[kind]
     drift = 0.01 * kind.startswith("time")
@@ -175,7 +173,7 @@ def test_no_crossings_at_rest_or_away_from_the_section():
 
 def test_steps_too_large_to_be_made_from_scratch_are_divided(monkeypatch):
     """A step to a crossing begins without the predictor of the running session, so the iteration may not converge for a
-    large step, which is then divided. Here all other steps above 0.03 are made to fail.
+    large step, which is then divided. In this test all steps above 0.03 fail, except the regular steps of 0.1.
     """
     from phigen.runtime.c_session import CSession
     from phigen.runtime.interface import BackendError

@@ -83,8 +83,8 @@ def test_vmap_is_a_loop(solver, axes):
 
 @pytest.mark.slow
 def test_members_share_a_parameter_in_any_way(solver):
-    """The derivative by the shared parameter I2 is the sum over the members: with members as leading axis of x, with
-    vmap over x inside the derivative, and with vmap over I2 outside.
+    """The derivative by a shared parameter I2 is the sum over the members, whether these are the leading axis of x, or
+    vmap runs over x inside the derivative, or over I2 outside of it.
     """
     propagate = propagator(solver)
     expected = sum(jax.grad(cubes(propagate), argnums=1)(x, 2.2) for x in X)

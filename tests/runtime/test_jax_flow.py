@@ -45,7 +45,7 @@ def flow(name, h, steps, **options):
 
 
 def network(x, weights):
-    """Return the output, one number, of a neural network with one layer of seven units. This network is H."""
+    """Return the value at x of a neural network with one layer of seven units, which serves as H."""
     return jnp.tanh(x @ weights["rows"] + weights["shift"]) @ weights["last"]
 
 
@@ -98,7 +98,7 @@ def test_steps_to_truncation_are_none():
 
 @pytest.mark.slow
 def test_order_is_that_of_the_method():
-    """Half the step divides the error of order 4 by 2⁴. Order 6 is compared with a solver by
+    """With half the step, the error of the method of order 4 is 2⁴ times smaller. Order 6 is compared with a solver by
     `test_rows_are_those_of_the_solver`.
     """
     x, weights = start_of(3), weights_of(3)

@@ -71,8 +71,8 @@ def test_orbits_of_a_monitor_are_those_of_the_energy_after_the_kick(target):
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_the_momentum_in_space_is_constant_after_an_impulse_too(target):
-    """A gauge adds multiples of Casimirs to H, which rotates the body at a rate that depends on the leaf. After an
-    impulse, the attitude is corrected by the rate of the new leaf.
+    """A gauge adds multiples of Casimirs to H. These rotate the body at a rate that depends on the leaf, so after an
+    impulse the attitude must use the rate of the new leaf.
     """
     session, at = session_of("dzhanibekov", target)
     session.step(at.h, 40)
@@ -134,7 +134,7 @@ def test_what_is_not_allowed_leaves_all_as_it_was(target):
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_after_a_change_of_parameters_a_session_goes_on_as_one_that_starts_there(name, target):
-    """The session keeps its gauge, and a session that starts at the same state determines its own one. So the states
+    """The session keeps its gauge, and a session that starts at the same state determines a new gauge. So the states
     differ by less than the error of the steps.
     """
     session, at = session_of(name, target)

@@ -1,4 +1,4 @@
-"""Arrays over sites that cannot fit are refused before they are made."""
+"""Arrays over sites that do not fit into memory are refused before they are allocated."""
 
 from contextlib import nullcontext
 

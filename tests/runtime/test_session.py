@@ -8,8 +8,8 @@ from phigen.errors import StepError
 from phigen.runtime.interface import BackendError
 
 STEPS = 24
-#: One system for each driver, the loop over steps in the C runtime: Newton's method, explicit steps, and the path
-#: realisation.
+#: One system for each driver, the loop over steps in the C runtime: Newton's method, explicit steps, and Karasev's
+#: paths.
 DRIVERS = ("rigid_body", "pendulum_euler", "sir_epidemic")
 
 

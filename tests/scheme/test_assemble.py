@@ -105,7 +105,7 @@ def test_collected_polynomials_differentiate_like_the_tower():
             assert mpmath.almosteq(*values([mine, theirs], at), mpmath.mpf(10) ** -25)
 
 
-# -- the budget
+# -- the limit of operations
 
 
 def test_a_program_beyond_the_budget_is_refused_with_a_hint(monkeypatch):

@@ -71,7 +71,7 @@ def test_schemes_that_do_not_apply_are_left_out():
 
 
 def test_the_series_is_the_default():
-    """A spec without the key has the scheme series. The default of lattices is auto."""
+    """A spec without the key ``scheme`` uses the series. For a lattice the default is auto."""
     assert loads(f"phigen: 1\nname: t\n{BODY}").scheme == "series"
     assert spec_of("toda3").scheme == "series"
     text = "coordinates: [q, p]\nlattice: {axes: [i]}\npoisson: {canonical: {q: [q], p: [p]}}\n"

@@ -1,5 +1,5 @@
-"""Monitors g with dt = g dτ: a step in τ, that of K = g(H + e), is exactly a Poisson map at fixed e, and computes the
-time t.
+"""Monitors g with dt = g dτ: a step in τ, made with the Hamiltonian K = g(H + e), is exactly a Poisson map for a fixed
+energy level e, and also computes the time t.
 """
 
 import numpy as np
@@ -183,7 +183,7 @@ def test_until_and_at_without_a_monitor(target):
 def test_a_session_goes_on_from_its_bytes_with_its_time_and_its_e(kepler, target):
     backend = kepler[1][target].backend
     whole, first = backend.start(START, {}), backend.start(START, {})
-    whole.advance(STEP, 64)  # 64 and 32 are whole blocks; a block that ends early may round differently
+    whole.advance(STEP, 64)  # steps are made in blocks; a block that ends early may round differently
     first.advance(STEP, 32)
     resumed = backend.restored(first.saved(), {})
     resumed.advance(STEP, 32)
@@ -303,7 +303,9 @@ def test_without_a_monitor_nothing_is_said_of_it():
 
 @pytest.mark.parametrize("forces", ["", "forces: {covector: {x1: x2}, vector: {x3: x1}}\n"])
 def test_sympy_derives_the_same_with_a_monitor(forces):
-    """The derivation by sympy treats e as a symbol of K. With forces, p is g(∇H + ζ), which is not a gradient."""
+    """The derivation by sympy treats the energy level e as a symbol of K. With forces, the covector p is g(∇H + ζ),
+    which is not a gradient.
+    """
     agreements = list(compare(compile_spec(spec.loads(BODY + forces), order=2)))
     assert all(c.statement.holds for c in agreements if c.term is None)
     assert any(c.statement.name == GRADIENT for c in agreements)

@@ -1,5 +1,5 @@
-"""Roles of kernels: each belongs to one group or stands alone. By the group, loops over sites choose the arrays that
-they read.
+"""Roles of kernels, the functions that a program evaluates: each role belongs to one group or to none. The group
+determines which arrays the loops over sites read.
 """
 
 import pytest

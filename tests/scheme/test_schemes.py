@@ -10,7 +10,7 @@ from phigen.scheme.program import Program
 from phigen.spec.names import SCHEMES
 from phigen.spec.validate import WITHOUT_SERIES
 
-#: The schemes without auto, which chooses among the others.
+#: All schemes except auto, which chooses one of these.
 NAMED = [scheme for scheme in SCHEMES if scheme != "auto"]
 
 #: A body whose Hamiltonian is not quadratic, so that the flow of the whole of H has no closed form.

@@ -1,4 +1,4 @@
-"""Kinds of steps: each has an entry in the tables of the rooms that treat kinds differently."""
+"""Kinds of steps: each has an entry in the tables of the packages that treat kinds differently."""
 
 import re
 

@@ -1,5 +1,5 @@
-"""The Hamilton–Jacobi series: closed forms, parity, comparison with sympy, and of two representations with each
-other.
+"""The Hamilton–Jacobi series: closed forms, parity, comparison with sympy, and agreement of its two representations, by
+polynomials and by graphs.
 """
 
 from fractions import Fraction
@@ -57,7 +57,7 @@ def tangent_coefficients(count):
     return [Fraction(int(c.p), int(c.q)) for c in (poly.coeff(t, 2 * k + 1) for k in range(count))]
 
 
-# -- check values with closed forms
+# -- closed forms
 
 
 def test_oscillator_in_the_midpoint_chart_is_a_tangent():
@@ -110,7 +110,7 @@ def test_logarithmic_hamiltonian_of_a_log_canonical_system_is_its_own_series():
     assert all(expansion.tower.is_zero(term) for term in expansion.terms[1:])
 
 
-# -- structure
+# -- parity, and the Hamilton–Jacobi equation
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if described(name)[2].symmetric])
@@ -255,7 +255,7 @@ FREE_OF_MOMENTUM = [
     (call("tan", q) * PI, lambda x: mpmath.tan(x) * mpmath.pi),
     (call("atan2", q, ONE), lambda x: mpmath.atan2(x, 1)),
     (call("abs", q) * q, lambda x: abs(x) * x),
-    (sqrt(power(symbol("g"), Fraction(2))) * q, lambda x: x),  # √g² is 1 at g = 1; the result must not contain 1/g
+    (sqrt(power(symbol("g"), Fraction(2))) * q, lambda x: x),  # √g² is a constant factor, 1 at g = 1
 ]
 
 
@@ -274,7 +274,7 @@ def test_series_of_a_shift_is_a_taylor_expansion(function, exact):
         assert all(abs(x - y) < mpmath.mpf(10) ** -18 * (1 + abs(y)) for x, y in zip(computed, expected, strict=True))
 
 
-# -- cost
+# -- time and memory
 
 
 def test_order_twelve_of_the_rigid_body_is_quick():

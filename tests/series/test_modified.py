@@ -95,7 +95,7 @@ def test_first_correction_is_minus_the_first_term_left_out(text, terms):
     ],
 )
 def test_constant_to_higher_order_for_each_term(name, order):
-    """The truncated modified Hamiltonian Σ_{j<m} h^j H_j varies along a trajectory by O(h^m)."""
+    """The modified Hamiltonian Σ h^j H_j, truncated before the power m, varies along a trajectory by O(h^m)."""
     compilation = compile_spec(replace(compiled(name).spec, gauge="none"), order=order)
     at = setting(compilation)
     stride = 2 if compilation.realisation.symmetric else 1

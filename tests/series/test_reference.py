@@ -41,7 +41,7 @@ def series(hamiltonian, source, coordinates, terms):
     return list(islice(generating_function(hamiltonian, source, coordinates), terms))
 
 
-# -- S_1, S_2, …
+# -- the series S_1, S_2, …
 
 
 def tangents(terms):
@@ -95,7 +95,7 @@ def test_taylor_reaches_each_multi_index_once():
     assert sympy.expand(f.subs(shift, simultaneous=True) - taylor_sum) == 0
 
 
-# -- paths
+# -- Karasev's paths
 
 
 def test_paths_of_linear_tensors_are_bernoulli_polynomials():
@@ -118,7 +118,7 @@ def test_paths_satisfy_the_axioms(tensor):
     assert list(defects(tensor, alpha, beta, x, p, 3)) == []
 
 
-# -- axioms
+# -- axioms of α and β
 
 
 def wrong_signs():
@@ -135,7 +135,7 @@ def test_wrong_signs_violate_the_axioms(tensor, alpha):
     assert any(True for _ in defects(tensor, *(closed_form(m, p)(3) for m in (alpha, mirrored)), x, p, 3))
 
 
-# -- what is 0
+# -- proofs that an expression is 0
 
 u, v = x[0], x[1]
 ZEROS = [

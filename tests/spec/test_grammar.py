@@ -137,7 +137,7 @@ def trees() -> st.SearchStrategy[Expression]:
 
 
 def value(e: Expression, point: dict[str, float]) -> float:
-    """Return the value in double precision. Raise an error unless it is real and at most 10⁶."""
+    """Return the value in double precision. Raise an error unless it is real and its absolute value is at most 10⁶."""
 
     def visit(node: Expression, args: list[float]) -> float:
         simple: dict[str, Any] = {

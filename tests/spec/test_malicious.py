@@ -21,7 +21,7 @@ def refused(data: str | bytes, tmp_path: Path) -> SpecError:
     """Return the error of a spec file with this content, which must come within `SECONDS`."""
     path = tmp_path / "spec.yaml"
     path.write_bytes(data.encode() if isinstance(data, str) else data)
-    start = time.process_time()  # of this process, since other processes must not count
+    start = time.process_time()  # processor time of this process only
     with pytest.raises(SpecError) as caught:
         load(path)
     assert time.process_time() - start < SECONDS

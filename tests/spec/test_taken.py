@@ -21,8 +21,8 @@ _CPP = "algorithm chrono complex filesystem fstream functional iostream map memo
 
 
 def reached(compiler, language, names):
-    """Return the names, without suffix, of the headers in the folders of the search path that these headers include,
-    directly or through others. Names that do not exist are left out.
+    """Return the names, without suffix, of all headers in the folders of the search path that the headers ``names``
+    include, directly or through others. Names that do not exist are left out.
     """
     text = "".join(f"#if __has_include(<{name}>)\n#include <{name}>\n#endif\n" for name in names)
     command = [tool(compiler), "-x", language, "-E", "-M", "-v", "-"]
@@ -74,8 +74,8 @@ def declared():
 
 
 def test_no_two_specs_share_a_symbol(declared):
-    """A symbol of one solver can only equal a symbol of another solver if the name of a spec has an end such as
-    _default. The list of refused ends has exactly these ends.
+    """A symbol of one solver can only equal a symbol of another solver if one of the specs has a name that ends in a
+    word such as _default. The list of refused ends has exactly these words.
     """
     pairs = {(s.removesuffix(f"_{t}"), s) for s in declared for t in declared if s.endswith(f"_{t}")}
     # Names of specs have no capital letters.
@@ -115,7 +115,7 @@ def test_other_names_are_free(name):
         ("math", "k", "hide the header"),
         ("body_default", "k", "clash"),
         ("body", "h", "called 'h'"),
-        ("Body", "k", "stand"),
+        ("Body", "k", "cannot be used"),
     ],
 )
 def test_systems_from_sympy_obey_the_same_rules(name, parameter, complaint):

@@ -129,8 +129,8 @@ def test_gradients_of_lattices_are_checked_on_few_sites_and_on_those_of_the_run(
 
 
 def test_positive_parameters_of_sites_may_differ_by_powers_of_ten():
-    """The parameters are like the masses of a sun and of planets. The differences of runs must use steps so small that
-    no mass becomes negative.
+    """The parameters are like the masses of a sun and of planets. Difference quotients must change each mass by so
+    little that it stays positive.
     """
     masses = "{value: 1, at: sites, positive: true}"
     text = SPINS.replace("{value: 0.8, at: sites}", masses).replace("B*z**2/2", "log(B)*z/8")

@@ -29,7 +29,7 @@ def test_times_of_the_solver_do_not_contain_its_set_up(body):
     start = START.copy()
     methods = race.compiled(body, ["rk4"], start, PARAMETERS)
     of_phigen, rk4 = (methods.runners[name](0.05, 10, 1) for name in (race.OWN, "rk4"))
-    start *= 2  # RK4 reads the start in each measurement, but the solver was set up before
+    start *= 2  # the solver was set up with the old start, but RK4 reads the new one
     assert (methods.runners[race.OWN](0.05, 10, 1) == of_phigen).all()
     assert not np.allclose(methods.runners["rk4"](0.05, 10, 1), rk4)
 
@@ -65,7 +65,7 @@ def test_a_step_that_cannot_be_made_has_no_result(in_c):
 @pytest.mark.slow
 @pytest.mark.parametrize("make", ["c", "python"])
 def test_orders_of_a_study_are_the_stated_ones(body, in_c, make, monkeypatch):
-    # A busy machine would reach this limit before the small steps.
+    # A busy machine would reach this time limit before it measures small steps.
     monkeypatch.setattr(precision, "MOST_SECONDS", math.inf)
     methods = ["rk4", "dop853"]
     other = race.interpreted(solver(body, "numpy"), methods, START, PARAMETERS)
