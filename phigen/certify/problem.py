@@ -13,6 +13,7 @@ from phigen.symbolic.numeric import evaluate
 from phigen.symbolic.remainders import QUOTIENTS, REMAINDERS
 from phigen.symbolic.universal import ANOMALY
 from phigen.targets.c.gauss import with_frames
+from phigen.targets.c.language import members
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
@@ -53,6 +54,7 @@ def problem_of(
         text=text,
         step=step,
         parameters={p.name: float(parameters[p.name]) for p in program.parameters},
+        members={member: parameter for parameter, member in members(program).items()},
         gauge=_gauge(compilation, parameters, start),
         domain=domain,
         time=time,

@@ -66,15 +66,17 @@ class NoCertificateError(RefusedError):
 class StepProblem:
     """Problem to be certified: a solver in C, its parameters, and a domain of states and times.
 
-    ``text`` is the C; ``gauge`` are the multiples of Casimirs that are subtracted from H or, with a monitor, the energy
-    level e. ``ulps`` is a bound for the errors of libm, and ``within`` the largest error bound that is accepted, both
-    in units in the last place. ``timed`` says that steps depend on the time.
+    ``text`` is the C; ``members`` maps names of parameters in C to those of the spec. ``gauge`` are the multiples of
+    Casimirs that are subtracted from H or, with a monitor, the energy level e. ``ulps`` is a bound for the errors of
+    libm, and ``within`` the largest error bound that is accepted, both in units in the last place. ``timed`` says that
+    steps depend on the time.
     """
 
     name: str
     text: str
     step: float
     parameters: Mapping[str, float]
+    members: Mapping[str, str]
     gauge: Sequence[float]
     domain: Box
     time: Sequence[float]
@@ -97,7 +99,7 @@ def described(problem: StepProblem, exact: bool = False) -> dict[str, Any]:
         "gauge": list(problem.gauge),
     }
     box = [interval(d) for d in problem.domain]
-    facts = {**facts, **numbers, "start": sum(problem.time) / 2}
+    facts = {**facts, **numbers, "members": problem.members, "start": sum(problem.time) / 2}
     return {
         "phigen": __version__,
         "name": problem.name,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import itertools
+import keyword
 import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -17,6 +18,15 @@ _WORK = "work"
 
 #: Pattern of floating-point literals in C, with a point or an exponent; integer literals are indices and do not match.
 _NUMBER = r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)"
+
+#: Pattern of Python's keywords, which are identifiers in C.
+_KEYWORDS = rf"\b({'|'.join(keyword.kwlist)})\b"
+
+#: Suffix of Python's keywords while C is parsed as Python. Names in generated C end in ASCII characters.
+_SUFFIX = "π"
+
+#: Statement of splittings with `adjoint: true`: it copies the state, and changes nothing that a step computes.
+_TAPE = "if (tape != NULL) memcpy(tape++, x, sizeof *tape);"
 
 
 class GeneratedC:
@@ -244,10 +254,19 @@ def _polynomial(source: GeneratedC, name: str) -> dict[str, Any]:
 
 
 def _parsed(text: str, mode: str = "eval") -> Any:
+    """Return the Python syntax tree of an expression or assignment in C."""
     try:
-        tree = ast.parse(text, mode=mode)
+        tree = ast.parse(re.sub(_KEYWORDS, rf"\1{_SUFFIX}", text), mode=mode)
     except SyntaxError:
         raise RefusedError(f"the C has {text!r}, which certificates do not cover") from None
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(name):
+                node.id = name.removesuffix(_SUFFIX)
+            case ast.Attribute(_, name):
+                node.attr = name.removesuffix(_SUFFIX)
+            case ast.keyword(str(name)):
+                node.arg = name.removesuffix(_SUFFIX)
     return tree.body if isinstance(tree, ast.Expression) else tree.body[0]  # type: ignore[attr-defined]
 
 
@@ -355,7 +374,7 @@ def _block(lines: Iterator[str]) -> list[tuple[str, Any]]:
             statements.append(("call", (int(call[1]), call[2])))
         elif advance:
             statements.append(("advance", advance[1]))
-        elif line:
+        elif line not in ("", _TAPE):
             raise RefusedError(f"the C has the statement {line!r}, which certificates do not cover")
     return statements
 

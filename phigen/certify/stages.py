@@ -71,20 +71,23 @@ class Listing:
 
 
 class _Parameters(dict[str, int]):
-    """Indices of operations that read parameters, by name; an operation is appended when its parameter is first
-    used."""
+    """Indices of operations that read parameters, by their names in C; an operation is appended when its parameter is
+    first used. ``names`` maps names in C to those of the spec."""
+
+    def __init__(self, listing: Listing, names: Mapping[str, str]) -> None:
+        self._listing, self._names = listing, names
+
+    def __missing__(self, member: str) -> int:
+        return self._listing.input("constant", "parameters", self._names[member])
+
+
+class _Gauge(dict[int, int]):
+    """Indices of operations that read multiples of Casimirs, by number; an operation is appended on first use."""
 
     def __init__(self, listing: Listing) -> None:
         self._listing = listing
 
-    def __missing__(self, name: str) -> int:
-        return self._listing.input("constant", "parameters", name)
-
-
-class _Gauge(_Parameters):
-    """Indices of operations that read multiples of Casimirs, by number; an operation is appended on first use."""
-
-    def __missing__(self, index: int) -> int:  # type: ignore[override]
+    def __missing__(self, index: int) -> int:
         return self._listing.input("constant", "gauge", index)
 
 
@@ -102,7 +105,7 @@ def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int
     if facts.get("multiples"):  # coefficient of the modified potential of a splitting: a multiple of h²
         square = listing.add("mul", step, step)
         kick = [listing.add("mul", listing.input("exact", facts["multiples"][stage]), square)]
-    kernels, inputs = facts["kernels"], {"params": _Parameters(listing), "gauge": _Gauge(listing)}
+    kernels, inputs = facts["kernels"], {"params": _Parameters(listing, facts["members"]), "gauge": _Gauge(listing)}
     coef = listing.copy(kernels["prepare"], **inputs, h=[h], kick=kick)["coef"]
     if "at_time" in kernels:
         moment = listing.add("mul", listing.input("exact", facts["middles"][stage]), step)

@@ -565,6 +565,39 @@ def test_steps_with_a_corrector_are_those_of_a_run_of_one() -> None:
     assert min(bound / error for error, bound in pairs if error > 0) < 12
 
 
+NAMES = """
+phigen: 1
+name: names
+coordinates: [await, p]
+poisson: {canonical: {q: [await], p: [p]}}
+parameters: {lambda: 1.5, int: 0.7, I: 0.3, v_int: 2}
+hamiltonian: lambda*p**2/2 + int*await**2/8 + I*await + v_int*await*p/9
+order: 2
+runs: {one: {initial: [0.3, 0.2], step: 0.1, steps: 10}}
+"""
+
+
+@pytest.mark.parametrize("scheme", ["series", "splitting"])
+def test_names_may_be_keywords_of_python_or_c(scheme: str) -> None:
+    stated, files = problem_of_spec(loads(NAMES).overridden(scheme=scheme))
+    c = json.loads(json.dumps(certified(stated, 4)))
+    assert c["parameters"] == {"lambda": 1.5, "int": 0.7, "I": 0.3, "v_int": 2}
+    assert all(
+        error <= bound < 1e-14 for error, bound in zip(observed(c, c, library(files), 8), c["bound"], strict=True)
+    )
+
+
+@pytest.mark.parametrize("name", ["driven", "corrected"])
+def test_splittings_with_gradients_have_the_same_bounds(name: str) -> None:
+    text = {"driven": DRIVEN, "corrected": CORRECTED}[name]
+    plain, _ = problem_of_spec(loads(text))
+    stated, files = problem_of_spec(loads(f"{text}adjoint: true\n"))
+    assert "tape" in stated.text
+    c = json.loads(json.dumps(certified(stated, 4)))
+    assert c["bound"] == certified(plain, 4)["bound"]
+    assert all(error <= bound for error, bound in zip(observed(c, c, library(files), 8), c["bound"], strict=True))
+
+
 CORRECTED = """
 phigen: 1
 name: corrected
