@@ -73,7 +73,7 @@ class _Compiled(ABC):
     @property
     @abstractmethod
     def poisson(self) -> bool:
-        """Whether a step is a Poisson map to round-off: its structure is exact, and there are no forces."""
+        """Whether a step is a Poisson map to round-off: it preserves the structure exactly, and there are no forces."""
 
     @property
     def symmetric(self) -> bool:
@@ -206,12 +206,12 @@ class _CompiledSystem(_Compiled, ABC):
 
     @property
     def poisson(self) -> bool:
-        """Whether a step is a Poisson map to round-off: its structure is exact, and there are no forces."""
+        """Whether a step is a Poisson map to round-off: it preserves the structure exactly, and there are no forces."""
         return self.exact and self.system.forces is None
 
     @property
     def discretised(self) -> System:
-        """The system whose Hamiltonian is discretised: H minus multiples of Casimirs, called the gauge."""
+        """The system whose Hamiltonian is discretised: H minus multiples of Casimirs (the gauge)."""
         return self.gauge.applied(self.system)
 
     @property
@@ -311,7 +311,7 @@ class CompiledSeries(_CompiledSystem):
 
     @property
     def discretised(self) -> System:
-        """The system whose Hamiltonian is discretised: H minus multiples of Casimirs, called the gauge."""
+        """The system whose Hamiltonian is discretised: H minus multiples of Casimirs (the gauge)."""
         return self.gauged.system
 
     @property
@@ -323,7 +323,7 @@ class CompiledSeries(_CompiledSystem):
         return self.gauged.series
 
     def by_series(self) -> CompiledSeries:
-        """Return this compilation."""
+        """Return this compilation, since its scheme is a series."""
         return self
 
     def by_kind(
@@ -372,7 +372,7 @@ class CompiledSplitting(_CompiledSystem):
         return True
 
     def by_splitting(self) -> CompiledSplitting:
-        """Return this compilation."""
+        """Return this compilation, since its scheme is a splitting."""
         return self
 
     def by_kind(
@@ -438,7 +438,7 @@ class CompiledGauss(_CompiledSystem):
         return {"scheme": self.scheme_name, "structure": self.structure}
 
     def by_gauss(self) -> CompiledGauss:
-        """Return this compilation."""
+        """Return this compilation, since its scheme is Gauss collocation."""
         return self
 
     def by_kind(
@@ -530,7 +530,7 @@ class CompiledLattice(_Compiled):
         return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     def by_sweeps(self) -> CompiledLattice:
-        """Return this compilation."""
+        """Return this compilation, since it is the compilation of a lattice."""
         return self
 
     def by_kind(

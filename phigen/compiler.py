@@ -56,7 +56,7 @@ T = TypeVar("T")
 PREVIEW_ORDER = 4
 
 #: Least number of sites of a lattice that is recognised in a spec with the equations of all sites. Specs with fewer
-#: coordinates are not examined for this.
+#: coordinates are not examined for lattices.
 LEAST_LATTICE_SITES = 8
 
 
@@ -136,7 +136,7 @@ def compile_proved(
     """Compile a spec, as `compile_spec` does, and prove the statements about the system and the method.
 
     Raises `CheckError` if a statement is refuted, with its name and its residual: π is not Poisson, a declared Casimir
-    is none, or the bi-realisation is wrong. Raises `SpecError` and `LimitError` as `compile_spec`.
+    is none, or the bi-realisation is wrong. Also raises the `SpecError` and `LimitError` of `compile_spec`.
     """
     examination = examine(spec, system=system, **options)
     if examination.refuted:

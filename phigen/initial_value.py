@@ -25,8 +25,8 @@ from phigen.runtime.trajectory import Trajectory
 if TYPE_CHECKING:
     from phigen.geometry.system import System
 
-#: An event as in SciPy: a function of t and y (DIM,) whose zeros are located. It may have the attributes ``terminal``
-#: and ``direction``.
+#: An event as in SciPy: a function of t and y (DIM,) whose zeros are located. The function may have the attributes
+#: ``terminal`` and ``direction``.
 Event = Callable[[float, Floats], float]
 
 #: For calls without a step ``h``: number of steps of the first attempt, and largest number of attempts. Each attempt

@@ -45,8 +45,8 @@ STRETCH, FAR_STEPS = 32, 64
 #: copies of the solver.
 _WHOLE_ONLY = ("until", "every", "at", "stop", "section", "retry")
 
-#: An array over the whole lattice, or a function f(first, end) that returns its planes first … end − 1. A plane is the
-#: set of all sites with one index of the first axis.
+#: An array over the whole lattice, or a function f(first, end) that returns the planes first … end − 1 of such an
+#: array. A plane is the set of all sites with one index of the first axis.
 Given = Any
 
 
@@ -278,9 +278,10 @@ class _Domain:
     # --- steps
 
     def advance(self, steps: int) -> None:
-        """Make a number of steps. Raises `StepError`.
+        """Make ``steps`` steps. Raises `StepError`.
 
-        The last flow of a step is merged with the first flow of the next step; after the last step it is applied alone.
+        The last flow of a step is merged with the first flow of the next step. After all steps, the last flow of the
+        last step is applied alone.
         """
         if steps:
             self._put_all(self.saved)
@@ -555,7 +556,7 @@ class _StoredState:
         self.identity = {"solver": domain.lattice.solver.backend.identity, **identity}
 
     def _file(self, count: int) -> Path:
-        """Return the path of the file with the state after ``count`` frames, one of two paths."""
+        """Return the path of the file with the state after ``count`` frames; two paths alternate."""
         return self.path.with_name(f"{self.path.name}.{count % 2}.npy")
 
     def save(self, energy: Sequence[float]) -> None:

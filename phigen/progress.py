@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 
 class Stage:
-    """Stage of a compilation, a context in which ``done`` of ``total`` parts of the work are done.
+    """Stage of a compilation, a context manager. ``done`` of ``total`` parts of the work of the stage are done.
 
     ``total`` is 0 if the number of parts is unknown. ``began`` is the time at which the stage started.
     """

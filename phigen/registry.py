@@ -83,7 +83,7 @@ TARGETS: Mapping[str, Target] = {target.name: target for target in _LISTED}
 
 _DEVICE = TARGETS["device"]
 
-#: The targets that are devices, by name; they run the files that are printed for the device.
+#: The targets that are devices, by name. Devices run the files of the target named "device".
 DEVICES: Mapping[str, Target] = {
     name: replace(_DEVICE, name=name, title=title, loader=f"phigen.runtime.devices.{name}", device=True)
     for name, title in (("opencl", "OpenCL"), ("cuda", "CUDA"))

@@ -76,8 +76,8 @@ def suggestion(source: str) -> str:
 
 
 def _find(name: str) -> Path:
-    # In a checkout the folder is beside the package. This is tried second: beside an installed package, an unrelated
-    # folder may have the same name.
+    # In a checkout the folder is beside the package. That place is tried second, since an unrelated folder beside an
+    # installed package may have the same name.
     for folder in (_PACKAGE / "_data" / name, _PACKAGE.parent / name):
         if folder.is_dir():
             return folder

@@ -14,7 +14,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-#: Folders whose entries are devices or open file descriptors. They are written directly, since they cannot be replaced.
+#: Folders whose entries are devices or open file descriptors. The entries are written directly, since they cannot be
+#: replaced.
 _DEVICES = ("/dev/", "/proc/")
 
 
@@ -124,7 +125,7 @@ def _remove_folder(folder: Path) -> None:
 def _mode(path: Path) -> int:
     """Return the permissions of the file that is replaced or, if there is none, those of a new file.
 
-    They must be set explicitly, since mkstemp creates temporary files that only their owner can read.
+    The permissions must be set explicitly, since mkstemp creates temporary files that only their owner can read.
     """
     try:
         return path.stat().st_mode & 0o777
@@ -135,5 +136,6 @@ def _mode(path: Path) -> int:
 
 
 def _encoded(content: str | bytes) -> bytes:
-    # A text may contain names of files that are no valid UTF-8; their surrogates are written as escapes.
+    # A text may contain names of files that are no valid UTF-8. Python represents their bytes by surrogates, which are
+    # written as escapes.
     return content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")

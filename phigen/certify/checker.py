@@ -40,7 +40,7 @@ OPERATIONS: Mapping[str, Callable[..., tuple[Ball, ...]]] = {  # name → value,
     "mul": lambda x, y: (x * y, y, x), "square": lambda x, _: (square(x), x, x), "max": lambda x, y: (x.max(y),),
     "div": lambda x, y: (x / y, 1 / y, -x / (y * y)), "abs": lambda x: (x.abs_lower().union(x.abs_upper()),),
 }  # fmt: skip
-# Number of terms of the power series below. Coefficients n are at most 2^(1-n), so for |s| < ROUNDED all further terms
+# Number of terms of the power series below. Coefficient n is at most 2^(1-n), so for |s| < ROUNDED all further terms
 # together are at most 2^(3-TERMS).
 TERMS = 90
 SERIES: Mapping[str, Callable[[int], fmpq]] = {  # functions that the C computes by polynomials → Taylor coefficient n

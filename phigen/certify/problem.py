@@ -1,4 +1,6 @@
-"""Input for the search of a certificate, from a compilation; refusal of solvers that certificates do not cover."""
+"""Conversion of a compilation to the input for the search of a certificate; solvers without certificates are
+refused.
+"""
 
 from __future__ import annotations
 

@@ -215,10 +215,10 @@ def _leaf(c: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
 
 
 def _implicit_part(c: dict[str, Any], stage: dict[str, Any], X: list[Any], T: Any) -> dict[str, Any]:
-    """Return the proof data of an implicit stage, whose unknowns u solve u = base - d(u): a box that contains u, and
-    bounds.
+    """Return the proof data of an implicit stage, whose unknowns u solve u = base - d(u).
 
-    The box is enlarged until the proof succeeds. Raises `RefusedError` if `PASSES` attempts fail.
+    The data are a box that contains u, and bounds for the distance of iterates from u. The box is enlarged until the
+    proof succeeds. Raises `RefusedError` if `PASSES` attempts fail.
     """
     base = X if stage["based"] else [arb(0)] * len(stage["equation"])
     start = run_of(c, stage, X, T, {}, base, exact=True)

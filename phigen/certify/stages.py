@@ -117,10 +117,11 @@ def prepared(facts: Mapping[str, Any], listing: Listing, stage: int) -> list[int
 def stages_of(
     facts: Mapping[str, Any], text: str, name: str, centre: Sequence[Any], exact: bool = False
 ) -> list[Stage]:
-    """Return the stages of a step as lists of operations; ``facts`` are what `read` returns for the C of the solver.
+    """Return the stages of a step as lists of operations; ``facts`` are what `read` returns for the C of the
+    solver.
 
-    Taylor series of paths have the number of terms that the C may use for states in the box ``centre``. With ``exact``,
-    they have the largest number.
+    Taylor series of paths have the number of terms that the C may use for states in the box ``centre`` or, with
+    ``exact``, the largest number that the C allows.
     """
     source, n = GeneratedC(text, name), len(centre)
     if facts["kind"] == "path":

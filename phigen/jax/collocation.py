@@ -69,8 +69,8 @@ def tableau_of(dtype: Any, stages: int) -> Tableau:
 class Collocation:
     """Step of size ``h`` by the Gauss method with ``stages`` stages.
 
-    ``points`` are the stage equations of a system, in which ``slope`` replaces ∇H of the system: a function of x and
-    further arguments.
+    ``points`` are the stage equations of a system. In these equations ∇H of the system is replaced by ``slope``, a
+    function of x and further arguments.
     """
 
     points: StageMap

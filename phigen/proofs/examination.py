@@ -105,9 +105,8 @@ def hint_of(spec: Spec, group: str) -> str:
 
 
 def doubts(examination: Examination) -> list[Diagnostic]:
-    """Return warnings, with places in the spec, about expressions that seem to be undefined.
-
-    They may be undefined everywhere, or at the start of a run.
+    """Return warnings, with places in the spec, about expressions that seem to be undefined, everywhere or at the start
+    of a run.
     """
     messages = [
         examination.spec.diagnostic(_place(examination.spec, DEFINEDNESS, s), str(s))

@@ -60,7 +60,7 @@ class Agreement:
 
     @property
     def timed(self) -> Statement:
-        """The statement, with the seconds of both derivations in its detail."""
+        """The statement; its ``detail`` also has the seconds that both derivations took."""
         seconds = f"in {self.sympy:.2f} s"
         if self.compiler is not None:
             terms = "" if self.term == 1 else f"S_1 … S_{self.term} "

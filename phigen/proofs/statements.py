@@ -87,8 +87,10 @@ def damping_of_lattice(spec: Spec) -> dict[str, tuple[Statement, ...]]:
 
 
 def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
-    """Return the parameters of the ``runs`` or, without runs, the defaults; [] if λ depends on more than these
-    parameters."""
+    """Return the parameters of the ``runs`` or, without runs, the defaults.
+
+    Returns [] if the damping coefficient λ depends on more than these parameters.
+    """
     numbers = {p.name for p in spec.parameters if p.at == "all"}
     rate = spec.forces.damping
     if rate is None or not set(symbols_of(rate)) <= numbers:

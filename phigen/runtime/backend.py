@@ -101,6 +101,5 @@ class Backend(Protocol):
         ...
 
     def rate(self, x: Floats, parameters: Mapping[str, float]) -> Floats:
-        """Return dt/dτ, the monitor g of dt = g dτ, at the states (rows, DIM), shape (rows,). Needs a solver with a
-        monitor."""
+        """Return the monitor g = dt/dτ at the states (rows, DIM), shape (rows,). Needs a solver with a monitor."""
         ...

@@ -39,8 +39,8 @@ SAMPLES = 4
 _DIFFERENCE = 1e-5
 #: Largest number of iterations of Newton's method for a zero; two to four are usual.
 _MOST_NEWTON = 8
-#: A point inside a step is reached by 1, 2, 4 or 8 equal smaller steps, the first number with which no step fails: a
-#: single step without a predictor may not converge.
+#: Numbers of equal smaller steps by which a point inside a step is reached. The first number with which no step fails
+#: is used: a single step without a predictor may not converge.
 SUBSTEPS = (1, 2, 4, 8)
 #: Absolute tolerance for the fraction of a step at which a zero lies: a smaller difference does not change the state.
 _RESOLUTION = 1e-18
@@ -88,10 +88,10 @@ class CrossingFinder(Generic[C]):
     zero in the requested direction.
 
     ``latest`` is the session after the latest step; ``past`` has copies of the session before that step and before
-    earlier steps. ``values`` are the values of g at the points, of which each step has ``points``; the first value is
-    at the start of step number ``first``. ``t0`` is the time of step 0. If ``timed``, g receives the times as well as
-    the states. ``places`` are the crossings of the latest block of steps: pairs of the number of steps from the start,
-    and a session at the crossing. A ``block`` is the number of steps between two evaluations of g on arrays.
+    earlier steps. Each step has ``points`` points, at which g has the ``values``; the first value is at the start of
+    step number ``first``. ``t0`` is the time of step 0. If ``timed``, g receives the times as well as the states.
+    ``places`` are the crossings of the latest block of steps: pairs of the number of steps from the start, and a
+    session at the crossing. A ``block`` is the number of steps between two evaluations of g on arrays.
     """
 
     g: Function

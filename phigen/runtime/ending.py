@@ -21,7 +21,7 @@ Finish = Callable[[Any], tuple[Any, float]]
 
 
 #: A zero within this number of steps after the start does not end a run. Otherwise a run that starts at a zero, where
-#: another run stopped, could stop at once, since rounding may move this zero behind the start.
+#: another run stopped, could stop at once, since rounding may put this zero slightly after the start.
 START = 1e-9
 
 

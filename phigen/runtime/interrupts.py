@@ -20,8 +20,8 @@ def interruptible(ask: Callable[[int | None], Any]) -> Iterator[None]:
     The function ``ask`` receives the address of a C function that returns nonzero after Ctrl-C; the C shall call this
     function. At the end of the context ``ask`` receives None.
 
-    In other threads than the main thread, which do not receive signals, ``ask`` is not called, and Ctrl-C acts as
-    usual. The same holds if the program has its own signal handler.
+    Only the main thread receives signals. In other threads, or if the program has its own signal handler, ``ask`` is
+    not called, and Ctrl-C acts as usual.
     """
     signals: list[int] = []
     first = threading.current_thread() is threading.main_thread()

@@ -252,10 +252,11 @@ class LatticeTrajectory:
         return cast("Figure", display("figure of a lattice run")(self, self.changes(), ""))
 
     def to_xarray(self) -> xr.Dataset:
-        """Return an `xarray.Dataset`: ``x`` (t, coordinate, *axes), ``energy`` (t), ``casimir_NAME`` (t, *axes) or (t).
+        """Return an `xarray.Dataset`: ``x`` (t, coordinate, *axes), ``energy`` (t), and the Casimirs
+        ``casimir_NAME``.
 
-        Parameters that are arrays are variables ``parameter_NAME``; other parameters are attributes. Raises
-        `MissingPackageError` without xarray.
+        Casimirs of each site have the dimensions (t, *axes), others (t). Parameters that are arrays are variables
+        ``parameter_NAME``; other parameters are attributes. Raises `MissingPackageError` without xarray.
         """
         from phigen.runtime.exchange import lattice_to_xarray
 
@@ -614,7 +615,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return self.carried_out(plan, recorded, output=output, checkpoints=checkpoints, progress=progress)
 
     def _plan_of(self, run: Run, beginning: Beginning, retry: int) -> IntegrationPlan:
-        """Return the plan of a run of the spec, whose initial values ``beginning`` have been checked."""
+        """Return the plan of a run of the spec; ``beginning`` are the initial values, already checked."""
         if retry or run.is_timed:
             arguments.expect_no_noise("retry" if retry else "every", self.interface)
         end, in_tau = None, self.interface.monitored and run.is_timed

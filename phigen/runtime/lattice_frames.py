@@ -209,8 +209,8 @@ class Frames:
 
 
 def stream_path(path: str | Path) -> Path | None:
-    """Return the path if frames are written to such a file one by one; None if the file is written at the end of the
-    run.
+    """Return the path if frames are written to the file one by one; None if the file is written at the end of
+    the run.
 
     The suffix of the path decides. Raises `ValueError` for suffixes of no known format.
     """
@@ -234,7 +234,7 @@ def expect_columns(shape: tuple[int, ...]) -> None:
 def site_names(coordinates: Sequence[str], sizes: Sequence[int]) -> tuple[str, ...]:
     """Return column names for the numbers of a state, such as ``q_0_0`` for q at the site (0, 0).
 
-    They are ordered by coordinate, then by site, with the last axis fastest.
+    The names are ordered by coordinate, then by site, with the last axis fastest.
     """
     sites = ["_".join(map(str, site)) for site in np.ndindex(*sizes)]
     return tuple(f"{name}_{site}" for name in coordinates for site in sites)

@@ -43,7 +43,7 @@ class RowSteps:
         return int(self.whole[-1])
 
     def times(self, begin: float, h: float) -> Floats:
-        """Return the times (rows,); ``begin`` is the time of the start."""
+        """Return the times of the rows (rows,); ``begin`` is the time of the start."""
         return np.asarray(begin + (h * self.whole + self.part), dtype=np.float64)
 
     def described(self) -> list[int | float]:
@@ -141,8 +141,8 @@ class IntegrationPlan:
 
     @property
     def times(self) -> Floats:
-        """The times of all rows. If the integration continues an earlier run, they begin with the times of the earlier
-        run.
+        """The times of all rows. If the integration continues an earlier run, the times of the earlier run come
+        first.
         """
         times = self.rows.times(self.begin, self.at.h)
         return times if self.past is None else np.append(self.past.t, times[1:])

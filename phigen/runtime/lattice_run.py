@@ -1,5 +1,6 @@
-"""The loop that all integrations of lattices use: it makes the rows, and handles sections, checkpoints, continued
-runs."""
+"""The loop that all integrations of lattices use: it makes the rows, and handles sections, checkpoints and continued
+runs.
+"""
 
 from __future__ import annotations
 
@@ -100,7 +101,7 @@ class LatticeRun:
     def tau(self) -> Floats | None:
         """The values of τ of the complete rows, if a monitor rescales time by dt = g dτ; else None.
 
-        None as well if this run continues another run.
+        Also None if this run continues another run.
         """
         if not self.solver.interface.monitored or self.plan.past is not None:
             return None

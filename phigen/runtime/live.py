@@ -147,7 +147,7 @@ class LiveSession:
         return None if (rows := self._element()[1]) is None else rows[0]
 
     def copy(self) -> LiveSession:
-        """Return an independent copy."""
+        """Return an independent copy of the session."""
         twin = object.__new__(LiveSession)
         twin.__dict__.update(self.__dict__)
         twin.parameters, twin._session = dict(self.parameters), self._session.branch()
@@ -216,13 +216,15 @@ class LiveLattice(LiveSession):
 
     @property
     def observables(self) -> dict[str, Any]:
-        """The observables of the spec at the state, by name: numbers, and arrays (*sizes) for those of sites."""
+        """The observables of the spec at the state, by name. Observables with a value at each site are arrays (*sizes),
+        all others are numbers.
+        """
         interface, sites = self.solver.interface, self._sites
         numbers = dict(zip(interface.observables, sites.observables().tolist(), strict=True))
         return numbers | dict(zip(interface.observed_fields, sites.observed_fields(), strict=True))
 
     def copy(self) -> LiveLattice:
-        """Return an independent copy."""
+        """Return an independent copy of the session."""
         twin = object.__new__(LiveLattice)
         branch = cast("LatticeCourse", self._session).branch()
         twin.__dict__.update(self.__dict__, _session=branch, parameters=dict(self.parameters))

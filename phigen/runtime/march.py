@@ -91,8 +91,9 @@ def march(
 
 
 def standing(session: Session, number: float) -> Piece:
-    """Return a piece with one row, the present state of a session. ``number`` is its number of steps since the
-    start."""
+    """Return a piece with one row, the present state of a session; ``number`` is the number of steps since the
+    start.
+    """
     return _piece_of_rows([(session, number)], len(session.state()), len(session.element()))
 
 

@@ -107,7 +107,7 @@ class MemberBatch:
             self._running = True
 
     def _end_run(self) -> None:
-        """Apply the inverse of the corrector, the map that was applied before a sequence of steps.
+        """Apply the inverse of the corrector, which was applied before a sequence of steps.
 
         Members whose result is not finite fail, and get back their states from before the sequence.
         """

@@ -53,13 +53,13 @@ class AttitudeState(NamedTuple):
     rate: Floats | None
 
     def arrays(self) -> dict[str, Any]:
-        """Return the arrays, by name, with which a saved session stores this attitude."""
+        """Return the arrays, by name, that a session stores to save this attitude."""
         rate = np.empty(0) if self.rate is None else self.rate
         return {"first": self.first, "begun": self.begun, "element": self.element, "lost": self.lost, "rate": rate}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, Any]) -> AttitudeState:
-        """Return the attitude from the arrays, by name, of a saved session."""
+        """Return the attitude from the arrays of a saved session; ``arrays`` maps their names to the arrays."""
         rate = arrays["rate"] if arrays["rate"].size else None
         return cls(arrays["first"], float(arrays["begun"]), arrays["element"], arrays["lost"], rate)
 
@@ -206,7 +206,9 @@ class NumpySession:
             raise BackendError(status, self.steps, self._x.copy())
 
     def _follow(self, flows: str) -> None:
-        """Apply a corrector to the state; ``flows`` is the name of the attribute of the module that lists its flows."""
+        """Apply a corrector to the state; ``flows`` is the name of the list, in the module, of the flows of the
+        corrector.
+        """
         x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
         if not np.isfinite(x).all():
             raise BackendError("NOT_FINITE", self.steps, self._x.copy())

@@ -20,5 +20,5 @@ class PrescribedNoise(Forwarding[Session]):
         self.session.advance_along(h, self.increments[steps_done : steps_done + steps])
 
     def branch(self) -> PrescribedNoise:
-        """Return an independent copy."""
+        """Return an independent copy of the session."""
         return PrescribedNoise(self.session.branch(), self.increments)

@@ -41,7 +41,7 @@ class Retrying(Forwarding[Followed]):
                 return
 
     def branch(self) -> Self:
-        """Return an independent copy."""
+        """Return an independent copy of the session."""
         twin = type(self)(self.session.branch(), self.most)
         twin.retried, twin._extra = list(self.retried), self._extra
         return twin

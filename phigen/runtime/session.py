@@ -93,9 +93,9 @@ class Session(Followed, Protocol):
         ...
 
     def placed(self, x: Floats) -> Self:
-        """Return a copy of a session that has made no step, with the state ``x`` (DIM,).
+        """Return a copy, with the state ``x`` (DIM,), of a session that has made no step.
 
-        The gauge, the multiples of Casimirs that are subtracted from H, is not chosen again for x.
+        The gauge (the multiples of Casimirs that are subtracted from H) is not chosen again for x.
         """
         ...
 
@@ -118,11 +118,10 @@ class Session(Followed, Protocol):
 def rows_along(
     session: Course, h: float, steps: int, stride: int, progress: Progress | None, see: Callable[[int], object] = id
 ) -> Floats:
-    """Advance a session from its start, and return the states (rows, DIM) after 0, stride, 2·stride, … and all
-    steps.
+    """Advance a session from its start by ``steps`` steps, and return the states (rows, DIM) at the rows.
 
-    ``see`` is called with the number of each row while the session is at that row. Raises `BackendError`, whose rows
-    end with the state before the failing step.
+    Rows are after 0, stride, 2·stride, … steps, and after the last step. ``see`` is called with the number of each row
+    while the session is at that row. Raises `BackendError`, whose rows end with the state before the failing step.
     """
     marks = row_steps(steps, stride)
     start = session.state()

@@ -39,7 +39,7 @@ _ADVICE = {
 
 @dataclass(frozen=True)
 class Marks:
-    """Data at the rows of a trajectory other than the states.
+    """Data of the rows of a trajectory, in addition to the states.
 
     ``tau`` (rows,) is h times the number of steps. With a monitor (dt = g dτ) this is the rescaled time τ, and
     ``passed`` (rows,) is the physical time since the start. ``turned`` (rows, numbers) are attitudes and positions.
@@ -483,7 +483,7 @@ class Solver(Named[Backend, Interface]):
         and t0 are numbers or (members,); the derivative by a number that all members share is the sum over members.
         ``threads`` is explained at `ensemble`.
 
-        Derivatives are exact to round-off. The gauge, the multiples of Casimirs that are subtracted from H, is held
+        Derivatives are exact to round-off. The gauge (the multiples of Casimirs that are subtracted from H) is held
         fixed. With a monitor, the energy level e = −H(x0) is differentiated by x0. There are no derivatives of times
         and attitudes. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
         """

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeTrajectory
     from phigen.spec.model import CorrelationChoice, SpectrumChoice
 
-#: Smallest number of frames for a spectrum: with fewer, no frequencies are resolved, since the Hann window spreads a
-#: frequency over about four of them.
+#: Smallest number of frames for a spectrum. The Hann window spreads a wave over about four frequencies, so with fewer
+#: frames a spectrum shows nothing.
 LEAST_FRAMES = 4
 #: Times between frames count as equal if they differ by less than this fraction.
 _EQUAL = 1e-6

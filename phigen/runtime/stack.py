@@ -18,8 +18,8 @@ from phigen.targets.header import plain
 _NODE = re.compile(r'node: \{ title: "([^"]+)" label: "[^"]*?\\n[^"]*?(?:\\n(\d+) bytes \((\w+(?:,\w+)?)\))?"')
 _EDGE = re.compile(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"')
 _HINT = "gcc of version 10 or later, or one named in the environment variable CC, such as CC=arm-none-eabi-gcc"
-#: Names in gcc's call graph of calls through a pointer, and of functions of OpenMP that call functions through a
-#: pointer.
+#: Names in gcc's call graph: the name for all calls through a pointer, and the beginning of the names of functions of
+#: OpenMP, which make such calls.
 _BY_POINTER = ("__indirect_call", "GOMP_")
 _TIMEOUT = 300.0  # time limit of a command of the compiler, in seconds
 
@@ -38,10 +38,11 @@ class CallGraph:
     kinds: Mapping[str, str]
 
     def deepest(self, function: str, above: tuple[str, ...] = ()) -> int:
-        """Return the largest stack, in bytes, of a call of ``function`` with all calls below it, library functions
-        excluded.
+        """Return the largest stack, in bytes, that a call of ``function`` needs, with all calls that it leads
+        to.
 
-        ``above`` are the functions that lead to this call. Raises `ToolchainError` if a function can call itself.
+        Library functions are not counted. ``above`` are the functions that lead to this call. Raises `ToolchainError`
+        if a function can call itself.
         """
         if function in above:
             raise ToolchainError(f"{function} can call itself: {' → '.join((*above, function))}")

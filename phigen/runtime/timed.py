@@ -162,8 +162,9 @@ def states_at(session_at: Callable[[int], Session], t: Floats, x: Floats, h: flo
 
 
 def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -> None:
-    """Make steps over the time ``span``: whole steps of size h, then a shorter step. Only for steps that are equal in
-    time.
+    """Make steps over the time ``span``: whole steps of size h, then a shorter step.
+
+    The steps must be equal in time, as they are without a monitor.
     """
     step = float(np.copysign(h, span))
     whole_count = whole_steps(step, span)

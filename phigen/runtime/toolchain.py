@@ -286,7 +286,8 @@ def _run(command: Sequence[str], timeout: float, *, errors: bool = True) -> tupl
             if waiter.is_alive():
                 raise subprocess.TimeoutExpired(command, timeout)
             listener.join(_GRACE)
-        # also after Ctrl-C, whose signal does not reach the compiler, since it runs in a session of its own
+        # Processes are killed after Ctrl-C too: its signal does not reach them, since they run in a session of their
+        # own.
         finally:
             if waiter.is_alive() or listener.is_alive():
                 with contextlib.suppress(ProcessLookupError):

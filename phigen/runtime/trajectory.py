@@ -76,7 +76,8 @@ class Trajectory:
         return cast("Figure", display("figure of runs")({"phigen": self}, {}))
 
     def to_xarray(self) -> xr.Dataset:
-        """Return an `xarray.Dataset`: ``x`` (t, coordinate), and ``energy``, ``casimir_NAME``, each observable (t,).
+        """Return an `xarray.Dataset` with the variables ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and
+        observables (t).
 
         The step size and the parameters are attributes. Raises `MissingPackageError` without xarray.
         """

@@ -32,8 +32,8 @@ _STEPS_PER_UNIT = 1 << 24
 #: memory.
 _MEMBERS_PER_UNIT = 2048
 
-#: Bytes of a member's values beyond registers that still lie in the cache of a card: a multiprocessor has 128 kB of
-#: cache, and runs 256 members at once if each uses 255 registers.
+#: Largest number of bytes, in addition to registers, that a member can use without leaving the cache of a card. A
+#: multiprocessor has 128 kB of cache, and runs 256 members at once if each uses 255 registers.
 _LOCAL_BYTES = 512
 
 

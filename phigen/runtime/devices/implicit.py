@@ -46,8 +46,8 @@ class ImplicitSession(DeviceLatticeSession):
         """Evaluate the kernel ``name`` of an implicit stage on the device, for the iterate ``x``, and return its
         result.
 
-        ``coefficients`` are those of the stage, ``start`` is the state before it. ``varied`` is a direction, for the
-        kernel that computes a derivative.
+        ``coefficients`` are those of the stage, ``start`` is the state before the stage. ``varied`` is a direction, for
+        the kernel that computes a derivative.
         """
         if self._written is not coefficients:
             self._write_coefficients([coefficients])

@@ -1,4 +1,6 @@
-"""Sessions of lattices on devices: the state stays on the device, and energies and observables are read as numbers."""
+"""Sessions of lattices on devices. The state stays on the device, which also reduces energies and observables to
+numbers.
+"""
 
 from __future__ import annotations
 

@@ -12,7 +12,8 @@ from phigen.runtime.devices.device import Device
 from phigen.runtime.devices.site_tables import SiteTables
 from phigen.runtime.interface import Floats
 
-#: Number of values that a work item adds, or reduces otherwise, in one pass. It alone decides the order of sums.
+#: Number of values that a work item adds, or reduces otherwise, in one pass. This number alone decides the order of
+#: sums.
 _REDUCED = 64
 
 #: Numbers that tell a kernel how to reduce values. A mean is computed as a sum, and divided afterwards.

@@ -89,8 +89,7 @@ class MonitoredSession(DeviceLatticeSession):
 
 
 def monitoring_module(text: str, name: str) -> Any:
-    """Return the NumPy module of a lattice, with its function for the energy of a part of H replaced by one on a
-    device."""
+    """Return the NumPy module of a lattice in which a kernel on a device computes the energy of a part of H."""
     module: Any = load_module(text, name)
     module._part_energy = lambda sites, part, x: sites.on_device.part_energy(part)
     return module

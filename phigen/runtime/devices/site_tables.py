@@ -38,8 +38,10 @@ class SiteTables:
         return int(np.prod(self.sizes))
 
     def selected(self, launch: SiteLaunch) -> tuple[Any, int]:
-        """Return a buffer with the numbers of the sites on which a launch works (None: all sites), and how many they
-        are."""
+        """Return a buffer with the numbers of the sites on which a launch works, and the number of these sites.
+
+        The buffer is None if the launch works on all sites.
+        """
         if launch.colour is None and not launch.inside and launch.window is None:
             return None, self.count
         key = "sites", launch.colour, launch.inside, launch.window is not None
@@ -77,7 +79,7 @@ class SiteTables:
         }
 
     def kinds(self, numbers: tuple[int, ...]) -> Any:
-        """Return a buffer with the numbers that name the kinds of some reductions."""
+        """Return a buffer with ``numbers``, which tell a kernel how to reduce values (sum, product, …)."""
         return self._of_sizes(("kinds", numbers), np.int32, lambda: [np.array(numbers)])
 
     def written(self, values: Any, kind: Any) -> Any:
@@ -123,8 +125,8 @@ class SiteTables:
     def _bonds(self, launch: SumLaunch, colour: int) -> tuple[Any, Any, Any]:
         """Return the bonds of a graph, sorted by site, as three buffers.
 
-        They contain the index of the first bond of each site, the partner site of each bond, and the parameters of each
-        bond.
+        The buffers contain the index of the first bond of each site, the partner site of each bond, and the parameters
+        of each bond.
         """
         key = "bonds", launch.end, launch.chosen, colour if launch.chosen else 0
         if key not in self._stored:
