@@ -153,7 +153,7 @@ class Browser:
             ready, _, _ = select.select([self._read], [], [], max(0.0, end - time.monotonic()))
             part = os.read(self._read, 1 << 20) if ready else b""
             if not part:
-                raise RuntimeError(f"chromium said nothing for {_SECONDS:g} s, or ended")
+                raise RuntimeError(f"chromium ended, or did not answer within {_SECONDS:g} s")
             self._buffer += part
         text, self._buffer = self._buffer.split(b"\0", 1)
         message: dict[str, Any] = json.loads(text)

@@ -19,8 +19,8 @@ def reference_work() -> int:
 
 
 def slowness() -> float:
-    """Return the ratio of the processor time that `reference_work` takes now to that on the reference machine; at least
-    1.
+    """Return the factor by which this machine is slower at present than the reference machine, at least 1: the ratio of
+    the processor times of `reference_work`.
     """
     begin = time.process_time()
     reference_work()
@@ -35,4 +35,4 @@ def processor_seconds_below(limit: float) -> Iterator[None]:
     spent = time.process_time() - begin
     if spent >= limit:
         spent /= slowness()
-    assert spent < limit, f"{spent:.2f} s of processor time in place of {limit:g}"
+    assert spent < limit, f"{spent:.2f} s of processor time; the limit is {limit:g} s"

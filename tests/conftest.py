@@ -24,11 +24,11 @@ APART = ("tests/random/test_differential.py",)
 
 def pytest_addoption(parser):
     parser.addoption(
-        "--all", action="store_true", help="the long tests too, and one system of each kind as users compile it"
+        "--all", action="store_true", help="run the slow tests too, and compile one system of each kind with -O3"
     )
-    parser.addoption("--corpus", action="store_true", help="with --all, systems as well that are like others")
-    parser.addoption("--random", type=int, metavar="N", help="N random systems of each kind, in tests/random")
-    parser.addoption("--seed", type=int, default=0, metavar="S", help="the seed of the first of them")
+    parser.addoption("--corpus", action="store_true", help="with --all: include systems that resemble others")
+    parser.addoption("--random", type=int, metavar="N", help="test N random systems of each kind, in tests/random")
+    parser.addoption("--seed", type=int, default=0, metavar="S", help="seed of the first random system")
 
 
 def pytest_configure(config):
@@ -47,17 +47,18 @@ def pytest_configure(config):
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if not toolchain.available():
         raise pytest.UsageError("the tests need a C compiler; on Debian: apt-get install gcc libc6-dev")
-    config.addinivalue_line("markers", "exhaustive: left out unless --corpus is given, or the test is named by `::`")
-    config.addinivalue_line("markers", "slow: long; left out unless --all or -m is given, or the test is named by `::`")
+    config.addinivalue_line("markers", "exhaustive: runs only with --corpus, or if the test is named as file::name")
+    config.addinivalue_line("markers", "slow: runs only with --all or -m, or if the test is named as file::name")
     config.addinivalue_line(
-        "markers", "corpus: of the corpus, systems beside `systems.QUICK` are slow, and those like others need --corpus"
+        "markers",
+        "corpus: only cases with systems in `systems.QUICK` are quick; systems in `systems.ALIKE` need --corpus",
     )
     config.addinivalue_line(
         "markers",
-        "thin(n, of_all=m): quick tests make one in n of the quick cases, drawn by their names; --all makes one in m, "
-        "2 by default, of all cases",
+        "thin(n, of_all=m): one in n of the quick cases runs, chosen by a hash of their names; with --all, one in m of "
+        "all cases, by default one in 2",
     )
-    config.addinivalue_line("markers", "few(*cases, of): of the cases `of`, those beside the named ones are slow")
+    config.addinivalue_line("markers", "few(*cases, of): of the cases `of`, all but the named ones are slow")
 
 
 def pytest_collection_modifyitems(config, items):
@@ -177,9 +178,9 @@ def without_compiler(monkeypatch, tmp_path_factory):
 
 def pytest_terminal_summary(terminalreporter, exitstatus, config):
     if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and not config.option.all:
-        terminalreporter.write_line("no test, or none that is quick: --all runs the slow ones too")
+        terminalreporter.write_line("no quick test was selected; --all runs the slow tests too")
     skipped = [report.longrepr[2] for report in terminalreporter.stats.get("skipped", [])]
     if skipped:
-        terminalreporter.section("what was not tested")
+        terminalreporter.section("skipped tests")
         for line in not_tested(skipped):
             terminalreporter.write_line(line)

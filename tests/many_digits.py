@@ -218,8 +218,8 @@ class PreciseStep:
     map at x.
 
     The map uses only the bi-realisation (α, β) and the series S_h: Newton's method solves α(y, ∇S_h(y)) = x, then the
-    next state is β(y, ∇S_h(y)). The tangent map comes from implicit differentiation. precise_path.py does this for
-    paths.
+    next state is β(y, ∇S_h(y)). The tangent map comes from implicit differentiation. For steps along paths see
+    precise_path.py.
     """
 
     def __init__(self, compilation: Compilation, parameters: Mapping[str, float], h: float) -> None:
@@ -287,7 +287,7 @@ class _Stage:
             if mpmath.norm(delta, mpmath.inf) <= mpmath.norm(y, mpmath.inf) * mpmath.mpf(10) ** (4 - DIGITS):
                 return beta, d_alpha, d_beta
             y -= delta
-        raise ArithmeticError("no convergence")
+        raise ArithmeticError("Newton's method for the step does not converge")
 
     def solve(self, x: Sequence[Any]) -> list[Any]:
         return list(self._solved(x)[0])

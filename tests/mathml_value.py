@@ -54,7 +54,7 @@ class _Reader:
             case "mroot":
                 return f"(({self.read(children[0])})**(1/({self.read(children[1])})))"
             case "msup":
-                assert children[0].tag != "msup", "an exponent of an exponent, or of the power?"
+                assert children[0].tag != "msup", "ambiguous: an exponent of a power or of its exponent"
                 return f"(({self.read(children[0])})**({self.read(children[1])}))"
             case "msubsup":
                 base = f"K[{text_of(children[0]) + '_(' + text_of(children[1]) + ')'!r}]"

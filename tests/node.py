@@ -45,7 +45,7 @@ def asked(module: Path, body: str) -> Any:
         late.cancel()
     if not line:
         _started.cache_clear()
-        raise AssertionError(f"node ended, or had no answer after {_SECONDS:g} s: {body[:200]}")
+        raise AssertionError(f"node ended, or did not answer within {_SECONDS:g} s: {body[:200]}")
     answer = json.loads(line)
     assert "error" not in answer, answer["error"]
     return answer["value"]

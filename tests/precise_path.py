@@ -77,7 +77,7 @@ def flow_at_one(field: Callable[[list[Any]], list[Any]], start: Sequence[Any]) -
         if good:
             return state
         pieces *= 2
-    raise ArithmeticError("the path is too long")
+    raise ArithmeticError("the path needs more than 1024 intervals")
 
 
 def _extrapolate(field: Callable[[list[Any]], list[Any]], state: list[Any], big: Any, target: Any) -> list[Any] | None:
@@ -205,7 +205,7 @@ class PrecisePathStep(PreciseSystem):
                 inverse = mpmath.inverse(mpmath.eye(self.n) - self._generate(self.path(x, list(p))[1])[1] * by_p)
             last = size
             p = p - inverse * residual
-        raise ArithmeticError("no convergence")
+        raise ArithmeticError("Newton's method for the covector does not converge")
 
     def solve(self, x: Sequence[Any]) -> tuple[list[Any], Any]:
         """Return Φ(x), the state after one step from x, and the tangent map DΦ(x)."""

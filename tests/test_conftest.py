@@ -13,4 +13,4 @@ def test_who_asks_for_slow_tests_only_is_told_how_to_have_them_made():
     command = [sys.executable, "-m", "pytest", "-p", "no:xdist", "-p", "no:cacheprovider", file]
     process = subprocess.run(command, capture_output=True, text=True, check=False)
     assert process.returncode == pytest.ExitCode.NO_TESTS_COLLECTED
-    assert "--all runs the slow ones too" in process.stdout
+    assert "--all runs the slow tests too" in process.stdout

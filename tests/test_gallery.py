@@ -17,7 +17,7 @@ gallery = importlib.util.module_from_spec(_location)
 _location.loader.exec_module(gallery)
 
 KNOWN = json.loads(gallery.FACTS.read_text(encoding="utf-8"))
-MENDED_BY = "the gallery is stale; make figures makes it anew"
+MENDED_BY = "docs/gallery.md is out of date; `make figures` updates it"
 #: Systems that compile and run quickly.
 QUICK = ["lotka_volterra", "harmonic_oscillator"]
 

@@ -27,18 +27,22 @@ BUILD = "from phigen.cli import main; main()"
 @pytest.mark.parametrize("name", golden.WHOLE)
 def test_whole_solver_is_what_is_made_of_the_spec(name):
     expected = {path.name: path.read_text(encoding="utf-8") for path in (GENERATED / name).iterdir()}
-    assert golden.solver_files(name) == expected, "make golden makes it anew"
+    assert golden.solver_files(name) == expected, "the file is out of date; `make golden` updates it"
 
 
 @pytest.mark.parametrize("name", golden.PARTIAL)
 def test_part_of_its_own_is_what_is_made_of_the_spec(name):
     current = golden.part(name, golden.solver_files(name), golden.of_whole_solvers())
-    assert (golden.PARTS / f"{name}.txt").read_text(encoding="utf-8") == current, "make golden makes it anew"
+    assert (golden.PARTS / f"{name}.txt").read_text(encoding="utf-8") == current, (
+        "the file is out of date; `make golden` updates it"
+    )
 
 
 @pytest.mark.parametrize("name", [*golden.WHOLE, *golden.PARTIAL])
 def test_calls_are_those_of_the_solver(name):
-    assert golden.calls()[name] == golden.called(name), "make golden makes the table anew"
+    assert golden.calls()[name] == golden.called(name), (
+        "tests/golden/calls.txt is out of date; `make golden` updates it"
+    )
 
 
 def test_a_paragraph_is_omitted_where_a_whole_solver_has_it():
@@ -78,9 +82,7 @@ def test_code_is_fit_to_be_read(name):
         chapters = re.findall(r"^/\* ---- (.*) ---- \*/$", text, re.M)
         long = text.split("*/\n", 1)[1].count("\n") > FEW_SCREENS
         assert [re.sub(r"\n \* +", " ", line) for line in contents] == ["; ".join(chapters)] * bool(chapters and long)
-        assert not re.search(r"^}\n(?:/\*|#define|enum|static)", text, re.M), (
-            "something sticks to the end of a function"
-        )
+        assert not re.search(r"^}\n(?:/\*|#define|enum|static)", text, re.M), "no blank line after a function"
 
 
 def expected():

@@ -245,7 +245,7 @@ def test_a_step_whose_matrices_are_too_large_is_composed_or_refused_before_they_
     with pytest.raises(LimitError, match=f"the matrices of a step would take more than {most} operations"):
         compile_spec(replace(text, composition="none"))
     dense = "*".join(f"cos({x})" for x in names(10))
-    monkeypatch.setattr(discretisation, "generating_function", None)  # the size is known before any S_i is computed
+    monkeypatch.setattr(discretisation, "generating_function", None)  # no S_i is computed before the check
     with pytest.raises(LimitError, match="the matrices of a step"):
         compile_spec(loads(log_canonical(10).replace("hamiltonian: ", f"hamiltonian: {dense} + ")))
 

@@ -64,7 +64,10 @@ def sources(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif("PHIGEN_ALL_PLATFORMS" not in os.environ, reason="zig makes its C library first, with this set")
+@pytest.mark.skipif(
+    "PHIGEN_ALL_PLATFORMS" not in os.environ,
+    reason="PHIGEN_ALL_PLATFORMS is not set; zig would first build the C library of each platform",
+)
 def test_zig_is_taken_where_there_is_no_other_compiler(monkeypatch, tmp_path):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))

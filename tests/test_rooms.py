@@ -187,7 +187,7 @@ def javascript_conditions() -> tuple[int, int]:
 
 
 def kind_tests(tree: ast.AST) -> list[int]:
-    """Return the lines of a module that test the kind of a step, a plan, or a compilation."""
+    """Return the numbers of the lines of a module that test the kind of a step, a plan, or a compilation."""
     imported = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module in KINDS)
     kinds = {a.asname or a.name for node in imported for a in node.names if a.name in KINDS[node.module or ""]}
     asked = list[int]()
@@ -241,8 +241,8 @@ def test_regular_expressions_read_what_is_listed():
 
 
 def shared_names() -> Counter[str]:
-    """Return the names that several modules have, with the numbers of these modules. Modules of different targets with
-    one name count once.
+    """Return the names that two or more modules have, each with the number of these modules. Modules of different
+    targets with the same name count as one.
     """
     files = (p for p in (ROOT / "phigen").rglob("*.py") if p.name != "__init__.py")
     rooms = {(p.stem, "targets" if "targets" in p.parts else p.parent) for p in files}
@@ -283,7 +283,7 @@ def f(step):
 if __name__ == "__main__":
     print([len(circle) for circle in circles(imports())], "modules in circles")
     print(len(upward_imports()), "imports from higher rooms")
-    print(shared_names().total(), "modules that share their names")
+    print(shared_names().total(), "modules whose name another module has")
     print(sum(map(len, all_kind_tests().values())), "tests on kinds of steps and compilations")
     print("{} of {} lines of the runtime in C are conditions".format(*conditions()))
     print("{} of {} lines of the runtime in JavaScript are conditions".format(*javascript_conditions()))

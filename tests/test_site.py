@@ -25,7 +25,7 @@ def site(tmp_path_factory):
     if importlib.util.find_spec("mkdocs") is None:
         if os.environ.get("PHIGEN_ALL_TOOLS"):
             pytest.fail("mkdocs is not installed")
-        pytest.skip("mkdocs is missing, which make docs installs")
+        pytest.skip("mkdocs is not installed; `make docs` installs it")
     folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", folder]
     panels = {"PHIGEN_PANELS": "pendulum_euler toda thermal_spin"}

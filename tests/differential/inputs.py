@@ -44,7 +44,7 @@ def malformed(system: Lattice) -> None:
         (where, value), wrong = source.choice(drawn), source.choice(WRONG)
         spoilt = system.text.replace(json.dumps(value), json.dumps(value | {key: wrong}), 1)
         message = refusal(lambda text=spoilt: _started(phigen.spec.loads(text)))  # type: ignore[misc]
-        expect(bool(message), f"{where}: {key}: {json.dumps(wrong)} is taken without a word")
+        expect(bool(message), f"{where}: {key}: {json.dumps(wrong)} is accepted")
 
 
 def _random_values(system: Lattice) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -79,7 +79,7 @@ def tables(system: Lattice) -> None:
     }
     for what, (names, columns) in wrong.items():
         expect(
-            bool(refusal(lambda n=names, c=columns: _of_table(system, n, c))), f"{what} in a table of bonds is taken"
+            bool(refusal(lambda n=names, c=columns: _of_table(system, n, c))), f"{what} in a table of bonds is accepted"
         )  # type: ignore[misc]
 
 

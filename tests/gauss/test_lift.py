@@ -193,8 +193,8 @@ def test_parameters_that_move_the_leaf_bring_new_frames():
 
 
 def test_compensated_frames_keep_casimirs_in_long_runs():
-    """Frames with compensation terms keep Casimirs to 1.5e-14 in these steps. Without compensation the error is seven
-    times as large, and twenty times in a run of ten times the length.
+    """Quaternion frames with compensation terms keep Casimirs to 1.5e-14 in this run. Without compensation the error is
+    seven times as large, and twenty times in a run of ten times the length.
     """
     compilation = CASES["so4_manakov"][0]()
     run = solver(compilation, "c").integrate(start_of(compilation), 0.5, 100_000, 1000)

@@ -1,4 +1,6 @@
-"""Gauss steps of equal size in a fictitious time τ: they integrate K = g·(H + e), with the monitor g, instead of H."""
+"""Gauss steps of equal size in a fictitious time τ: they integrate K = g·(H + e), with the monitor g and the energy
+level e = −H(x₀), instead of H.
+"""
 
 from functools import cache
 

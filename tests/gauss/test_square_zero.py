@@ -50,8 +50,8 @@ NAMED = [("se", 3, 8), ("se", 2, 4), ("so", 4, 8), ("heisenberg", 2, 6)]
 
 @pytest.mark.parametrize(("family", "size", "unknowns"), NAMED)
 def test_ideals_of_named_algebras(family, size, unknowns):
-    """In se(n) the translations are a square-zero ideal. so(4) has no ideal that serves, and the ideal of a Heisenberg
-    algebra is not square-zero.
+    """In se(n) the translations are a square-zero ideal. so(4) has no such ideal, and the ideal of a Heisenberg algebra
+    is not square-zero.
     """
     algebra = quaternionic(named(family, size))
     ideal = square_zero_ideal(algebra)

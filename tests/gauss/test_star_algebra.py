@@ -61,7 +61,7 @@ def test_oscillator_algebra_has_one():
 
 def test_change_of_basis_with_parameters():
     """The brackets [a, b] = r·c, [b, c] = s·a, [c, a] = b/r with parameters r and s define so(3) or sl(2), depending on
-    the sign of s; both have one star algebra.
+    the sign of s. One star algebra of dimension 4 serves for both signs.
     """
     r, s = symbol("r"), symbol("s")
     lie = from_structure_constants(3, {0: {1: {2: r}, 2: {1: -1 / r}}, 1: {2: {0: s}}})

@@ -1,5 +1,5 @@
-"""The velocity ξ of a group element, Ġ = Gξ, collected as sums over the momenta of the frame elements. The values are
-the same as if computed from the coordinates, with fewer products.
+"""The velocity ξ of a group element, Ġ = Gξ, is written as sums over the momenta x̃(G f G*) of a few frame elements f.
+The values are the same as if ξ is computed from the coordinates, with fewer products.
 """
 
 import pytest

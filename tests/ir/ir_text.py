@@ -1,4 +1,6 @@
-"""Functions of the loop IR as text, for tests that compare a function before and after a pass."""
+"""Functions of the loop IR, the intermediate representation of generated code, as text: tests compare a function before
+and after a pass.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Functions of splittings in the loop IR: the flows, their order in a step, and the reverse pass."""
+"""Functions of splittings in the loop IR, the intermediate representation of generated code: the flows, their order in
+a step, and the reverse pass.
+"""
 
 from __future__ import annotations
 

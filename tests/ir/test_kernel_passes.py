@@ -1,5 +1,5 @@
-"""Functions of kernels in the loop IR, and the passes over them; tests compare the text of a function before and after
-a pass.
+"""Functions of kernels in the loop IR, the intermediate representation of generated code, and the passes over them.
+Tests compare the text of a function before and after a pass.
 """
 
 from textwrap import dedent

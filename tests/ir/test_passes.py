@@ -1,4 +1,6 @@
-"""Passes of the loop IR; tests compare the text of a function before and after a pass."""
+"""Passes over the loop IR, the intermediate representation of generated code. Tests compare the text of a function
+before and after a pass.
+"""
 
 from textwrap import dedent
 

@@ -1,4 +1,6 @@
-"""Functions of paths in the loop IR: recurrences of Taylor coefficients, and the sums over orders in SIMD lanes."""
+"""Functions of paths in the loop IR, the intermediate representation of generated code: recurrences of Taylor
+coefficients, and the sums over orders in SIMD lanes.
+"""
 
 from __future__ import annotations
 

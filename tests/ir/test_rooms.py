@@ -1,4 +1,6 @@
-"""The loop IR and the targets import only the modules that they may import."""
+"""The packages of the loop IR (the intermediate representation of generated code) and of the targets import only the
+modules that they may import.
+"""
 
 import ast
 from pathlib import Path

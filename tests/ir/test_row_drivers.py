@@ -1,4 +1,4 @@
-"""Row drivers, which call the loops of a lattice for its rows; tests compare their text."""
+"""Row drivers: functions of generated code that call the loops of a lattice row by row. Tests compare their text."""
 
 from dataclasses import replace
 from textwrap import dedent

@@ -1,4 +1,6 @@
-"""The lowering of loops to rows; tests compare the text of a function before and after the pass."""
+"""The pass that lowers loops over a lattice to loops over its rows. Tests compare the text of a function before and
+after the pass.
+"""
 
 from dataclasses import replace
 from textwrap import dedent

@@ -27,7 +27,7 @@ sweeps:
 """
 
 
-@pytest.mark.slow  # each starts a cluster of workers
+@pytest.mark.slow  # each case starts a cluster of workers
 @pytest.mark.parametrize(("after", "frames"), [(None, 0), (2.5, 7)])
 def test_statistics_are_those_of_single_runs(frames, after):
     text = DRIVEN if after is None else DRIVEN.replace("start: 0.5", f"start: 0.5, average: {{after: {after}}}")
@@ -50,7 +50,7 @@ def test_statistics_are_those_of_single_runs(frames, after):
             assert data["error(kinetic)"][i, j] == pytest.approx(error, rel=1e-9, nan_ok=True)
 
 
-@pytest.mark.slow  # it starts a cluster of workers
+@pytest.mark.slow  # the test starts a cluster of workers
 def test_statistics_are_over_the_stored_rows_of_a_run():
     text = DRIVEN.replace("start: 0.5", "start: 0.5, stride: 7, average: {after: 2.5, blocks: 2}")
     data, solver = phigen.sweep(phigen.spec.loads(text), workers=1), phigen.compile(phigen.spec.loads(text))
@@ -125,7 +125,7 @@ sweeps:
 """
 
 
-@pytest.mark.slow  # it starts a cluster of workers
+@pytest.mark.slow  # the test starts a cluster of workers
 def test_statistics_of_lattices_are_those_of_single_runs(tmp_path):
     spec = phigen.spec.loads(CHAIN)
     data = phigen.sweep(spec, workers=1)
@@ -148,7 +148,7 @@ def test_sweeps_of_lattices_keep_numbers_only():
         phigen.spec.loads(CHAIN.replace("mean(heat)", "mean(local)"))
 
 
-@pytest.mark.slow  # it starts a cluster of workers
+@pytest.mark.slow  # the test starts a cluster of workers
 def test_the_temperature_curve_of_the_page_is_that_of_theory():
     page = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
     (text,) = (block for block in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL) if "name: samples" in block)
