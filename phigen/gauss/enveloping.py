@@ -235,8 +235,8 @@ class _Module:
         return self._completed(left, lowered, factors, iota)
 
     def _action(self, a: fmpq_mat, lowered: Sequence[fmpq_mat], extract: fmpq_mat) -> fmpq_mat:
-        """Return the matrix of the action of ``a`` on S, the module of symmetric elements; ``a`` is the adjoint matrix
-        of a basis element of the Lie algebra.
+        """Return the matrix of the action of a basis element of the Lie algebra on the module S of symmetric elements.
+        ``a`` is the adjoint matrix of the basis element.
         """
         m, d = a.nrows(), len(lowered)
         images = [a.transpose() * q + q * a for q in lowered]
@@ -362,7 +362,7 @@ class _Module:
 
 
 def sum_of(matrices: Sequence[fmpq_mat], factors: Sequence[fmpq], column: int, rows: int) -> list[fmpq]:
-    """Return column ``column`` of Σ_k factors[k]·matrices[k], whose matrices have ``rows`` rows."""
+    """Return column ``column`` of the matrix Σ_k factors[k]·matrices[k]. The matrices have ``rows`` rows."""
     nonzero_terms = [(m, f) for m, f in zip(matrices, factors, strict=True) if f != 0]
     return [sum((m[i, column] * f for m, f in nonzero_terms), fmpq(0)) for i in range(rows)]
 

@@ -141,10 +141,11 @@ class StarAlgebra:
             yield difference(self.starred(f), f, -self.field.one)
 
     def _commutators_of_skew(self) -> Iterator[Vector]:
-        """Yield residuals that are 0 if the skew elements which every functional x̃ maps to 0 form an ideal of the skew
-        elements.
+        """Yield residuals that decide whether some skew elements form an ideal of all skew elements: those on which
+        every functional x̃ is 0.
 
-        They are x̃([u, n]) for all skew u and for all these elements n.
+        The residuals are x̃([u, n]) for all skew u and all n among these elements. They are 0 if and only if the
+        elements form an ideal.
         """
         rows: list[Vector] = [{} for _ in self.basis]
         for i, u in enumerate(self.skew):

@@ -189,11 +189,12 @@ def _differences(
     values: Mapping[str, Expression],
     states: Mapping[str, Expression],
 ) -> list[tuple[str, Expression]]:
-    """Return the differences between the steps of two sets of unknowns, in the changes of x and in the velocities.
+    """Return the differences between the steps of two sets of unknowns, in the changes of x and in the
+    velocities.
 
-    The symbols "slope" stand for ∇H, so that zero differences are equal for any H. ``values`` has the unknowns of
-    ``points`` as functions of the unknowns of ``reference``; ``states`` replaces coordinates at the start by other
-    expressions.
+    The symbols "slope" stand for ∇H. So if the differences are 0, the steps are equal for any H. ``values`` has the
+    unknowns of ``points`` as functions of the unknowns of ``reference``; ``states`` replaces coordinates at the start
+    by other expressions.
     """
     slopes = [symbol(Symbol("slope", i)) for i in range(system.dimension)]
     reference_rates = substitute(vector_field(reference, at_unknowns(reference), slopes=slopes), states)
@@ -226,8 +227,8 @@ def _unknowns_by_elements(points: StageMap, complete: StageMap) -> dict[str, Exp
 
 
 def _follows(system: System, points: StageMap, field: Sequence[Expression]) -> Iterator[Statement]:
-    """Decide whether the unknowns 0 stand for the state at the start of a step, and whether the method follows ẋ = π∇H
-    there.
+    """Decide whether the state is that at the start of a step if all unknowns are 0, and whether the method follows ẋ =
+    π∇H there.
     """
     at_start = dict.fromkeys(points.unknowns, ZERO)
     start = [(c, e) for c, e in zip(system.coordinates, substitute(points.change, at_start), strict=True)]

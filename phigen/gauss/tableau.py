@@ -21,19 +21,19 @@ DIGITS = 60
 #: Largest number of stages; a method of s stages has order 2s.
 MOST_STAGES = 8
 
-#: Band of the predictor of a Gauss step, an angular frequency in units of 1/h, for each stage of the method. The
-#: predictor of the next step is optimal for motions with frequencies up to the band. Methods with more stages are used
-#: with longer steps, so their band is wider.
+#: Width of the frequency band of the predictor of a Gauss step. The predictor is optimal for motions with angular
+#: frequencies up to BAND/h times the number of stages. Methods with more stages are used with longer steps, so their
+#: band is wider.
 BAND = Fraction(1, 4)
 
 
 #: Largest number of previous steps that predictors read in C code with the stages of a step in SIMD lanes.
 EARLIER = 2
 
-#: Bands of several predictors, as `BAND`, each with the number of previous steps that the predictor reads. C code with
-#: the stages of a step in SIMD lanes uses the predictor that was best in recent steps. For the Kowalevski top with
-#: steps of 0.1, 0.25, 0.5 and 1, the errors of its predicted derivatives are 3e-10, 4e-8, 8e-5 and 0.1. With `BAND`
-#: alone they are 3e-5, 6e-5, 3e-4 and 0.2.
+#: Widths of the bands of several predictors, in the unit of `BAND`, each with the number of previous steps that the
+#: predictor reads. C code with the stages of a step in SIMD lanes uses the predictor that was best in recent steps. For
+#: the Kowalevski top with steps of 0.1, 0.25, 0.5 and 1, the errors of its predicted derivatives are 3e-10, 4e-8, 8e-5
+#: and 0.1. With `BAND` alone they are 3e-5, 6e-5, 3e-4 and 0.2.
 BANDS = ((Fraction(3, 32), EARLIER), (Fraction(3, 16), EARLIER), (Fraction(3, 8), 1))
 
 
@@ -108,10 +108,10 @@ def tableau(stages: int, precision: Precision = DOUBLE) -> Tableau:
 def continuation(stages: int) -> list[list[float]]:
     """Return the matrix that predicts the stages of a step by the collocation polynomial of the last step.
 
-    It has the form of ``prediction`` of `Tableau`, and is used by solvers with loops over the stages, in C, JavaScript
-    and NumPy. On ten systems at orders 4 to 16, it takes as many sweeps as the second predictor of `BANDS`, within 6 %,
-    and up to 25 % fewer at small steps. It reads only the last step, so derivatives of earlier steps need no change of
-    frame, and a kick between earlier steps does not spoil it.
+    It has the form of ``prediction`` of `Tableau`. Solvers with loops over the stages use it, in C, JavaScript and
+    NumPy. In ten systems at orders 4 to 16, steps took the same number of sweeps as with the second predictor of
+    `BANDS`, within 6 %; at small steps they took up to 25 % fewer. The matrix reads only the last step, so derivatives
+    of earlier steps need no change of frame, and a kick between earlier steps does not spoil the prediction.
     """
     weights, _ = _exact(stages)
     nodes = gauss_nodes(stages)

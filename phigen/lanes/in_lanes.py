@@ -38,7 +38,7 @@ LANES = 8
 #: stack on macOS.
 MAX_STACK_BYTES = 256 * 1024
 
-#: Largest number of packs (SIMD batches of members) in a group, which must equal that of the runtime.
+#: Largest number of packs (SIMD batches of members) in a group. The runtime has the same constant, with the same value.
 PACKS_PER_GROUP = 4
 
 #: Number of arrays (stages × unknowns) that a batch of members needs for a Gauss step: the unknowns, and the increments
@@ -46,9 +46,9 @@ PACKS_PER_GROUP = 4
 MEMBER_BATCHES = 4
 
 #: Largest number of stages for which members of an ensemble are integrated in batches. The second limit applies if
-#: kernels call functions and a single trajectory iterates only over its momenta, since a batch iterates over all
-#: unknowns. Measured time in batches, relative to members one by one: Kowalevski top 1.13 with eight stages, 0.85 with
-#: six; two pendulums 1.15 with four stages, 0.6 with two.
+#: kernels call functions and the iteration for a single trajectory has only momenta as unknowns: in a batch, the
+#: iteration has all unknowns, and takes longer. Measured time in batches, relative to members one by one: Kowalevski
+#: top 1.13 with eight stages, 0.85 with six; two pendulums 1.15 with four stages, 0.6 with two.
 MAX_BATCHED_STAGES, MAX_BATCHED_STAGES_WITH_FUNCTIONS = 6, 3
 
 _DOUBLE = 8
@@ -196,14 +196,14 @@ def _of_newton(program: Program, step: Newton) -> Blocks | None:
 def _of_path(program: Program, step: Path) -> Blocks | Traces | None:
     """Return blocks of steps if several steps can be solved together.
 
-    Otherwise return the paths for the reverse pass, which are in lanes in double precision only; None if they are not
-    in lanes.
+    Otherwise return the paths for the reverse pass, if they are in lanes, or None. They are in lanes in double
+    precision only.
     """
     blocks = None
     if _is_lowered(program) and step.lanes and (program.offers("recurrences") or not step.adjoint):
         blocks = _paths(program, step, step.lanes)
     if blocks or program.single or not program.lanes:
-        return blocks  # each number in a lane has 64 bits
+        return blocks  # the code of paths in lanes assumes numbers of 64 bits
     return _traces(program, step)
 
 

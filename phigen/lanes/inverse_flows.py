@@ -17,8 +17,8 @@ from phigen.symbolic.expression import ZERO, symbol, symbols_of
 
 
 def recomputing_transposes(program: Program, step: Splitting) -> tuple[Kernel, ...]:
-    """Return transposes of flows that read the state after a flow, and that also output the state before it,
-    `STATE_BEFORE`.
+    """Return transposes of flows, which read the state after the flow. An additional output, `STATE_BEFORE`, is the
+    state before the flow.
 
     Returns () if there are forces, or if coefficients for the step −h differ from those for h by more than their signs.
     """

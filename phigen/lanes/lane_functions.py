@@ -10,7 +10,8 @@ from phigen.scheme.lowering import expand_powers
 from phigen.symbolic.expression import Expression, topological
 from phigen.symbolic.functions import FUNCTIONS
 
-#: Functions with a vector version, and functions that are formulas in such functions, with their formulas.
+#: LANE_FUNCTIONS have a vector version. LANE_FORMULAS are computed from functions with a vector version; they are given
+#: with their formulas.
 LANE_FUNCTIONS = tuple(f.name for f in FUNCTIONS.values() if f.lanes == f.name)
 LANE_FORMULAS = {f.name: f.lanes for f in FUNCTIONS.values() if f.lanes not in ("", f.name)}
 
@@ -20,8 +21,8 @@ SMALL_ARGUMENT_FUNCTIONS = tuple(
     f.name for f in sorted(FUNCTIONS.values(), key=lambda f: (f.written and f.name) or "") if f.near
 )
 
-#: Functions with a vector version for all arguments; for sin and cos, for all |u| ≤ 10⁸, since their reduction modulo π
-#: is exact up to there. The vector versions of exp beyond 700 and of log at 0 fail.
+#: Functions with a vector version for all arguments. There are three exceptions. The reduction of the arguments of sin
+#: and cos modulo π is exact only for |u| ≤ 10⁸. The vector version of exp fails beyond 700, and that of log at 0.
 FULL_RANGE_FUNCTIONS = (*SMALL_ARGUMENT_FUNCTIONS, "cos")
 
 #: Exponents of powers that remain after lowering, and that need no library function.

@@ -1,7 +1,7 @@
 """Kernels of steps along Karasev's paths in SIMD lanes, with one path in each lane.
 
-A path is the solution of ṁ = π(m)p about its mean (docs/mathematics.md); it is computed by Taylor series. This module
-also counts the values on the stack that the series need.
+A path is a solution of ṁ = π(m)p; docs/mathematics.md explains Karasev's construction. Paths are computed by Taylor
+series. This module also counts the values on the stack that the series need.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from phigen.scheme.steps import Path, PathAdjoint, PathLanes
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
 
-#: Largest number of Taylor terms of a path about its middle, which must equal that of the runtime.
+#: Largest number of Taylor terms of a path about its middle. The runtime has the same constant, with the same value.
 MAX_TERMS = 16
 
-#: Numbers of Taylor terms to try for the derivatives of paths, without a reverse pass and (in SLOPE_TERMS_BACK) with
-#: one. The first number whose series fit on the stack is used.
+#: Numbers of Taylor terms to try for the derivatives of paths; SLOPE_TERMS_BACK is for solvers with a reverse pass. The
+#: first number whose series fit on the stack is used.
 SLOPE_TERMS = (12, 8)
 SLOPE_TERMS_BACK = (MAX_TERMS, 12, 8)
 
