@@ -95,7 +95,7 @@ class FlowFunctions:
             pair = (*self._flow(others[0][0], _row(K)), *self._flow(outer, _row(ir.plus(K, 1))))
             count, two = ir.Constant(len(schedule.begin)), ir.Constant(2)
             body.append(ir.Loop("stages", pair, "k", ir.Constant(1), count, step=two))
-        doc = "Corrector: flows before the first step of a run or after the last, with half a flow of the larger part"
+        doc = "Corrector: the flows before the first step of a run or, if after is 1, those after the last step"
         parameters = ("after", "coef", "x", "displacement", "start", *["tape"] * self.stores)
         return self.function("corrector", doc, parameters, tuple(body))
 
@@ -113,9 +113,9 @@ class FlowFunctions:
         )
         body: list[ir.Statement] = [ir.Switch(PART, tuple(range(1, count + 1)), cases)]
         if self.turns:
-            note, zeros = "attitude increments, already applied", ir.Listed((ir.Constant(0.0),))
+            note, zeros = "attitude increments, which are not needed here", ir.Listed((ir.Constant(0.0),))
             body.insert(0, ir.vectors(ir.Vector(ELEMENTS), ELEMENT, value=zeros, note=note))
-        doc = "Apply the flow of a part; slope is the derivative of its increment at the start"
+        doc = "Apply the flow of a part of H; slope receives the derivative of its increment by the state at the start"
         return self.function("tangent_flow", doc, ("part", "coef", "x", "displacement", "start", "slope"), tuple(body))
 
 
@@ -255,7 +255,8 @@ class FlowTransposes:
         state = ir.Vector(ir.Constant(self.dimension))
         types = {"x": replace(state, constant=True), "bar": state, "coef_bar": ir.Vector(ir.Constant(self.row))}
         doc = (
-            "Pull a cotangent back through the flow of a part that started at x; the cotangents of its coefficients are"
+            "Pull a cotangent back through the flow of a part of H, which started at x;"
+            " the cotangents of its coefficients are"
         )
         parameters = ("part", "coef", "x", "bar", "coef_bar")
         body: ir.Block = (*self._results(), self._switch(case))
@@ -269,7 +270,7 @@ class FlowTransposes:
     def group_flows(self) -> ir.Function:
         """Return the function that applies a flow to all members of a group.
 
-        Before, it stores the coordinates that the transpose of the flow reads.
+        First it stores the coordinates that the transpose of the flow reads.
         """
 
         def case(k: int, flow: Transposed) -> Iterator[ir.Statement]:

@@ -50,8 +50,8 @@ class LatticeLoops:
         return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window, sweep.first)
 
     def stage(self, kernel: Kernel) -> ir.Function:
-        """Return the function of a kernel of the implicit equation of a stage, whose unknown is y. The fields that it
-        reads are y.
+        """Return the function of a kernel of the implicit equation of a stage. The fields that the function reads are
+        those of the unknown y.
         """
         gather = self.step.others.varied if kernel.reads_variations else self.step.others.field
         read = gather if kernel.inputs["gathered"] else None
@@ -91,10 +91,11 @@ class LatticeLoops:
     def transposed(
         self, kernel: Kernel, gather: Gather | None, sweep: Sweep | None = None, fields: Sequence[str] = ()
     ) -> ir.Function:
-        """Return the function of a transposed kernel: of the implicit equation of a stage, or of a ``sweep``.
+        """Return the function of a transposed kernel. It is the transpose of a kernel of a ``sweep`` or, without
+        ``sweep``, of the implicit equation of a stage.
 
-        ``gather`` are the sums that the kernel reads. The kernel recomputes ``fields`` as they were before the sweep,
-        by the inverse flow.
+        ``gather`` has the sums that the kernel reads. By the inverse flow, the kernel recomputes the values of
+        ``fields`` before the sweep.
         """
         stores = self._cotangents(kernel, gather.names if gather else (), fields)
         return self._over_sites(kernel, ("coef",), stores, gather, self._selection(sweep))
@@ -262,8 +263,8 @@ def _present(kernels: Iterable[Kernel], kind: str) -> tuple[Symbol, ...]:
 
 
 def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:
-    """Return the least and the largest offset of a term along each axis, which the symbol of its weight has as its
-    ``key``.
+    """Return the least and the largest offset of a term along each axis. They are read from the ``key`` of the symbol
+    of its weight.
     """
     ends = [int(k) for k in key]
     return list(zip(ends[::2], ends[1::2], strict=True))

@@ -26,7 +26,7 @@ _TYPES: Mapping[str, ir.ParameterType] = {
 
 
 def are_allowed(parameters: Sequence[Parameter], members: Mapping[str, str], *, graph: bool) -> ir.Function:
-    """Return the function that is 1 if all parameters are finite and have the required signs, else 0."""
+    """Return the function that returns 1 if all parameters are finite and have the required signs, else 0."""
     body, conditions = list[ir.Statement](), list[ir.Value]()
     for p in parameters:
         array, zero = ir.Member(PARAMS, members[p.name]), ir.Constant(0.0)
@@ -52,8 +52,8 @@ def are_allowed(parameters: Sequence[Parameter], members: Mapping[str, str], *, 
 def copies(
     parameters: Sequence[Parameter], members: Mapping[str, str], arrays: Sequence[str], at_bonds: Sequence[str]
 ) -> Iterator[ir.Function]:
-    """Yield the functions that copy parameters of the caller: at sites into rows of ``arrays``, at bonds into
-    ``at_bonds``.
+    """Yield the functions that copy parameters from arrays of the caller. Parameters at sites are copied into the rows
+    of ``arrays``, and parameters at bonds into ``at_bonds``.
     """
     sites, bonds = ([p for p in parameters if p.at == at] for at in ("sites", "bonds"))
     types = {**_TYPES, "s": ir.RecordType("solver", mutable=True)}

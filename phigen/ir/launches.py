@@ -13,9 +13,9 @@ class EnsembleLaunch:
     """Data for launching the kernel of an ensemble on a device.
 
     ``group`` is the default number of work items in a work group. ``predictors`` is the number of values that a member
-    has in shared memory for its predictor. ``coefficients`` is the number of coefficients that members with the same
-    parameters, step and gauge can share. ``gauges`` is the number of factors of a gauge. A number is 0 if there are no
-    such values.
+    has in shared memory for its predictor; 0 without a predictor. ``coefficients`` is the number of coefficients that
+    members with the same parameters, step and gauge can share; 0 if they share none. ``gauges`` is the number of
+    factors of a gauge; 0 without a gauge.
     """
 
     group: int = 0
@@ -72,5 +72,5 @@ class LatticeLaunches:
     bounds: tuple[tuple[tuple[int, int], ...], ...] = ()
     seams: tuple[tuple[int, tuple[int, ...]], ...] = ()
     numbers: tuple[str, ...] = ()
-    # for each observable: its reduction, such as "sum" or "max", and "sites", "bonds" or "pairs", over which it runs
+    # for each observable: its reduction, such as "sum" or "max", and what it runs over: "sites", "bonds" or "pairs"
     reductions: tuple[tuple[str, str], ...] = ()

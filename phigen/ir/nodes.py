@@ -109,7 +109,7 @@ class Storage(Enum):
 
 @dataclass(frozen=True)
 class Array:
-    """Array over the sites, by its kind of storage and its number among the arrays of this kind."""
+    """Array over the sites, identified by its kind of storage and its number among the arrays of this kind."""
 
     storage: Storage
     number: int
@@ -154,7 +154,9 @@ class Load:
 
 @dataclass(frozen=True)
 class Coefficient:
-    """Coefficient by its number. Coefficients do not depend on the state; the kernel ``prepare`` computes them."""
+    """Coefficient, identified by its number. Coefficients do not depend on the state; the kernel ``prepare`` computes
+    them.
+    """
 
     number: int
 
@@ -202,8 +204,8 @@ class HasColour:
 class OnSeam:
     """Weight of a term of H near boundary seams: 1 if the sweep of a part of H includes the term, else 0.
 
-    The term begins at the site ``offset`` away. It is included if this site has the colour ``colour`` and lies on
-    exactly those seams that the sweep is for.
+    The term begins at the site that is ``offset`` away from the site of the loop. It is included if it begins at a site
+    of the colour ``colour`` that lies on exactly those seams that the sweep is for.
     """
 
     number: int
@@ -422,9 +424,10 @@ class Selection:
     """The sites over which a loop runs.
 
     With a ``colour``, they are the sites of this colour. ``inside`` excludes the sites near boundary seams. With a
-    ``window``, a bit mask of axes, the loop runs over the sites near seams that are reached by terms on the seams of
-    these axes. Sites with numbers below ``first`` are excluded. ``massive`` excludes the sites after the last site that
-    has a mass. In loops over pairs, ``first`` and ``massive`` apply to the second site of a pair.
+    ``window``, the loop runs over sites near seams: those that are reached by terms on the seams of some axes. The bits
+    of ``window`` say which axes these are. Sites with numbers below ``first`` are excluded. ``massive`` excludes the
+    sites after the last site that has a mass. In loops over pairs, ``first`` and ``massive`` apply to the second site
+    of a pair.
     """
 
     colour: int | None = None

@@ -1,7 +1,8 @@
-"""Builders of the functions for paths, the solutions m(s) of ṁ = π(m)p, by recurrences for their Taylor coefficients.
+"""Builders of the functions for paths, the solutions m(s) of ṁ = π(m)p, by recurrences for their Taylor
+coefficients.
 
 Each node of the expression graph of π(m)p has a Taylor series, an array of coefficients by order. The recurrences are
-the same in all languages; a `PathLayout` says in which arrays the values are. The functions for SIMD lanes
+the same in all languages; a `PathLayout` says where the values are stored. The functions for SIMD lanes
 (`lane_functions`) have loops for the sums over orders, and also compute derivatives of the path.
 """
 
@@ -35,7 +36,9 @@ ZERO, ONE = ir.Constant(0), ir.Constant(1.0)
 
 
 class PathLayout:
-    """The arrays in which the values of a path are; the array of a Taylor series has one entry for each order."""
+    """The names of the arrays that hold the values of a path. The array of a Taylor series has one entry for each
+    order.
+    """
 
     def coefficient(self, i: int) -> ir.Value:
         """Return coefficient i, a function of parameters and step."""
@@ -64,7 +67,7 @@ class PathLayout:
 
 @dataclass(frozen=True)
 class PathFunctions:
-    """Builder of the recurrences for a path; ``layout`` says in which arrays the values are."""
+    """Builder of the recurrences for a path; ``layout`` says where the values are stored."""
 
     program: Program
     path: Recurrences
@@ -152,8 +155,8 @@ class PathFunctions:
         return ir.Binary("/", ir.Grouped(total), self.layout.order(q.divisor, ZERO)) if q.divisor is not None else total
 
     def _sum(self, t: ConvolutionTerm) -> ir.Value:
-        """Return a convolution, the sum over orders in a product of two series, as a call of a function of the
-        runtime.
+        """Return a convolution as a call of a function of the runtime. A convolution is the sum over orders in a
+        product of two series.
         """
         exponent = (_exponent(t),) if t.kind == "power" else ()
         return ir.Called(f"taylor_{t.kind}", (self.layout.series(t.a), self.layout.series(t.b), *exponent, K))
@@ -216,7 +219,7 @@ def adjoint_program(program: Program, path: PathAdjoint) -> Program:
 class _LaneLayout(PathLayout):
     """The places of the values of a path in one lane of the record e.
 
-    The series that derivatives of the path need have the numbers after the series of the path.
+    Some series are needed for derivatives of the path only. Their numbers follow those of the series of the path.
     """
 
     def __init__(self, path: Recurrences) -> None:
@@ -300,8 +303,8 @@ class _LaneFunctions:
         return typed_function(name, f"{doc} terms", ("coef", "e", "k"), (*share, *body), _TYPES)
 
     def variation(self, name: str, array: str, jacobian: Sequence[SeriesEntry], width: int, whose: str) -> ir.Function:
-        """Return the function that adds a product to derivatives of the path: ∂(π p)/∂m at order j, times these at
-        order k − j.
+        """Return the function that adds a product to derivatives of the path. The product is ∂(π p)/∂m at order j times
+        the derivatives of the path at order k − j.
 
         The derivatives are matrices with ``width`` columns in the member ``array`` of e; ``whose`` describes them in
         the comment.
@@ -371,7 +374,9 @@ def _lanes(statements: Iterable[ir.Statement]) -> ir.Loop:
 
 
 def _over_lanes(statements: Sequence[ir.Statement]) -> Iterator[ir.Loop]:
-    """Yield loops over all lanes that together have all ``statements``, each with at most `LONGEST_LOOP` of them."""
+    """Yield loops over all lanes that together contain ``statements``. Each loop has at most `LONGEST_LOOP`
+    statements.
+    """
     for start in range(0, len(statements), LONGEST_LOOP):
         yield _lanes(statements[start : start + LONGEST_LOOP])
 

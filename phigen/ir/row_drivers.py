@@ -24,8 +24,8 @@ LENGTH, STATE = ir.Member(S, "length"), ir.Member(S, "x")
 
 #: Sites of a row segment: the first site, and the site after the last one. None stands for all sites of the segment.
 Sites = tuple[ir.Value, ir.Value] | None
-#: The sites of a row segment that are away from open ends and boundary seams; the sites near its begin; those near its
-#: end.
+#: The sites of a row segment that are away from open ends and boundary seams; those near the first site of the segment;
+#: those near its last site.
 AWAY, FIRST_SITES, LAST_SITES = (SECOND, THIRD), (BEGIN, SECOND), (THIRD, STOP)
 
 #: Number of sites in a SIMD vector. Loops that add whole vectors begin at multiples of this number, and rows are padded
@@ -90,7 +90,7 @@ class RowDrivers:
         The cases have the numbers 1, 2, …, or ``labels``; each is a `RowSegment` or a block of statements. By default,
         the function processes the segments ``first`` … ``end`` − 1. With ``threads``, it processes all segments, and
         uses several threads for lattices of more than ``threads`` sites. If ``alone``, it processes a single segment,
-        without a loop. With ``vectors``, the sites near open ends are rounded up to whole SIMD vectors.
+        without a loop. With ``vectors``, the number of sites near open ends is rounded up to whole SIMD vectors.
         """
         several = not alone and not threads
         range_names = ("first", "end") if several else ("unit",) * alone

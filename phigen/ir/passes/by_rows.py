@@ -28,8 +28,8 @@ _MEMBERS = {Storage.STATE: "x", Storage.VARIATION: "varied", Storage.START: "sta
 class RowLayout:
     """Layout of a lattice in rows.
 
-    ``lines`` are the offsets of the rows that functions read from the row of the loop. ``members`` maps parameters to
-    the names of their members in the record ``params``.
+    ``lines`` are the rows that functions read, as offsets relative to the row of the loop. ``members`` maps parameters
+    to the names of their members in the record ``params``.
     """
 
     lattice: LatticeLoops
@@ -201,7 +201,7 @@ class RowDeclarations:
             self._once(name, local_name, in_row)
             return
         in_open_rows: ir.Value = ir.Constant(1.0)
-        if not self.layout.single_row:  # before the loop, since gcc does not vectorise a loop with this access
+        if not self.layout.single_row:  # read before the loop: gcc does not vectorise a loop that reads it
             in_open_rows = ir.fixed(f"there{value.number}")
             self.once.append((in_open_rows.symbol, in_row))
         condition = tests[0] if len(tests) == 1 else ir.Binary("and", *tests)

@@ -34,7 +34,8 @@ from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
 
 NUMBER, COLOUR = (ir.fixed(name) for name in ("k", "colour"))
 
-#: Names of arrays in JavaScript, for each kind of storage and for parameters of functions whose names differ.
+#: Names of arrays in JavaScript: for each kind of storage, and for those parameters of functions that have other names
+#: in JavaScript.
 _ARRAYS = {ir.Storage.STATE: "x", ir.Storage.VARIATION: "v", ir.Storage.START: "start", ir.Storage.SUM: "sums"}
 _PARAMETERS = {"state": "x", "varied": "v"}
 

@@ -30,7 +30,9 @@ def divided_at_ends(function: ir.Function) -> list[ir.Function]:
 
 
 def _weight(s: ir.Statement) -> str:
-    """Return the name of the weight of a term at open ends that a statement declares; "" for other statements."""
+    """Return the name of the weight that a statement declares, if it is the weight of a term at open ends; "" for other
+    statements.
+    """
     return s.items[0][0] if isinstance(s, ir.Declare) and isinstance(s.items[0][1], ir.Inside) else ""
 
 

@@ -107,8 +107,8 @@ def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Stat
 
 
 def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Function:
-    """Return the function by rows of a kernel of the implicit equation of a stage. It assigns or ``adds`` its
-    outputs.
+    """Return the function by rows of a kernel of the implicit equation of a stage. If ``adds``, it adds its outputs to
+    the arrays of results, otherwise it assigns them.
     """
     return _storing(function, layout, dict(enumerate(outputs)), "out", WRITTEN, adds=adds)
 
@@ -255,12 +255,12 @@ def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
 def bonds_of(
     loop: ir.Loop, rows: RowDeclarations, updated: Iterable[ir.Statement], sign: ir.Value, *, across: bool = False
 ) -> ir.Loop:
-    """Return the loop over the bonds of a site: those that begin there ("a"), end there ("b"), or both (""), by
-    ``loop.end``.
+    """Return the loop over the bonds of a site. ``loop.end`` selects the bonds that begin there ("a"), end there ("b"),
+    or both ("").
 
     Bonds are skipped if their end ``loop.chosen`` does not have the colour of the sweep; with ``across``, a flag of the
-    caller decides which end is tested. ``sign`` is 1 or −1: the value of `SIDE`, the direction of a bond, at the site
-    where the bond begins.
+    caller decides which end is tested. The direction of a bond is 1 or −1, and opposite at its two ends. It is stored
+    in the variable `SIDE`, and is ``sign`` at the site where the bond begins.
     """
     names = [s.items[0][0] for s in loop.body if isinstance(s, ir.Declare)]
     reads_there = [(name, value) for name, value in rows.other.items() if name in names]

@@ -39,8 +39,8 @@ from phigen.symbolic.symbols import HERE
 BEGIN, END, APART, WHOLE, LANES, LANE, INDEX_TO = (
     ir.fixed(name) for name in ("begin", "end", "apart", "whole", "lanes", "l", "to")
 )
-#: Number of partial sums for a sum over sites, a macro of the generated C; and the array of the sums. The runtime adds
-#: the partial sums.
+#: BATCH is the number of partial sums for each sum over sites; it is a macro of the generated C. SUMS is the array of
+#: the partial sums, which the runtime adds up.
 BATCH, SUMS = ir.fixed("ADDED"), ir.fixed("sums")
 
 #: Number of sites in a batch of a sum over pairs. Additions for different sites are independent, so the processor need
@@ -50,7 +50,7 @@ PAIR_BATCH = 32
 
 @dataclass(frozen=True)
 class Handed:
-    """Contribution of each site to the cotangent of field ``base`` at the site ``offset`` away.
+    """Contribution of each site to the cotangent of field ``base`` at the site that is ``offset`` away.
 
     The contributions of all sites are stored in the array with the number ``array``.
     """
@@ -66,9 +66,9 @@ class Transpose:
 
     The function reads cotangents of the kind ``seed``: those of the fields with the numbers ``fields``, or the
     variations in the row record if ``fields`` is empty. First it adds the contributions ``received``, which an earlier
-    loop has stored. It stores its contributions to neighbours in the arrays of ``handed``. The cotangents of the
-    ``summed`` sums over bonds or pairs that it reads are stored in the arrays from number ``sums_from`` on. It also
-    writes the fields ``recomputed``.
+    loop has stored. It stores its contributions to neighbours in the arrays of ``handed``. If the function reads sums
+    over bonds or pairs, ``summed`` is their number, and their cotangents are stored in the arrays from number
+    ``sums_from`` on. It also writes the fields ``recomputed``.
     """
 
     function: ir.Function
@@ -323,8 +323,8 @@ def _lanes(count: ir.Value, body: ir.Block, *, independent: str = "", note: str 
 
 
 def _into(s: ir.Update, k: int, site: ir.Value, value: ir.Value) -> ir.Assign:
-    """Return the statement that uses a result of a loop over bonds or pairs at a site: the sum ``value`` over all of
-    these.
+    """Return the statement that uses the result of a loop over the bonds or pairs of a site. The result is a sum,
+    ``value``.
 
     It is added to a cotangent or to a sum over sites, or stored at the site.
     """

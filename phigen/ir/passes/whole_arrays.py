@@ -70,10 +70,10 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(MOVED)))
 
     def stage(self, function: ir.Function) -> ir.Function:
-        """Return a kernel of the implicit equation of a stage as a function of y, its unknown, and of the state at the
-        start.
+        """Return a kernel of the implicit equation of a stage as a function of the unknown y and of the state at the
+        start of the stage.
 
-        The name of the parameter y is x.
+        Its parameter for y is named x.
         """
         shape = ir.Member(SITES, "sizes")
         values = (ir.Called("broadcast_to", (s.value, shape), NP) for s in function.loop.stores)
@@ -182,7 +182,8 @@ class WholeArrays:
     def _returned(self, loop: ir.Loop, s: ir.Store, value: ir.Value) -> ir.Value:
         """Return a contribution to a cotangent, as an array over the sites of the values that were read.
 
-        It is shifted by the opposite offset, or summed over the bonds or pairs of each site.
+        A value read at an offset contributes at this offset, so the array is shifted. A value read at an end of bonds
+        or pairs contributes the sum over the bonds or pairs of each site.
         """
         if s.end and loop.kind == "bonds":
             return ir.Called("summed", (value, ir.fixed("here" if s.end == "a" else "there")), SITES)
@@ -280,9 +281,7 @@ class WholeArrays:
         return value
 
     def _load(self, array: ir.Array, offset: Sequence[int], end: str) -> ir.Value:
-        """Return the array of a field at all sites, moved by an offset, or its values at one end of all bonds or
-        pairs.
-        """
+        """Return the values of a field: at all sites, shifted by an offset, or at one end of all bonds or pairs."""
         fields, increments = self.lattice.program.coordinates, self.lattice.step.sites.increments
         storage, number = ir.fixed(_ARRAYS.get(array.storage, array.name)), ir.Constant(array.number)
         whole: ir.Value = ir.Entry(storage, number)
@@ -300,8 +299,8 @@ class WholeArrays:
 
 
 def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
-    """Yield the functions, each body only once. A function that differs from an earlier one only in colour or window
-    calls it.
+    """Yield the functions, with each body printed only once. If a function differs from an earlier one only in colour
+    or window, its body is a call of the earlier function.
     """
     first: dict[ir.Block, ir.Function] = {}
     for function in functions:

@@ -51,7 +51,9 @@ def kernel_arrays(lattice: LatticeLoops) -> tuple[str, ...]:
 
 
 def work_items(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
-    """Return a function over sites, bonds or pairs as the statements of one work item, which computes one site."""
+    """Return the statements of one work item for a function with a loop over sites, bonds or pairs. A work item
+    computes one site.
+    """
     items = _WorkItems(lattice)
     loops = [s for s in function.body if isinstance(s, ir.Loop)]
     head = [s for s in function.body if isinstance(s, ir.Declare)]
@@ -70,8 +72,8 @@ class _WorkItems:
     declared: set[int] = field(default_factory=set)
 
     def loop(self, loop: ir.Loop) -> Iterator[ir.Statement]:
-        """Yield the statements of a work item, which computes one site, for a loop: the body for its own site, or a
-        loop over the bonds or pairs of the site.
+        """Yield the statements of a work item, which computes one site. A loop over sites is replaced by its body; a
+        loop over bonds or pairs becomes a loop over those of the site.
         """
         if loop.kind == "sites":
             yield from (new for s in loop.body for new in self.lowered(s))
