@@ -62,8 +62,8 @@ def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
 
 
 def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64], dict[str, Floats]]:
-    """Return the sites that bonds connect, an array (bonds, 2) from a ``.csv`` file, and the columns of parameters by
-    name.
+    """Return the bonds in a ``.csv`` file: an array (bonds, 2) of the sites that they connect, and the columns of
+    parameters by name.
 
     ``parameters`` are the names that the file may have as columns. Without column names, the file has two columns of
     sites.

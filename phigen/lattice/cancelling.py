@@ -17,7 +17,9 @@ Factored = tuple[Expression, Mapping[str, int]]
 
 
 def cancelled(values: Sequence[Expression], names: Iterable[str]) -> list[Expression]:
-    """Return the expressions with the powers of each symbol of ``names`` in a product combined, as in m·m⁻¹ = 1."""
+    """Return the expressions with powers of symbols combined in each product, as in m·m⁻¹ = 1, for the symbols
+    ``names``.
+    """
     return [_multiplied(f) for f in _factored(values, names)]
 
 

@@ -96,7 +96,7 @@ class Cell:
         return self.neighbours.origin
 
     def at(self, name: str, offset: Offset) -> str:
-        """Return the symbol of a field, or of a parameter at sites, at the site ``offset`` away."""
+        """Return the symbol of a field, or of a parameter at sites, at the site that is ``offset`` away."""
         return self.neighbours.at(name, offset)
 
     def place(self, name: str) -> Place:

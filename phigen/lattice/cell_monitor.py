@@ -84,7 +84,7 @@ def _positive(cell: Cell, e: Expression) -> set[str]:
 
 
 def _at_start(cell: Cell, flow: CellFlow, spec: Spec, run: str) -> float:
-    """Return the energy of one part of H, that with the given ``flow``, at the initial state of a run."""
+    """Return the energy of a part of H at the initial state of a run. It is the part whose flow is ``flow``."""
     import numpy as np  # numpy is imported here: its import takes as long as the compilation of a small system
 
     from phigen.lattice.states import start_of

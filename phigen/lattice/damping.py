@@ -1,9 +1,10 @@
 """Flows of damping at sites, as parts of the splitting of a lattice: ẋ = λππb with b = ∇H.
 
-b depends on neighbours, which are damped too. The flow is split. The terms of b that do not depend on the site itself
-have a flow while the neighbours stand still. It is applied to the sites of one colour after the other, where no two
-sites of one colour are neighbours. The remaining terms of b depend on the fields of the site; their flow is applied to
-all sites at once.
+b depends on neighbours, which are damped too. Therefore b is written as a sum of two parts, each with its own flow. The
+first part has the terms that do not depend on the site itself. It has an elementary flow as long as the neighbours
+stand still. So sites are coloured such that no two neighbours have the same colour, and the flow is applied to one
+colour after the other. The second part has the remaining terms, which depend on the fields of the site. Its flow is
+applied to all sites at once.
 """
 
 from __future__ import annotations
@@ -112,8 +113,8 @@ def _sums(cell: Cell) -> tuple[BondSum, ...]:
 def _colours(cell: Cell, colouring: Colouring, fixed_slopes: Covector) -> list[int | None]:
     """Return the colours that are damped one after the other.
 
-    There is one entry if the damping of a site does not depend on its neighbours, or on a graph, whose colours are
-    known only at run time. Raises `_TogetherError` if neighbours have one colour.
+    There is one entry if the damping of a site does not depend on its neighbours. There is one entry for a graph as
+    well, since its colours are known only at run time. Raises `_TogetherError` if neighbours have one colour.
     """
     if cell.relation == GRAPH:
         return [0]

@@ -2,8 +2,8 @@
 
 P = dH/dt is a sum over sites, bonds and pairs: the change of each density along the motion, plus its derivative with
 respect to time. The Hamiltonian vector field itself contributes nothing to the sum. P is evaluated after every step,
-and its integral is that of polynomials which interpolate eight neighbouring values. So the accuracy does not depend on
-the number of steps between frames.
+and polynomials that interpolate eight neighbouring values are integrated. So the accuracy does not depend on the number
+of steps between two stored states.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _variations(term: Expression) -> Iterator[Symbol]:
 
 
 def shifted(array: Floats, offset: Offset) -> Floats:
-    """Return an array whose entry at each site is the entry of ``array`` at the site ``offset`` away; axes wrap
+    """Return an array whose entry at each site is the entry of ``array`` at the site that is ``offset`` away; axes wrap
     around.
     """
     return np.roll(array, [-int(o) for o in offset], tuple(range(array.ndim))) if offset else array
@@ -104,8 +104,8 @@ def integral(values: Floats, h: float, row_positions: Floats | None = None) -> t
     """Return the integrals of the power P from the first time to later times, and an estimate of their error.
 
     ``values`` (steps + 1,) are P at times ``h`` apart. Without ``row_positions`` there is an integral to each of these
-    times. With ``row_positions`` (rows,), the integrals end at these times instead, given in steps since the first
-    time, which need not be whole numbers. An integral beyond the last value extrapolates the last polynomial.
+    times. With ``row_positions`` (rows,), there is an integral to each of these positions: times in units of ``h``
+    since the first time, not only whole numbers. An integral beyond the last value extrapolates the last polynomial.
     """
     fine, coarse = (_integrals_to(values, count, h, row_positions) for count in (FINE_NODES, COARSE_NODES))
     return fine, float(np.abs(fine - coarse).max())

@@ -118,8 +118,8 @@ class Expansion:
         return {pair: e for pair, e in sums.items() if not e.is_zero}
 
     def casimirs(self) -> dict[str, Expression]:
-        """Return the Casimirs by name. A Casimir of the cell stands for one Casimir of each site, a sum or a product
-        over sites.
+        """Return the Casimirs by name. A Casimir of the cell is a density. It stands for a sum or a product over sites,
+        or for one Casimir at each site.
         """
         casimirs: dict[str, Expression] = {}
         plain_names = (*(p.name for p in self.cell.parameters), *self.cell.times)

@@ -108,7 +108,7 @@ class GraphSearch(PartSearch):
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
         """Return the flow of a sum of commuting terms of H.
 
-        The terms in ``more`` are those of a modified potential; they are multiplied by the symbol `KICK`.
+        ``more`` has the terms that a modified potential adds to the part; they are multiplied by the symbol `KICK`.
         """
         return replace(super().flow(part, more), by_colour=part[0][1] != WHOLE)
 
@@ -212,7 +212,10 @@ def bond_rates(cell: Cell, density: Expression) -> Iterator[tuple[str, str, Expr
 
 
 def energies(cell: Cell) -> tuple[BondSum, ...]:
-    """Return the energy of a bond as sums over bonds at a site, for each end of the bond, or the energy of a pair."""
+    """Return the sums over the bonds or pairs of a site whose summand is the energy of a bond or pair.
+
+    For bonds there may be two sums: over the bonds that begin at the site, and over those that end there.
+    """
     name = Symbol(GATHERED, "energy")
     if cell.relation == PAIRS:
         return merged_ends([BondSum({name: cell.pair_hamiltonian})])
@@ -236,7 +239,8 @@ def site_sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def sums_by_field(cell: Cell) -> dict[str, Expression]:
-    """Return the contribution of all bonds or pairs to the force on each field that has one.
+    """Return, for each field, the contribution of all bonds or pairs to the force on the field; zeros are left
+    out.
 
     It is the symbol of a sum times its `SumFactors`. With brackets along bonds, it is the contribution to the rate of
     change.

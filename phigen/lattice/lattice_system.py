@@ -26,7 +26,9 @@ class LatticeSystem:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Raise an `AttributeError`; its message says where to find what an attribute of `System` would hold."""
+            """Raise an `AttributeError`. For attributes that only a `System` has, its message says what to use for a
+            lattice.
+            """
             raise missing_attribute(self, name)
 
     def __repr__(self) -> str:

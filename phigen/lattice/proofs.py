@@ -58,8 +58,8 @@ def tensor(cell: Cell) -> tuple[Statement, ...]:
 
 
 def casimirs(cell: Cell) -> Iterator[Statement]:
-    """Yield the statement π∇C = 0 for each Casimir C. Its kind says whether C belongs to a site, or is a sum or
-    product.
+    """Yield the statement π∇C = 0 for each Casimir C. The Casimir belongs to each site, or is a sum or product over
+    sites.
     """
     for name, (density, kind) in cell.casimirs.items():
         title = f"{name} is a Casimir"

@@ -2,8 +2,8 @@
 
 Numbers in names of coordinates are read as sites: ``x1 … x16``, ``q_0_0 … q_7_7``, ``S3_x``. Each term of H is
 translated to the site at the origin. Terms that are equal after translation, one for every site, become a term of the
-density of H. Brackets are treated in the same way. Terms are compared only by their values at one point. Therefore the
-lattice found is expanded and proved to be the original system.
+density of H. Brackets are treated in the same way. Terms are compared only by their values at one point, so the result
+may be wrong. Therefore the lattice is expanded, and the expansion is proved to be the original system.
 """
 
 from __future__ import annotations
@@ -167,8 +167,8 @@ def _lattice(
 def _names(spec: Spec, coordinates: Mapping[str, tuple[str, Site]], boundary: tuple[str, ...]) -> _SiteNames:
     """Return the fields and sites of coordinates, and of parameters with a value at every site.
 
-    Sites are counted from 0 along each axis, even if the names start at 1. Raises `_NoLatticeError` if names of axes
-    are not free.
+    Sites are counted from 0 along each axis, even if the names start at 1. Raises `_NoLatticeError` if the spec uses
+    the names of axes already.
     """
     first = tuple(min(c) for c in zip(*(s for _, s in coordinates.values()), strict=True))
     fields = tuple(dict.fromkeys(f for f, _ in coordinates.values()))
@@ -286,7 +286,8 @@ def _density(e: Expression, names: _SiteNames) -> list[Expression]:
 def _terms(e: Expression, names: _SiteNames, factor: Expression) -> Iterator[Expression]:
     """Yield the additive terms of an expression, each multiplied by ``factor``.
 
-    Factors of a bracketed sum that do not depend on the site are multiplied into its terms.
+    If a sum in brackets has a factor that does not depend on the site, each term of the sum is multiplied by this
+    factor.
     """
     args = e.args
     if e.op in ("add", "sub"):
@@ -337,8 +338,8 @@ def _brackets(
 def _casimirs(spec: Spec, names: _SiteNames) -> tuple[dict[str, Expression], dict[str, str]]:
     """Return the densities and the kinds of Casimirs of the lattice, by name.
 
-    A Casimir of the ordinary spec becomes a sum or a product over sites, or one of the Casimirs "sites" of all sites.
-    All other Casimirs are left out.
+    A Casimir of the ordinary spec becomes a sum or a product over sites. If each site has a Casimir with the same
+    density, they become a single Casimir of the kind "sites". All other Casimirs are left out.
     """
     densities, kinds = dict[str, Expression](), dict[str, str]()
     by_value: dict[float, list[tuple[str, Expression]]] = {}

@@ -80,9 +80,9 @@ class LatticeBodies:
 
     @property
     def shifts(self) -> tuple[Symbol, ...]:
-        """The symbols of Σ m_j V_j/m_0, a velocity with which one part of H moves all positions, for each axis.
+        """The symbols of the components of the velocity Σ m_j V_j/m_0; () in Jacobi coordinates.
 
-        () in Jacobi coordinates. m_j are masses, and V_j relative velocities.
+        One part of H moves all positions with this velocity. m_j are masses, and V_j relative velocities.
         """
         return () if self.jacobi else tuple(Symbol(GATHERED, "shift", q) for q, _ in self.axes)
 

@@ -87,8 +87,8 @@ class _FewBodies:
         return self.masses[i] * self.inner(i - 1) * power(self.inner(i), -1)
 
     def cartesian(self, kind: str) -> list[Vector]:
-        """Return the Cartesian positions (``kind`` Q) or velocities (``kind`` V) of all bodies, in relative
-        coordinates.
+        """Return the Cartesian positions (``kind`` Q) or velocities (``kind`` V) of all bodies, as functions of
+        their relative coordinates.
         """
         m, sum_of_masses = self.masses, total(self.masses)
         centre, *relative = ([symbol(n) for n in self.names(kind, i)] for i in range(self.count))
@@ -107,10 +107,11 @@ class _FewBodies:
         return [first, *([c + e for c, e in zip(first, of, strict=True)] for of in relative)]
 
     def product(self, positions: str, velocities: str) -> Expression:
-        """Return Σ m q·v in Cartesian coordinates minus M R·V + Σ Q·V/w in relative coordinates.
+        """Return the sum Σ m q·v in Cartesian coordinates, minus the sum M R·V + Σ Q·V/w in relative
+        coordinates.
 
-        Q and V are relative positions and velocities, R and V of body 0 those of the centre of mass. M is the total
-        mass, and 1/w are reduced masses.
+        Q and V are relative positions and velocities. R and V without a sum are those of body 0, that is, of the centre
+        of mass. M is the total mass, and 1/w are reduced masses.
         """
         pairs = zip(self.masses, self.cartesian(positions), self.cartesian(velocities), strict=True)
         weights = [total(self.masses), *(self.inertia(i) for i in self.others)]
@@ -140,9 +141,9 @@ class _FewBodies:
         return square(moments) * power(self.masses[0], -1) / 2
 
     def sums(self) -> Iterator[tuple[str, Expression]]:
-        """Yield residuals that show that H is the sum of its parts in relative coordinates.
+        """Yield residuals that are 0 if H is the sum of its parts in relative coordinates.
 
-        They are those of the kinetic energy, and of the positions of bodies relative to the first body.
+        There are residuals for the kinetic energy, and for the positions of bodies relative to the first body.
         """
         yield f"kinetic energy of {self.count} bodies", self.product("V", "V") / 2 - self.recoil()
         q = self.cartesian("Q")
@@ -167,7 +168,7 @@ class _FewBodies:
     def pull(self, a: int, b: int, k: int) -> Expression:
         """Return the acceleration of body ``a`` by body ``b`` along axis ``k``, with the opposite sign.
 
-        It is computed as the kernel of the remainder, the part of H without Kepler motions, computes it.
+        The remainder is the part of H without Kepler motions. Its kernel computes the acceleration by the same formula.
         """
         q, cell = self.cartesian("Q"), self.bodies.cell
         value = [*self.bodies.pulls.values.values()][k]

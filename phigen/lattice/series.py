@@ -90,7 +90,7 @@ class SeriesPlan:
         """The lines about the method in the header of generated files."""
         count = len(self.fractions)
         composed = [f"composition: {self.composition}, {count} stages of order 2"] if count > 1 else []
-        step = "step: implicit, by sweeps over the sites until they change nothing"
+        step = "step: implicit, solved by sweeps over the sites until the solution no longer changes"
         since = [f"scheme: series, since {self.since}"] if self.since else []
         return [
             *since,
@@ -105,7 +105,7 @@ class SeriesPlan:
 
         Covector forces ζ are added to ∇H; vector forces f act in two halves.
         """
-        return "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(forces.vector)
+        return "p = h (grad H + zeta)" + ", and half of the impulse h f before and after a stage" * bool(forces.vector)
 
     def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
         """Yield nothing: a step by a series has no flows."""

@@ -84,8 +84,8 @@ class Colouring:
         return (colour + sum(w * o for w, o in zip(self.weights, steps(offset), strict=True))) % self.count
 
     def periods(self, boundary: Sequence[str]) -> Steps:
-        """Return the number along each axis of which sizes must be multiples; 1 if the colouring has seams, which allow
-        all sizes.
+        """Return, for each axis, the number of which the size must be a multiple. With seams all sizes are allowed, and
+        the number is 1.
         """
         if self.seams:
             return (1,) * len(boundary)
@@ -191,10 +191,10 @@ class CellFlow(Flow):
     """The flow of a part of H over the lattice. The order of the ``motions`` has no effect, nor has the order of the
     sites.
 
-    ``summands`` are the terms of the part, each with the colours of the sites where it begins. On graphs, a flow marked
-    ``by_colour`` is that of the terms at one colour, and stands for such flows of all colours. If the colouring has
-    boundary seams, ``beside`` is the motion of sites near the seams. ``window`` is a set of seams, as a bit mask over
-    the axes (see `Colouring.windows`): the terms of ``beside`` begin on exactly these seams.
+    ``summands`` are the terms of the part, each with the colours of the sites where it begins. On graphs, the terms of
+    a flow marked ``by_colour`` belong to one colour; a step applies this flow for each colour in turn. If the colouring
+    has boundary seams, ``beside`` is the motion of sites near the seams. ``window`` is a set of seams, as a bit mask
+    over the axes (see `Colouring.windows`): the terms of ``beside`` begin on exactly these seams.
     """
 
     motions: tuple[SiteMotion, ...] = ()
@@ -230,7 +230,7 @@ def splittings(
 ) -> Iterator[CellSplitting]:
     """Yield ways to write H as a sum of parts with elementary flows, one for each colouring.
 
-    Colourings with fewer colours come first, then those with fewer parts. Raises `SpecError` at ``place`` if there is
+    They are ordered by the number of colours, then by the number of parts. Raises `SpecError` at ``place`` if there is
     no such sum; the error names the term that has no flow.
     """
     search = search or PartSearch
@@ -344,8 +344,8 @@ class PartSearch:
     def _summands(self, term: Summand) -> list[Summand]:
         """Return the term as a list of summands.
 
-        It has the term alone, except if the term mixes coordinates of different sites that do not commute. Then it has
-        the monomials of the term.
+        The list has one entry, except if the term mixes coordinates of different sites that do not commute. Then the
+        list has the monomials of the term.
         """
         if self._classes(term) or self._is_single_site(term):
             return [term]
@@ -360,8 +360,8 @@ class PartSearch:
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
         """Return the flow of a sum of commuting terms of H.
 
-        The terms in ``more`` are those of a modified potential, V + κ{V, {V, T}}; they are multiplied by the symbol
-        `KICK`, κ.
+        ``more`` has the terms of {V, {V, T}} in a modified potential V + κ{V, {V, T}}. They are multiplied by the
+        symbol `KICK`, which stands for κ.
         """
         motions = [m for m in self._motions(part, more) if m.increments]
         by_term: dict[int, tuple[Summand, list[int]]] = {}
@@ -381,8 +381,8 @@ class PartSearch:
     def _seam_motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
     ) -> SiteMotion | None:
-        """Return the motion of sites near boundary seams, the last sites along an axis, where colours break their
-        period.
+        """Return the motion of sites near boundary seams. A seam is at the last sites along an axis, where colours
+        break their period.
 
         Returns None if there are no seams, or if the part has the terms of all colours, so that seams make no
         difference.
@@ -406,8 +406,9 @@ class PartSearch:
         shift: Offset = (),
         factor: Expression = ONE,
     ) -> Expression:
-        """Return ∂V/∂field at the site ``shift`` away, for a part V of H, the sum of the terms ``part``; terms of bonds
-        are left out.
+        """Return ∂V/∂field at the site that is ``shift`` away, where V is the sum of the terms ``part``.
+
+        Terms of bonds are left out.
 
         ``colour`` is the colour of that site. Each term has a weight that is 0 if the term reaches beyond an open end.
         If ``colour`` is None, the site is near a boundary seam, and the weight also depends on the site where the term
@@ -436,7 +437,7 @@ class PartSearch:
         """Return the motion of the sites of a colour under the terms of a part of H; of sites near seams if ``colour``
         is None.
 
-        The terms in ``more`` are those of a modified potential; they are multiplied by the symbol `KICK`.
+        ``more`` has the terms that a modified potential adds to the part; they are multiplied by the symbol `KICK`.
         """
         cell = self.cell
         coordinates: set[tuple[str, int | None]] = {c for s in (*part, *more) for c in self._support(s)}
@@ -556,11 +557,14 @@ class SiteFields:
         self._every = [(s, 0) for s in summands_of(cell)]
 
     def slope(self, field: str, shift: Offset = ()) -> Expression:
-        """Return ∂H/∂field at the site ``shift`` away."""
+        """Return ∂H/∂field at the site that is ``shift`` away."""
         return self._search.force(self._every, field, 0, shift) + self.gathered.get(field, ZERO)
 
     def push(self, field: str, shift: Offset = ()) -> Expression:
-        """Return the component ``field`` of the covector force ζ at the site ``shift`` away, including damping."""
+        """Return the component ``field`` of the covector force ζ at the site that is ``shift`` away.
+
+        Damping is included.
+        """
         cell_forces = self.cell.forces
         covector = self._shifted(cell_forces.covector.get(field, ZERO), shift)
         if cell_forces.damping is None:
@@ -568,7 +572,7 @@ class SiteFields:
         return covector + self.damping(shift) * self.tangent(field, self.slope, shift)
 
     def damping(self, shift: Offset = ()) -> Expression:
-        """Return the damping coefficient λ at the site ``shift`` away; 0 without damping."""
+        """Return the damping coefficient λ at the site that is ``shift`` away; 0 without damping."""
         return self._shifted(self.cell.forces.damping or ZERO, shift)
 
     def impulse(self, field: str) -> Expression:
@@ -576,7 +580,7 @@ class SiteFields:
         return self._shifted(self.cell.forces.vector.get(field, ZERO))
 
     def noise(self, field: str, shift: Offset = ()) -> Expression:
-        """Return the derivative of the noise Hamiltonian Σ ΔW σ g by ``field``, at the site ``shift`` away.
+        """Return the derivative of the noise Hamiltonian Σ ΔW σ g by ``field``, at the site that is ``shift`` away.
 
         The sum is over the sources of noise, with their increments ΔW, amplitudes σ and Hamiltonians g.
         """
@@ -587,7 +591,7 @@ class SiteFields:
         return self._shifted(total(slopes), shift)
 
     def tangent(self, field: str, covector: Callable[[str, Offset], Expression], shift: Offset = ()) -> Expression:
-        """Return (πp)_field for a covector field p at the site ``shift`` away."""
+        """Return (πp)_field for a covector field p at the site that is ``shift`` away."""
         terms = []
         for (f, other), entry in self.cell.bracket.items():
             if f == field:
@@ -597,7 +601,10 @@ class SiteFields:
         return total(terms)
 
     def _shifted(self, e: Expression, shift: Offset = ()) -> Expression:
-        """Return an expression moved to the site ``shift`` away; each term has a weight that is 0 beyond open ends."""
+        """Return an expression moved to the site that is ``shift`` away.
+
+        Each term has a weight that is 0 beyond open ends.
+        """
         cell = self.cell
         if cell.relation != GRID or e.is_zero:
             return e

@@ -105,7 +105,9 @@ class _Reader:
             self._expect_masses(p, values)
 
     def _expect_masses(self, p: Parameter, values: Floats) -> None:
-        """Raise `SpecError` if masses are not allowed in relative coordinates, such as a first body without mass."""
+        """Raise `SpecError` if relative coordinates do not allow the masses. For instance, the first body must have a
+        positive mass.
+        """
         begin, form = f"with coordinates_from: {self.spec.coordinates_from},", self.spec.poisson
         if not values.flat[0] > 0:
             message = f"{begin} the first body needs a positive mass, not {values.flat[0]:g}"
@@ -113,7 +115,7 @@ class _Reader:
         entries = [e for row in form.entries for e in row] if isinstance(form, MatrixForm) else []
         if (least := np.min(values)) < 0:
             raise self._out_of_bound(p, values, f"{begin} masses must be nonnegative")
-        if least == 0 and p.name not in symbols_of(*entries):  # brackets of velocities contain the mass
+        if least == 0 and p.name not in symbols_of(*entries):  # no mass in the brackets: momenta
             raise self._out_of_bound(p, values, f"{begin} bodies with momenta must have positive masses")
 
     def _out_of_bound(self, p: Parameter, values: Floats, rule: str) -> SpecError:
@@ -138,7 +140,8 @@ class _Reader:
     def _sites(self, bonds: Bonds) -> int:
         """Return the number of sites of a run that does not state ``sizes``.
 
-        It is the largest length of a list in the initial state, or the number of the last site that has a bond, plus 1.
+        It is the largest length of a list in the initial state. Without lists, it is one more than the largest number
+        of a site in a bond; sites are counted from 0.
         """
         lengths = [len(v.listed) for v in self.lattice_run.state.values() if v.listed]
         if not lengths and not len(bonds):

@@ -225,10 +225,11 @@ def _plan_bodies(cell: Cell, spec: Spec) -> SplittingPlan:
 
 
 def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMethod:
-    """Return the method with additional flows, of the terms that begin on boundary seams, where colours break their
+    """Return the method with additional flows for the terms that begin on boundary seams, where colours break their
     period.
 
-    The flows on seams come after the flow of the remaining terms of their part of H, but before it in the last part.
+    For each part of H but the last, the flows on seams come after the flow of its remaining terms. For the last part,
+    they come before this flow.
     """
     flows = choice.splitting.flows
     last, all_flows = len(flows) - 1, list[Flow]()
@@ -240,7 +241,7 @@ def _with_seams(choice: ScheduledMethod, colouring: Colouring) -> ScheduledMetho
 
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
-    """Yield flows of the terms of a part of H that begin on boundary seams, where colours break their period.
+    """Yield flows of those terms of a part of H that begin on boundary seams, where colours break their period.
 
     There is one flow for each set of seams on which a site may lie.
     """
@@ -339,7 +340,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
     further = {"kick": (KICK,) if schedule.multiples else (), "late": late}
     prepare = Kernel(
         "prepare",
-        f"everything that depends on parameters and the time of a {'stage' if solved else 'flow'} only",
+        f"all values that depend only on parameters and on the duration of a {'stage' if solved else 'flow'}",
         {"params": plain_names, "h": (TIME,), **{n: s for n, s in further.items() if s}},
         (Output("coef", tuple(coefficients.values)),),
     )

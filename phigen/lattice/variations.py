@@ -37,8 +37,9 @@ def varied_sum(name: Symbol) -> Symbol:
 
 
 def with_variations(cell: Cell, values: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return the summands of ``values``, followed by the summands for the variations of these sums over bonds or
-    pairs.
+    """Return summands of sums over bonds or pairs, followed by summands for the variations of the sums.
+
+    ``values`` maps the symbol of each sum to its summand, and so does the result.
     """
     names = [n for n in values if isinstance(n, Symbol) and kind_of(n) == GATHERED]
     assert len(names) == len(values)
