@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from phigen.scheme.policies import POLICIES, MeasurePolicy, Policy, PolicyConstant
 from phigen.scheme.program import Program
 
-#: Numbers below two to this power are printed as powers of two. They are bounds on rounding errors.
+#: Powers of two with a smaller exponent than this one are printed as powers. They are bounds on rounding errors.
 _LEAST_EXPONENT = -20
 
 
 def policies_of(program: Program) -> dict[str, Policy]:
-    """Return the policies of a program by the names of their files.
+    """Return the policies of a program by the names of the runtime files that contain its constants.
 
     If coordinates keep their signs during a step, errors are measured relative to each coordinate.
     """

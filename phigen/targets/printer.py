@@ -7,8 +7,8 @@ from fractions import Fraction
 
 from phigen.symbolic.expression import Expression, fold
 
-#: Binding strength of sums, products and atoms, by which parentheses are set. Inside products, a unary minus is in
-#: parentheses.
+#: Binding strengths of sums, of products, and of atoms. They decide where parentheses are needed. Inside products, a
+#: unary minus is in parentheses.
 SUM, PRODUCT, ATOM = 1, 2, 3
 
 Printed = tuple[str, int]

@@ -1,7 +1,7 @@
 """Reserved identifiers of each language: its keywords, and macros of its standard headers.
 
 A name in a spec that equals such a macro would break generated C, or a program that includes a standard header before
-the header of a solver. The tests compare the lists with the compilers of the machine on which they run.
+the header of a solver. Tests compare the lists with the compilers of the machine that runs the tests.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ MOST_HALVINGS = 14
 MOST_MEANS = 16
 
 _MEANING = (
-    "(1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation.",
+    "(1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it.",
     "The derivative of (1 - w cot w)/s, w = sqrt(s)/2.",
     "The second derivative of (1 - w cot w)/s, w = sqrt(s)/2.",
 )
@@ -44,8 +44,8 @@ _CLOSED = (
 
 
 def used(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
-    """Return the functions of `SPECIAL` that kernels of a program call, in order; the kernels ``unprinted`` do not
-    count.
+    """Return the functions of `SPECIAL` that kernels of a program call, in the order of `SPECIAL`. Calls in the kernels
+    ``unprinted`` do not count.
     """
     kernels = [kernel for kernel in program.kernels if kernel not in unprinted]
     ops = {e.op for e in topological([e for kernel in kernels for e in kernel.roots])}
@@ -81,11 +81,10 @@ def closed(order: int) -> tuple[str, ...]:
 
 
 def turns(*, single: bool) -> dict[str, object]:
-    """Return the constants with which multiples of π are subtracted from w = √s/2: two parts of π, whose sum is π, and
-    1/π.
+    """Return constants for subtracting multiples of π from w = √s/2: 1/π, and an upper and a lower part of π.
 
-    The upper part of π has 33 bits, or 8 in single precision. So its products with integers up to 2^20, or 2^16, are
-    exact. ``limit`` is the value of s up to which no larger integer is needed.
+    The sum of the parts is π. The upper part has 33 bits, or 8 in single precision, so that its products with integers
+    up to 2^20, or 2^16, are exact. ``limit`` is the value of s up to which no larger integer is needed.
     """
     bits, most = (6, 2.0**16) if single else (31, 2.0**20)
     upper = math.floor(math.pi * 2.0**bits) / 2.0**bits
@@ -99,7 +98,7 @@ _BEYOND_PI = 1.2246467991473532e-16
 
 
 class _Calls:
-    """A math library that returns each call as an expression."""
+    """Stand-in for a math library. Its functions return expressions that call them."""
 
     def __getattr__(self, name: str) -> Callable[..., Expression]:
         return lambda *arguments: call(name, *arguments)
@@ -124,8 +123,8 @@ def far(function: str, printer: Callable[[Scope], Printer], choice: str) -> dict
 
 
 def entire_used(program: Program) -> list[str]:
-    """Return the functions of `ENTIRE` that kernels of a program call, directly or through other functions, in
-    order.
+    """Return the functions of `ENTIRE` that kernels of a program call, directly or through other functions. They are in
+    the order of `ENTIRE`.
     """
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     for f in (f for f in ENTIRE if f in ops):
@@ -139,8 +138,8 @@ def calls_anomaly(program: Program) -> bool:
 
 
 def elliptic_used(program: Program) -> list[str]:
-    """Return the functions of `ELLIPTIC` that kernels of a program call. If there are any, the first function is
-    included.
+    """Return the elliptic functions that kernels of a program call. If there are any, the first function of `ELLIPTIC`
+    is included, since the others call it.
     """
     ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
     called = [name for name in (*ELLIPTIC, elliptic.THIRD) if name in ops]
@@ -157,10 +156,10 @@ def remainders_used(program: Program) -> list[str]:
 
 
 def remainder_values(names: Sequence[str]) -> dict[str, object]:
-    """Return template values for functions that exponentials of small matrices need, with the index of each among
-    these.
+    """Return template values for functions that exponentials of small matrices need.
 
-    ``names`` are functions of `phigen.symbolic.remainders`.
+    ``names`` are functions of `phigen.symbolic.remainders`. The values include the index of each function in the list
+    of all these functions.
     """
     places = {name: k for k, name in enumerate((*remainders.REMAINDERS, *remainders.QUOTIENTS))}
     reach = remainders.MAX_ROOT
@@ -180,8 +179,9 @@ def _described(place: int) -> str:
     return f"Coefficient {place % 4} of the {'remainder' if place < 4 else 'quotient'}."
 
 
-#: The integrals of elliptic functions: the comment, the template of Carlson's integral, and its arguments, for the
-#: integral and for half a turn. In the arguments, cc, dd and s*s are the squares of cn, dn and S, and ratio is R/P.
+#: The integrals of elliptic functions: the comment, the template of Carlson's integral, the arguments of Carlson's
+#: integral up to t, and its arguments for half a turn. In the arguments, cc, dd and s*s are the squares of cn, dn and
+#: S, and ratio is R/P.
 _INTEGRALS = {
     elliptic.SQUARES: ("The integral over t of S**2 with S = sn/sqrt(P)", "carlson", "cc, dd, 1.0", "0.0, ratio, 1.0"),
     elliptic.RATIOS: (
@@ -241,8 +241,8 @@ def _nested(coefficients: Sequence[str], variable: str) -> str:
 
 
 def stumpff() -> tuple[list[Fraction], list[Fraction]]:
-    """Return the coefficients of c2 = (1 - cos x)/x² and c3 = (x - sin x)/x³ as series in x², which are sufficient for
-    x² ≤ 1.
+    """Return the coefficients of c2 = (1 - cos x)/x² and of c3 = (x - sin x)/x³ as series in x². The series have as
+    many terms as full precision needs for x² ≤ 1.
     """
     count = len(ENTIRE["arcroot"].terms())
     c2 = [Fraction((-1) ** n, math.factorial(2 * n + 2)) for n in range(count)]
@@ -253,8 +253,8 @@ def anomaly_values(*, single: bool = False) -> dict[str, object]:
     """Return the values that the templates of the universal anomaly have in all languages; ``single`` is for 32-bit
     numbers.
 
-    ``unit`` is the relative error of a rounding; ``rounding``, a tenth of ``unit``, is the error at which the iteration
-    ends.
+    ``unit`` is the relative error of a rounding. The iteration ends at the error ``rounding``, which is a tenth of
+    ``unit``.
     """
     if single:
         return {"most": MOST_ITERATIONS, "radial": "1e-12", "unit": "1.2e-7", "rounding": "1e-8"}

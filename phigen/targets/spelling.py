@@ -15,7 +15,7 @@ from phigen.targets.language import Language
 from phigen.targets.names import Scope
 from phigen.targets.printer import ATOM, PRODUCT, SUM
 
-#: Binding strength of operators, by which parentheses are set, as in `phigen.targets.printer`.
+#: Binding strengths of operators. They decide where parentheses are needed, as in `phigen.targets.printer`.
 _STRENGTH = {"or": 1, "and": 1, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
 _STRENGTH |= dict.fromkeys(("==", "!=", "<", "<=", ">", ">="), 2)
 _ATOM = 9

@@ -106,23 +106,23 @@ STATE = (
     StateBlock(
         "gauge",
         "GAUGE && !MONITOR",
-        ("double gauge[PHI_GAUGES]; /* factors of the Casimirs that are subtracted from H, in their order */",),
+        ("double gauge[PHI_GAUGES]; /* the Casimirs, times these factors, are subtracted from H */",),
     ),
     StateBlock("common", "COMMON", ("PHI_COMMON_MEMBER",)),
     StateBlock(
         "coef",
         "NOISE && TIMED",
-        (f"{_COEFFICIENTS} /* functions of params and h, then functions of dw and time too */",),
+        (f"{_COEFFICIENTS} /* functions of params and h; then those that also depend on dw and the time */",),
     ),
     StateBlock(
         "coef",
         "NOISE && !TIMED",
-        (f"{_COEFFICIENTS} /* functions of params and h, then functions of dw too */",),
+        (f"{_COEFFICIENTS} /* functions of params and h; then those that also depend on dw */",),
     ),
     StateBlock(
         "coef",
         "RENEWED && !NOISE",
-        (f"{_COEFFICIENTS} /* functions of params and h, then functions of the time too */",),
+        (f"{_COEFFICIENTS} /* functions of params and h; then those that also depend on the time */",),
     ),
     StateBlock(
         "coef", "!RENEWED && !NOISE", (f"{_COEFFICIENTS} /* functions of params and h, computed when h changes */",)
@@ -166,7 +166,7 @@ STATE = (
         "rate",
         "RATE_OF_GAUGE",
         (
-            "double rate[PHI_RATE]; /* gradient of the Casimirs subtracted from H: rate of an additional rotation */",
+            "double rate[PHI_RATE]; /* rate of an additional rotation: gradient of what is subtracted from H */",
             "double aside[PHI_ELEMENT]; /* the additional rotation in one step, minus the identity */",
         ),
         reset=("phi_set_aside(s);",),

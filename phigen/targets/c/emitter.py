@@ -35,9 +35,9 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Number of iterations over a block of steps whose time, per step, is that of one evaluation at a single point. PASSES
-#: is for vectorised loops. PASSES_OF_CALLS is for loops that call library functions, and for paths, since a single
-#: evaluation needs no derivatives of paths.
+#: Number of iterations over a block of steps that take as much time, divided by the number of steps in the block, as
+#: one evaluation for a single step. PASSES is for vectorised loops. PASSES_OF_CALLS is for loops that call library
+#: functions, and for paths: a single evaluation of a path needs no derivatives of the path.
 PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Number of attempts to solve a stage of an implicit step: first with the predictor, then without it.
@@ -143,9 +143,7 @@ def _is_chapter(line: str) -> bool:
 
 
 def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, str]:
-    """Return the texts that are printed for the model, by the names of the files under which the runtime includes
-    them.
-    """
+    """Return the texts that are printed for the model. Each has the name of a file that the runtime includes."""
     step = program.step
     texts = text_of(program).texts(program, step, lanes, has)
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
@@ -187,7 +185,13 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
             )
     if has["PREDICTED"] and not has["RECURRENCES"] and not has["GAUSS"]:
         predictor = PredictorPolicy()
-        sizes.append(("DIFFERENCES", predictor.differences, "for the predictor; more would amplify rounding"))
+        sizes.append(
+            (
+                "DIFFERENCES",
+                predictor.differences,
+                "past differences that the predictor reads; more would amplify rounding errors",
+            )
+        )
     sizes += text_of(program).declared(step, lanes)
     if program.profile == "certified" and step.kind.implicit and step.inner_solve:
         most = ATTEMPTS * step.inner_solve.max_iterations * len(program.fractions)
@@ -219,7 +223,8 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
 def _stack(bound: StackBound, name: str) -> Sizes:
     """Return the number of bytes of stack that the solver needs, as constants with comments.
 
-    There is a constant for calls that begin with each of several functions; the comment names the function.
+    The number depends on the function that is called first. There is a constant for each of several functions, and one
+    for any function; the comment names the function.
     """
     return [
         ("STACK_OF_INIT", bound.init, f"from {name}_init on"),

@@ -147,8 +147,8 @@ def _elliptic(program: Program, names: Sequence[str], *, near: bool) -> list[str
 
 
 def _anomaly(program: Program, *, near: bool = False) -> str:
-    """Return the definition of the universal anomaly of Kepler motions; its series for c2 and c3 have the same
-    powers.
+    """Return the definition of the universal anomaly of Kepler motions. It contains series for c2 and c3, which have
+    the same powers.
     """
     c2, c3 = special.stumpff()
     count = max(len(needed(program, c, 1.0)) for c in (c2, c3))
@@ -195,8 +195,8 @@ def _nested(coefficients: Sequence[float]) -> str:
 
 
 def phi_lanes(program: Program, ops: Set[str]) -> list[str]:
-    """Return the definitions for loops over lanes of φ(s) = (1 − w cot w)/s, w = √s/2, and of its derivatives that
-    ``ops`` has.
+    """Return the definitions of φ(s) = (1 − w cot w)/s, w = √s/2, and of its derivatives, for use in loops over lanes.
+    Only the functions in ``ops`` are defined.
     """
     texts = []
     for f in (f for f in SPECIAL if f in ops):
@@ -226,7 +226,9 @@ def _phi(program: Program, f: str, *, device: bool) -> Mapping[str, object]:
 
 
 def needed(program: Program, coefficients: Sequence[C], reach: float) -> list[C]:
-    """Return the first coefficients of a series, as many as full precision at arguments up to ``reach`` needs."""
+    """Return the first coefficients of a series. They are as many as are needed for full precision at arguments up to
+    ``reach``.
+    """
     if not program.single:
         return list(coefficients)
     least = _SINGLE_NEGLIGIBLE * abs(float(coefficients[0]))

@@ -14,14 +14,15 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss
 from phigen.targets.c.real import rendered
 
-#: Threshold for the end of sweeps in single precision. Thresholds of single precision are printed as powers of those of
-#: double precision; by this rule 1.3e-20 becomes 1e-9, which is the same fraction of a rounding error as 2e-18 is in
-#: double precision. With 2e-18 and the rule, the energy error of 1e5 steps of Hénon–Heiles is 2e-5 instead of 5e-7.
+#: Threshold for the end of sweeps in single precision. Like all thresholds, it is given for double precision, and
+#: `phigen.targets.c.real.threshold` converts it: 1.3e-20 becomes 1e-9. As a fraction of a rounding error, 1e-9 is in
+#: single precision what 2e-18 is in double precision. With 2e-18 converted by this rule, the energy error of 1e5 steps
+#: of Hénon–Heiles would be 2e-5 instead of 5e-7.
 SINGLE_SOLVED = 1.3e-20
 
-#: Threshold for methods whose stages are in a loop, not in lanes. With 2e-18, the relative energy of the Hénon–Heiles
-#: system drifts by 1.7e-18 in each of 3e5 steps of 0.7 at order 12. With this threshold it drifts by less than 2e-19,
-#: and steps take 5 % longer.
+#: Threshold for the end of sweeps of methods whose stages are in a loop, not in lanes. With 2e-18, the relative energy
+#: of the Hénon–Heiles system drifts by 1.7e-18 per step in 3e5 steps of size 0.7 at order 12. With this threshold it
+#: drifts by less than 2e-19 per step, and steps take 5 % longer.
 LOOP_SOLVED = 5e-19
 
 
@@ -101,7 +102,7 @@ def tables(program: Program, step: Gauss, lanes: Lanes | None, *, batched: bool)
         table = tableau(table.stages, SINGLE)  # coefficients rounded to float would not have the sum 1
     staged = isinstance(lanes, Stages)
     predictions = predictors(table.stages, precision, integrated=staged and bool(step.reduced))
-    if not staged:  # in single precision, the continuation would amplify rounding errors to the size of increments
+    if not staged:  # in single precision, extrapolating stages would amplify rounding errors to the size of increments
         predictions = [[list(row) for row in table.prediction] if program.single else continuation(table.stages)]
     terms = [f"matrix[{j}][lane] * increment[{j}]" for j in range(table.stages)]
     older = [f"matrix[{table.stages + j}][lane] * before[{j}]" for j in range(table.stages)]
@@ -166,12 +167,14 @@ def _listed(numbers: Sequence[int]) -> str:
 
 
 def _in_chains(terms: Sequence[str]) -> str:
-    """Return a sum as text: two partial sums, which a processor computes in parallel, are added at the end."""
+    """Return a sum as text. It consists of two partial sums, which a processor computes in parallel."""
     return " + ".join(f"({' + '.join(terms[k::2])})" for k in range(min(2, len(terms))))
 
 
 def _halved(terms: Sequence[str]) -> str:
-    """Return a sum as text: it is divided into halves again and again, so that no chain of additions is long."""
+    """Return a sum as text. Its terms are added in pairs, then the sums of pairs in pairs, and so on, so that no
+    addition waits for a long chain of other additions.
+    """
     if len(terms) == 1:
         return terms[0]
     half = (len(terms) + 1) // 2

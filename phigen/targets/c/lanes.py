@@ -33,8 +33,8 @@ CHECKS = 8
 def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
     """Return the sizes of the recurrences of a solver as constants by name.
 
-    They are the numbers of past values that are stored, that a recurrence has, that it predicts, and on which it is
-    tested.
+    They are the number of stored past values, the number of past values in a recurrence, the number of values that a
+    recurrence predicts, and the number of past values on which it is tested.
     """
     affordable = MOST_HISTORY // (2 * program.dimension * len(program.fractions))
     values = max(SMALLEST, min(FITTED, affordable))

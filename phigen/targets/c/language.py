@@ -49,7 +49,7 @@ def _extended(name: str, pattern: str) -> Reserved:
 
 @cache
 def elementary_functions(name: str) -> dict[str, str]:
-    """Return the names in the code of a solver of the elementary functions.
+    """Return the names that elementary functions have in the code of a solver.
 
     Functions that the C library lacks belong to the solver, and have its name as prefix. So do versions for small
     arguments and for SIMD lanes (`phigen.ir.passes.forms`), unless they are formulas in other functions.

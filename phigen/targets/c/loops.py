@@ -142,7 +142,9 @@ class _StatementPrinter:
 
     def lines(self, body: Iterable[ir.Statement]) -> Iterator[str]:
         """Yield the lines of statements."""
-        if self.shared_line:  # otherwise, values that are printed in place would separate declarations
+        if self.shared_line:
+            # Values that are printed in place come first. Between other declarations, they would keep these
+            # declarations from sharing a line.
             body = sorted(body, key=lambda s: not (isinstance(s, ir.Declare) and s.in_place))
         for kind, group in groupby(body, self._kind):
             if kind == "discards":

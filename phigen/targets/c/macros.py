@@ -1,7 +1,8 @@
 """Expansion of macros of the C runtime, so that generated files do not contain these macros.
 
-The macros follow the rules of C, with two differences. A macro and its arguments must be on one line. If an empty macro
-stands before a statement or a block, as the head of a loop that runs once does, the statement loses its indentation.
+The macros follow the rules of C, with two differences. A macro and its arguments must be on one line. If a macro with
+an empty text stands alone on the line before a statement or a block, the statement or block loses its indentation: such
+a macro replaces the head of a loop that runs once.
 """
 
 from __future__ import annotations
@@ -86,12 +87,12 @@ def _arguments(line: str, at: int) -> tuple[list[str], int]:
 
 
 def _pattern_of_heads(names: Iterable[str]) -> re.Pattern[str]:
-    """Return the pattern of lines that begin with one of the ``names``, which are those of empty macros."""
+    """Return the pattern of lines that begin with one of the ``names``, the names of empty macros."""
     return re.compile(rf"^( *)(?:{'|'.join(names) or '(?!)'})(?: (.*))?$")
 
 
 def _without_heads(lines: Sequence[str], heads: re.Pattern[str]) -> list[str]:
-    """Return lines without the heads of loops that are empty macros.
+    """Return lines without the empty macros that stand in place of heads of loops.
 
     The body of each loop, with or without braces, is dedented.
     """

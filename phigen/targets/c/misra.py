@@ -1,5 +1,6 @@
-"""Rewriting of C for rules of MISRA C:2012, in the profile certified: an equal program with more parentheses and
-braces.
+"""Rewriting of C for rules of MISRA C:2012, in the profile certified.
+
+The result is an equivalent program that complies with three more rules:
 
 - 12.1: operators of different precedence in one expression have parentheses.
 - 15.6: the bodies of loops and conditionals have braces.
@@ -34,7 +35,7 @@ _UNUSED = {"memcpy", "memmove", "memset"}
 
 
 def compliant(code: str) -> str:
-    """Return C that complies with these rules of MISRA; ``code`` must be C that compiles."""
+    """Return C that complies with the rules at the head of this file; ``code`` must be C that compiles."""
     return _Text(_with_void(_Text(code).braced())).parenthesised()
 
 

@@ -48,8 +48,9 @@ def _definition(name: str, text: str) -> str:
 
 STAGES = Choice(
     "If a step has one stage, code has no loop over stages, no arrays over stages, and no argument for the stage."
-    " OF(array, stage) is an entry of an array over stages, or declares the array. ADDRESS points to the first of its"
-    " structs; IN and TO lead from this pointer to a member of the struct of a stage, and to this struct.",
+    " OF(array, stage) is an entry of an array over stages, or declares the array. ADDRESS is a pointer to the first"
+    " struct of an array over stages. From this pointer, TO makes a pointer to the struct of a stage, and IN reads a"
+    " member of this struct.",
     ("COMPOSED",),
     {
         "EACH_STAGE": ("for (int stage = 0; stage < PHI_STAGES; ++stage)", ""),
@@ -84,13 +85,15 @@ SWEPT = Choice(
 )
 
 ORDERS = Choice(
-    "The error of half an increment of a stage is proportional to this power of the size c of the stage.",
+    "The starting value of y in a stage is the start of the stage plus half of its increment. The error of this value"
+    " is proportional to this power of the size c of the stage.",
     ("CENTRED",),
     {"POWER_OF_STAGE(c)": ("c * c * c", "c * c")},
 )
 
 VALUES = Choice(
-    "The solution of a stage in the last step, from which predictors start, and an argument of predictors.",
+    "LAST_VALUE is the solution of a stage in the last step, from which predictors start. AND_ITERATION is an argument"
+    " of predictors.",
     ("RECURRENCES", "PREDICTED"),
     {
         "LAST_VALUE": (
@@ -134,7 +137,8 @@ PASSING = Choice(
 )
 
 LATE = Choice(
-    "With a monitor, the duration of a flow varies along a tangent vector; coefficients without variation receive 0.",
+    "With a monitor, the duration of a flow varies along a tangent vector. Where coefficients are computed without this"
+    " variation, the argument that contains it is 0.",
     ("LATE",),
     {"AND_ON_TIME": (", phi_on_time", "")},
 )
@@ -178,7 +182,7 @@ LEVEL = Choice(
 )
 
 OWN = Choice(
-    "The initial time of each member of an ensemble, or its gauge.",
+    "The initial time, or the gauge, of each member of an ensemble.",
     ("TIMED", "GAUGE"),
     {
         "OWN_POINTER": ("const double *t0,", "const double *gauge,", ""),
@@ -235,7 +239,7 @@ UNUSED_PARAMETERS = Choice(
 )
 
 UNUSED_GROUP = Choice(
-    "If there is a gauge but no parameter, the reverse pass of a group of members does not read the group.",
+    "If there is a gauge but no parameter, the reverse pass of a group of members does not use its argument group.",
     ("GAUGE && !PARAMETERS && !MONITOR",),
     {"NO_GROUP(group)": ("(void)group;", "")},
 )
@@ -311,8 +315,8 @@ GAINS = Choice(
 )
 
 RUN = Choice(
-    "The function that makes steps one by one. Its last argument are the increments of the noise, or the tape for the"
-    " states before all flows.",
+    "The function that makes steps one by one. Its last argument points to the increments of the noise, or to the tape"
+    " for the states before all flows.",
     ("BLOCKS", "NOISE", "SPLITTING && ADJOINT"),
     {
         "RUN": (
@@ -325,7 +329,7 @@ RUN = Choice(
         "ABOUT_RUN": (
             "/* Make steps one by one. */",
             "",
-            "/* phi_integrate, which writes the states before all flows to tape, unless that is NULL. */",
+            "/* As phi_integrate; also writes the state before each flow to tape, unless tape is NULL. */",
             "",
         ),
     },
@@ -355,7 +359,7 @@ STEP = Choice(
 
 CORRECTORS = Choice(
     "With correctors, the tape of a step has room for the flows before and after a run. The reverse pass goes through"
-    " these flows at the rows of a run, where correctors were applied.",
+    " these flows at the states that a run returned, since correctors were applied there.",
     ("CORRECTED && ADJOINT",),
     {
         "AND_TAPE": (", tape", ""),
@@ -438,8 +442,8 @@ ASIDE = Choice(
 )
 
 SIDES = Choice(
-    "The change of a group element by a factor, which is passed minus 1: the factor of a step, and the factor of the"
-    " gauge rotation, which is on the opposite side.",
+    "The change of a group element if it is multiplied by a factor. The argument is the factor minus the identity."
+    " The factor of a step and the factor of the gauge rotation are on opposite sides of the element.",
     ("POSITION && SPATIAL", "POSITION", "SPATIAL"),
     {
         "ADDED_FACTOR(element, factor, change)": (
@@ -490,7 +494,7 @@ HALO = Choice(
 )
 
 WIDTH = Choice(
-    "The number of doubles of a row, with its halo; sites and halo after them are rounded up to a multiple of 8.",
+    "The number of doubles in a row with its halo. The sites and the halo after them take a multiple of 8 doubles.",
     ("HALO",),
     {"WIDE(sites)": ("PHI_LEAD + (sites + PHI_HALO + 7) / 8 * 8", "sites")},
 )
@@ -537,7 +541,7 @@ JOINED = Choice(
 )
 
 MOMENTA = Choice(
-    "If bodies have momenta, velocities follow only for masses above 0.",
+    "If bodies have momenta, masses must be positive: velocities are momenta divided by masses.",
     ("MOMENTA",),
     {"OR_NO_MASS(mass)": ("|| !(mass > 0.0)", "")},
 )
@@ -584,7 +588,7 @@ MEMORY = Choice(
 )
 
 DEVICE_STARTS = Choice(
-    "The initial time of each member of an ensemble on a device, or its gauge.",
+    "The initial time, or the gauge, of each member of an ensemble on a device.",
     ("TIMED", "GAUGE"),
     {
         "OWN_STARTS": (
@@ -658,7 +662,7 @@ STAGE_PREDICTORS = Choice(
 )
 
 SWEEPS = Choice(
-    "Sweeps of a Gauss step iterate over some of the unknowns, of whose increments they read integrals, or over all.",
+    "Sweeps of a Gauss step iterate over all unknowns, or over some of them; then they read integrals of increments.",
     ("REDUCED",),
     {
         "ITERATED_COUNT": ("PHI_ITERATED", "PHI_UNKNOWNS"),

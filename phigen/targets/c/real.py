@@ -17,7 +17,7 @@ from phigen.targets.c.tokens import CToken, TokenKind, tokens
 from phigen.targets.language import Language
 from phigen.targets.rendering import render
 
-#: Number of binary digits of float, relative to those of double.
+#: Number of binary digits of float, divided by the number of binary digits of double.
 DIGITS = 24 / 53
 
 #: A number that is named by a ``#define`` counts as a threshold if it is at most this large.
@@ -165,7 +165,7 @@ def rendered(program: Program, template: str, values: Mapping[str, object]) -> s
 def threshold(value: float) -> float:
     """Return the threshold for single precision that corresponds to ``value`` in double precision.
 
-    It is the power 24/53 of ``value``, and so the same fraction of the digits of a number.
+    It is ``value`` to the power 24/53, since float has 24 binary digits and double has 53.
     """
     return float(f"{value**DIGITS:.0e}")
 

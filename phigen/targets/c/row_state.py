@@ -32,7 +32,7 @@ LATTICE = (
     ),
     StateBlock(
         "before",
-        members=("double *before[PHI_DIM]; /* fields before the present steps, restored if one fails */",),
+        members=("double *before[PHI_DIM]; /* fields before the present steps, restored if a step fails */",),
         reset=("for (size_t k = 0; k < PHI_DIM; ++k, memory += block) s->before[k] = memory;",),
     ),
     StateBlock(
@@ -102,7 +102,7 @@ LATTICE = (
         "clock",
         "MONITOR",
         (
-            "double level;             /* energy level e = -H(x0); K = log(A + e) - log(-B) is 0 along the run */",
+            "double level;             /* energy level e = -H(x0). With H = A + B, log(A + e) - log(-B) stays 0 */",
             "double *densities;        /* densities of a part of H at the sites */",
             "double *clock;            /* physical times of x and of before, each with its compensation term */",
         ),
@@ -112,7 +112,7 @@ LATTICE = (
         "open",
         "!SERIES",
         (
-            "int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */",
+            "int open; /* 1 if, between calls, x includes the last flow of the last step, but before does not */",
             "size_t far; /* number of the next steps that use full-range functions */",
         ),
     ),
@@ -216,7 +216,7 @@ LATTICE = (
     StateBlock(
         "kinds",
         "SEAMS",
-        (("double *kinds; /* for each site, in rows: its colour, and the seams that it is on, as one number */"),),
+        (("double *kinds; /* for each site, its colour and its seams as one number */"),),
         reset=("s->kinds = memory;",),
     ),
     StateBlock("steps", members=("size_t steps;             /* number of successful steps since phi_init */",)),
@@ -351,7 +351,7 @@ ROW = (
         "OPEN && !ONE_ROW",
         (
             "double present[PHI_WEIGHTS];"
-            " /* for each term of H, 0 if it reaches beyond an open end of another axis, else 1 */",
+            " /* for each term of H, 0 if it reaches beyond an open end of an axis across the row, else 1 */",
         ),
     ),
     StateBlock(
@@ -362,16 +362,13 @@ ROW = (
     StateBlock(
         "window",
         "SEAMS",
-        (
-            "double window;               "
-            " /* number in kinds of the first site of a term of H near the seam, see phi_solver */",
-        ),
+        ("double window;                /* the seams of the present sweep, encoded as in kinds of phi_solver */",),
         reset=("row.window = 0.0;",),
     ),
     StateBlock(
         "near",
         "SEAMS && !ONE_ROW",
-        ("int near;                     /* bits: the other axes along which the row is near a seam */",),
+        ("int near;                     /* bits: the axes across the row along which it is near a seam */",),
     ),
     StateBlock(
         "colour",

@@ -62,8 +62,7 @@ def _functions(program: Program, step: Splitting) -> FlowFunctions:
 def in_lanes(program: Program, step: Splitting, form: str, versions: Mapping[str, str]) -> list[str]:
     """Return the text of the step for batches of members in SIMD lanes.
 
-    ``versions`` are the versions of elementary functions that it calls; ``form`` is appended to the names of its
-    functions.
+    The step calls the ``versions`` of elementary functions. ``form`` is appended to the names of the printed functions.
     """
     texts, linkage = list[str](), f"{program.name}_IN_PLACE static inline"
     for k, flow in enumerate(step.flows, 1):
@@ -75,7 +74,7 @@ def in_lanes(program: Program, step: Splitting, form: str, versions: Mapping[str
 
 
 def _tables(program: Program, step: Splitting, prefix: str, suffix: str) -> str:
-    """Return the text of two tables over the flows of a step: the part of H, and the row of coefficients."""
+    """Return the text of two tables. They have, for each flow of a step, the part of H and the row of coefficients."""
     flows, length = step.schedule.flows_of_run, ir.fixed("FLOWS")
     parts = ir.ConstantTable(f"{prefix}part{suffix}", tuple(part + 1 for part, _ in flows), length)
     rows = ir.ConstantTable(f"{prefix}row{suffix}", tuple(row for _, row in flows), length)

@@ -28,13 +28,14 @@ Switches = Mapping[str, bool]
 
 @dataclass(frozen=True)
 class StepText:
-    """The text of one kind of step, as functions of the step.
+    """The parts of a solver that depend on the kind of step. Each field is a function; it receives the step, and may
+    also receive the program, the lanes and the switches.
 
     ``texts`` returns files that the runtime includes, and ``declared`` the sizes that are declared with the struct of
-    the solver. ``constants`` and ``last_constants`` are other sizes, printed before and after those of SIMD lanes.
-    ``kernels`` are printed first. ``tangents`` are printed after the kernels of the gauge and the monitor, and
-    ``transposes`` after these. ``trail`` is the number of values that a step stores on the tape. ``packed`` prints the
-    kernels for SIMD batches of members.
+    the solver. ``constants`` and ``last_constants`` return other sizes, printed before and after those of SIMD lanes.
+    ``kernels`` returns the kernels that are printed first. ``tangents`` returns those printed after the kernels of the
+    gauge and the monitor, and ``transposes`` those printed after the tangents. ``trail`` returns the number of
+    values that a step stores on the tape. ``packed`` prints the kernels for SIMD batches of members.
     """
 
     texts: Callable[[Program, Any, Lanes | None, Switches], dict[str, str]] = lambda program, step, lanes, has: {}
@@ -95,8 +96,8 @@ def _path_constants(program: Program, step: Path) -> Sizes:
 
 
 def _adjoint_path(program: Program, path: PathAdjoint) -> str:
-    """Return the text of the recurrences for paths in the reverse pass, and of the list of coefficients that π depends
-    on.
+    """Return the text of the recurrences for paths in the reverse pass, and the text of a list: the indices of the
+    coefficients that π depends on.
     """
     used, extended = ir.ConstantTable("back_used", tuple(path.used) or (0,)), adjoint_program(program, path)
     said = "The coefficients that the slope of a path depends on." if path.used else "No coefficient enters the slope."

@@ -17,7 +17,7 @@ TABLE = (
         "march",
         "COMPOSED && !PATH",
         (
-            "int marching; /* 1 if the last steps were a block, whose derivatives of x are in slope */",
+            "int marching; /* 1 if the last steps were a block; slope then has dx/dt at their starts */",
             "double slope[PHI_DIM][PHI_SLOPES];",
         ),
     ),
@@ -62,8 +62,8 @@ MODEL = (
     ),
 )
 
-#: Members of the struct with the arguments of a run of an ensemble. Arrays have a value for each member, or one for
-#: all.
+#: Members of the struct with the arguments of a run of an ensemble. An array has one value for each member, or one
+#: value for all members.
 MEMBERS = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),
@@ -94,7 +94,7 @@ COTANGENT = (
             "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* derivatives of L by the coefficients */",
         ),
     ),
-    StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state to which the derivatives x belong */",)),
+    StateBlock("end", "PATH", ("double end[PHI_DIM]; /* the state with respect to which x has derivatives */",)),
     StateBlock(
         "after",
         "GAUSS",
@@ -118,7 +118,7 @@ TRACED = (
     StateBlock("t", "RENEWED", ("double t[PHI_LANES]; /* the times of the stages */",)),
 )
 
-#: Members of the struct with the arguments of the reverse pass of an ensemble, those that depend on switches.
+#: The members that depend on switches, in the struct with the arguments of the reverse pass of an ensemble.
 PULLED = (
     StateBlock("t0", "TIMED", ("const double *t0; /* initial times */",)),
     StateBlock("gauge", "!TIMED && GAUGE", ("const double *gauge; /* gauges, or NULL to choose them at the start */",)),
@@ -138,13 +138,14 @@ BACK_GROUP = (
     ),
 )
 
-#: Members of the struct for the reverse pass of a lattice: derivatives of a number L, and the places of its arrays.
+#: Members of the struct for the reverse pass of a lattice: derivatives of a number L, and pointers to the arrays of the
+#: reverse pass.
 TRANSPOSE = (
     StateBlock(
         "bar",
         members=(
             "double *bar[PHI_BARS];      /* derivatives by fields, then by parameters at sites and at bonds */",
-            "double *row_bar[PHI_BARS];  /* as bar, with the derivatives by fields for one row of a run */",
+            "double *row_bar[PHI_BARS];  /* as bar, but derivatives by one state that the run returned */",
             "double *handed[PHI_HANDED]; /* contributions of sites to derivatives at their neighbours */",
             "double *sums;               /* for each row segment, derivatives by the coefficients */",
         ),
@@ -158,9 +159,9 @@ TRANSPOSE = (
         "states_of_legs",
         "!SERIES && RECOMPUTED",
         (
-            "double *tape;               /* states of a segment at steps that are leg steps apart */",
+            "double *tape;               /* states of a segment, one for every leg steps */",
             "size_t leg;                 /* number of steps between two states on the tape */",
-            "int lost;                   /* 1 if inverse flows have led to another state than that on the tape */",
+            "int lost;                   /* 1 if inverse flows did not lead back to a state on the tape */",
             "int anew;                   /* 1 if flows are repeated, since inverse flows are inaccurate */",
         ),
     ),
@@ -217,12 +218,12 @@ FLOW = (
     StateBlock(
         "go",
         "RECOMPUTED && TAKES",
-        ("int go;                     /* 0 forward; 1 or 2 reverse, for even or odd flows */",),
+        ("int go;                     /* 0 forward; 1 reverse, even flows; 2 reverse, odd flows */",),
     ),
     StateBlock(
         "go",
         "RECOMPUTED && !TAKES",
-        ("int go;                     /* 0 forward; 1 reverse, at the sites themselves; 2 reverse, for neighbours */",),
+        ("int go;                     /* 0 forward; 1 reverse, terms of sites; 2 reverse, terms of neighbours */",),
     ),
     StateBlock(
         "reverse",

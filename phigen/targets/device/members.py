@@ -15,7 +15,7 @@ _GROUPS = (128, 64, 32, 16, 8, 4, 2, 1)
 
 
 def predictors(program: Program) -> int:
-    """Return the number of values that the predictors of a member have. These values are in shared memory."""
+    """Return the number of values that the predictors of a member store. They are stored in shared memory."""
     if not program.step.kind.predicted or program.step.kind.collocates or program.noise:
         return 0
     return PredictorPolicy().differences * program.dimension * len(program.fractions)

@@ -1,6 +1,6 @@
 """Warnings about steps that need more registers than graphics cards have.
 
-They rely on measurements with the CUDA compiler, see docs/devices.md.
+The warnings rely on measurements with the CUDA compiler; see docs/devices.md.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from phigen.scheme.program import Program
 
 @dataclass(frozen=True)
 class Spills:
-    """A system for which the CUDA compiler was measured: its steps by the series keep ``size`` bytes per member in
-    memory.
+    """Measurement of code that the CUDA compiler made for the steps of a system by the series.
 
-    These bytes do not fit into the registers of a card with the architecture sm_90.
+    For each member, ``size`` bytes are in memory, because they do not fit into the registers of a card with the
+    architecture sm_90.
     """
 
     name: str
@@ -29,9 +29,9 @@ class Spills:
         return self.coordinates <= coordinates and self.coefficients <= coefficients
 
 
-#: Measurements. A step with at least as many coordinates and coefficients spills about as many bytes from registers to
-#: memory, or more. Steps with fewer than 6 coordinates and at most 40 coefficients do not spill: this was so for 52
-#: builds of 19 systems of the corpus, with orders 2 to 6.
+#: Measurements. A step with at least as many coordinates and coefficients as a measured system spills about as many
+#: bytes from registers to memory as that system, or more. Steps with fewer than 6 coordinates and at most 40
+#: coefficients do not spill. This was measured for 52 builds of 19 systems of the corpus, with orders 2 to 6.
 _MEASURED = (
     Spills("spin_chain5", 4, 15, 33, 44_000),
     Spills("so4_manakov", 6, 6, 216, 8_900),

@@ -76,7 +76,9 @@ def _included(line: str, features: Mapping[str, bool]) -> list[str]:
 
 
 def _parts(line: str) -> tuple[str, str, str]:
-    """Return the parts of a directive: its indentation, with the mark of a comment line, and its two words."""
+    """Return the indentation of a directive and its two words. In a comment of several lines, the indentation includes
+    the ``*`` at the beginning of the line.
+    """
     words = line.split()
     indent = line[: len(line) - len(line.lstrip())]
     if len(words) == 3 and words[0] in ("//", "*") and words[1] in ("#state", "#members"):

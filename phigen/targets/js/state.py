@@ -112,23 +112,23 @@ SOLVER = (
     StateFields("MONITOR", ("/** The energy level e: -H(x0), or the value passed as gauge. */", "gauge;")),
     StateFields(
         "GAUGE && !MONITOR",
-        ("/** Factors of the Casimirs in GAUGE that are subtracted from H. */", "gauge;"),
+        ("/** The Casimirs in GAUGE, times these factors, are subtracted from H. */", "gauge;"),
         options=(
             Option(
                 "gauge",
                 "ArrayLike<number>",
-                "factors of the Casimirs subtracted from H; by default they follow\nfrom x0. "
+                "the Casimirs, times these factors, are subtracted from H; by default\nthe factors follow from x0. "
                 "For fixed factors the step is an exact Poisson map",
             ),
         ),
     ),
     StateFields(
         "RENEWED && NOISE",
-        ("/** Coefficients of each stage: functions of parameters and step size, then those of noise or time too. */",),
+        ("/** Coefficients of each stage: functions of parameters and step size first, then of noise or time. */",),
     ),
     StateFields(
         "RENEWED && !NOISE",
-        ("/** Coefficients of each stage: functions of parameters and step size, then those of the time too. */",),
+        ("/** Coefficients of each stage: functions of parameters and step size first, then of the time. */",),
     ),
     StateFields("!RENEWED", ("/** Coefficients of each stage: functions of parameters and step size. */",)),
     StateFields(fields=("coef = emptyTables();",)),
@@ -158,7 +158,7 @@ SOLVER = (
     StateFields(
         "RATE_OF_GAUGE",
         (
-            "/** Rate of the gauge rotation, a gradient of Casimirs; the time when it was set. */",
+            "/** Rate of the gauge rotation: gradient of what is subtracted from H; the time when it was set. */",
             "turningRate;",
             "attitudeFrom;",
         ),

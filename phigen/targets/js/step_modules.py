@@ -20,7 +20,8 @@ from phigen.targets.rendering import render
 
 @dataclass(frozen=True)
 class StepModule:
-    """The text of one kind of step, as functions of the step.
+    """The parts of a module that depend on the kind of step. Each part is a function that receives the program and the
+    step.
 
     ``constants`` are printed before the kernels, and ``series`` after them. ``kernels`` are the kernels that the
     runtime calls; kernels of attitudes may replace some of them. `phigen.targets.js.files` lists the modules of the
@@ -33,7 +34,9 @@ class StepModule:
 
 
 def _implicit(step: Newton | Path) -> list[str]:
-    """Return the constants for solving an implicit step, and those of a path, which are 0 for steps without a path."""
+    """Return the constants for solving an implicit step, and the constants of a path. The latter are 0 if the step has
+    no path.
+    """
     path, varied = step.path, step.varied_path
     return [
         render(
@@ -59,7 +62,9 @@ def _path_series(program: Program, step: Path) -> list[str]:
 
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
-    """Return the text of the recurrences for a path, or for a path with its variation."""
+    """Return the text of the recurrences for a path. If ``kind`` is "tangent", they also compute the variation of the
+    path.
+    """
     blocks = PathFunctions(program, path, PathLayout()).blocks()
     lines = {name: [line.removeprefix("  ") for line in statements(function)] for name, function in blocks.items()}
     return render("js", "path.mjs", {**lines, "kind": kind})

@@ -91,8 +91,8 @@ def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
 
 
 def _with_level(prepare: Kernel) -> Kernel:
-    """Return the transposed kernel ``prepare`` with a second result: the cotangent of the energy level e, or [] without
-    e.
+    """Return the transposed kernel ``prepare`` with a second result: the cotangent of the energy level e. It is an
+    empty list if the program has no energy level.
     """
     return replace(prepare, outputs=(*prepare.outputs, Output("gauge_bar", ()))[:2])
 

@@ -51,7 +51,7 @@ def over_states(function: ir.Function) -> ir.Function:
 
 
 def _through_exponentials(program: Program, kernel: Kernel, inner: Kernel) -> str:
-    """Return the transpose of a kernel that computes matrix exponentials, as several functions.
+    """Return the transpose of a kernel that computes matrix exponentials, as the text of several functions.
 
     There is a function for the matrices, and a function that receives the cotangents of the matrices.
     """

@@ -87,8 +87,8 @@ def _of_bodies(step: Sweeps) -> dict[str, object]:
 def _reductions(program: Program) -> dict[str, object]:
     """Return the reductions of observables as values for templates.
 
-    They are the indices of observables, by the array method that reduces their densities, and the observables that are
-    means over bonds.
+    ``reduced`` lists the array methods that reduce densities, each with the indices of the observables for which it is
+    called. The other values are the indices of observables that are means over bonds, or over pairs.
     """
     reductions = program.observables.reductions
     methods = ["mean" if r.kind == "mean" and r.over == "sites" else r.kind.replace("mean", "sum") for r in reductions]

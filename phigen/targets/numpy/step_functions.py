@@ -22,7 +22,9 @@ from phigen.targets.rendering import render
 
 
 class _PathOverMembers(PathLayout):
-    """The arrays in which the values of a path are: columns of arrays over members, and lists of coefficients by
+    """The names of the arrays that hold the values of a path, for several members at once.
+
+    An array has the values of one quantity for all members. A Taylor series is a list of such arrays, one for each
     order.
     """
 
@@ -43,8 +45,8 @@ class _PathOverMembers(PathLayout):
 
 
 def _path_lines(program: Program, path: Recurrences) -> dict[str, list[str]]:
-    """Return the statements that compute a path ṁ = π(m)p by Taylor series, as lines of text by the name of their
-    block.
+    """Return the statements that compute a path ṁ = π(m)p by Taylor series: lines of text, by the name of the block
+    that they belong to.
     """
     blocks = PathFunctions(program, path, _PathOverMembers()).blocks()
     printed = {name: statements(function)[1] for name, function in blocks.items()}
@@ -60,7 +62,7 @@ class StepPart:
     values: Mapping[str, object] = field(default_factory=dict)
 
     def functions(self, program: Program) -> list[str]:
-        """Return the kernels as the text of functions of NumPy."""
+        """Return the kernels as the text of Python functions that use NumPy."""
         return [function(program, kernel) for kernel in self.kernels if kernel]
 
     def rendered(self, program: Program, prefix: str = "") -> list[str]:
@@ -130,8 +132,8 @@ def _path_adjoint(program: Program, step: Path) -> StepPart:
 
 
 def _varied(program: Program, step: Path, adjoint: PathAdjoint) -> dict[str, object]:
-    """Return template values: the recurrences for a path together with its derivatives, which are computed column by
-    column.
+    """Return template values: the recurrences for a path and for its derivatives. The derivatives are computed column
+    by column.
 
     The path is differentiated with respect to its start, the covector p, and the coefficients that π depends on.
     """

@@ -51,7 +51,8 @@ def _of_fixed(program: Program) -> dict[str, object]:
 def _of_gauge(program: Program) -> str:
     """Return the sentence on the gauge for docstrings.
 
-    If Gauss steps preserve the structure only up to the truncation error, the sentence claims no Poisson map.
+    The sentence says that a step is a Poisson map, unless the step is a Gauss step that preserves the structure only up
+    to the truncation error.
     """
     said = _OF_LEVEL if program.monitor else _OF_GAUGE
     return said.partition(":")[0] + "." if program.truncated else said

@@ -371,7 +371,7 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
 
 
 def _values_read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
-    """Return the fields and parameters whose values before a sweep some transposed kernel reads."""
+    """Return the fields and parameters that the transposed kernels read. They read the values from before the sweep."""
     used = {s for kernel in kernels for s in {*kernel.inputs.get("site", ())} & {*symbols_of(*kernel.roots)}}
     return {(step.sites.ends.get(s) or step.sites.places[s])[0] for s in used}
 

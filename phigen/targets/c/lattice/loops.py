@@ -199,8 +199,8 @@ class RowLoops:
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function that fills arrays over the sites with the values of a kernel.
 
-        Sums over bonds or pairs are computed for all sites before. If nothing else needs these sums, each site computes
-        its own.
+        Sums over bonds or pairs are computed beforehand, for all sites. But if nothing else needs these sums, each site
+        computes its own sums in this function.
         """
         gather, several = self.layout.partners.sums_of(kernel), kernel.role is Role.OBSERVABLES
         apart = ir.Constant(share(kernel)) if several else row_loops.SITES

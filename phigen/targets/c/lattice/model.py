@@ -90,7 +90,7 @@ def _gathered(layout: Layout) -> int:
 
 
 def _reserved(layout: Layout, has: Mapping[str, bool]) -> int:
-    """Return the number of arrays over the sites in the memory of a solver."""
+    """Return the number of arrays over the sites in the memory of a solver, including the fields and parameters."""
     program, dimension, stage = layout.program, layout.program.dimension, 0
     if layout.step.equation:
         stage = 2 if layout.slopes else 3  # y before and after a sweep, and its variation
@@ -137,8 +137,8 @@ def _flows(step: Sweeps) -> list[tuple[int, int]]:
 
 
 def _by_flow(step: Sweeps, values: Sequence[float], joined: float) -> list[float]:
-    """Return ``values``, which the schedule has by rows, for each flow of `_flows`; the merged flow gets the value
-    ``joined``.
+    """Return one value for each flow of `_flows`. ``values`` has a value for each row of the schedule. The flow that
+    results from merging two flows has the value ``joined``.
     """
     by_flow = [values[row] for _, row in _flows(step)]
     return by_flow if step.sites.increments or step.corrected else [*by_flow[:-1], joined]
@@ -231,7 +231,7 @@ def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, i
     if has["WAVES"]:
         far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = max(1, *far) if several else 1
-        yield "SPAN", span, "neighbouring slices that a flow reads on each side; see wavefront blocking"
+        yield "SPAN", span, "slices that a flow reads on each side of a slice, for wavefront blocking"
     if layout.lattice.weights and several:
         yield "WEIGHTS", len(layout.lattice.weights), "kinds of terms that reach beyond open ends"
     if sites.colours > 1:

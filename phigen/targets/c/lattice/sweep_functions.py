@@ -113,7 +113,7 @@ Names = Mapping[tuple[tuple[str, ...], ir.Block], str]
 
 @dataclass(frozen=True)
 class _PartLoops:
-    """The loops and row drivers of all parts of H. Without ``rows``, they are those of the derivatives of flows."""
+    """The loops and row drivers of all parts of H. Without ``rows``, they compute derivatives of the flows."""
 
     loops: RowLoops
     rows: Rows | None
@@ -261,7 +261,7 @@ class _PartLoops:
 def _alike(calls_of_parts: Sequence[Calls]) -> dict[tuple[tuple[str, ...], ir.Block], list[_Call]]:
     """Return the calls of all loops, by the code of the loop.
 
-    If a loop can be replaced by a loop that is there already, its call is replaced by a call of that loop.
+    If an earlier loop can do the work of a loop, the earlier loop is called instead.
     """
     alike: dict[tuple[tuple[str, ...], ir.Block], list[_Call]] = {}
     for calls_of_forms in calls_of_parts:
@@ -283,7 +283,9 @@ def _place(numbered: tuple[int, _Call]) -> tuple[str, bool]:
 
 
 def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[ir.Statement]:
-    """Yield the statements that skip rows and sites away from the seams on which the terms of a part begin."""
+    """Yield the statements that skip rows and sites away from boundary seams, if the terms of a part of H occur near
+    seams only.
+    """
     window, last = max((s.window or 0 for s in part), default=0), len(layout.step.sites.axes) - 1
     rows, near = ir.Constant(window & ~(1 << last)), ir.Member(ROW, "near")
     if rows.value:
@@ -313,14 +315,14 @@ def _statements(called: Sequence[_Call], names: Names) -> Iterator[ir.Statement]
 
 
 def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of arrays of the parameters at bonds in other orders."""
+    """Yield the declarations of arrays with pointers to the parameters at bonds, in other orders."""
     listed = layout.step.sites.at_bonds
     for order in dict.fromkeys(order for order in used if order):
         yield _arrays(order, [ir.entry(ir.Member(S, "at_bonds"), listed.index(p)) for p in order])
 
 
 def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[ir.Statement]:
-    """Yield the declarations of arrays over the sites with the fields in other orders."""
+    """Yield the declarations of arrays with pointers to fields and parameters at sites, in other orders."""
     for order in dict.fromkeys(order for order in used if order):
         increments = turned_increments(layout.step.sites, layout.lattice.arrays, order)
         other = {**dict(zip(layout.lattice.arrays, order, strict=False)), **increments}
@@ -384,5 +386,5 @@ _TITLES = {
     Role.SLOPE: "Derivative of a sweep by y along v",
     Role.OWN_SLOPE: "Derivative of a sweep by y at the site itself",
     Role.SIDE: "Derivative of a sweep by x along v",
-    Role.FOLLOW: "Derivative of the end of a stage by y along v, added",
+    Role.FOLLOW: "Derivative of the update of x at the end of a stage by y along v; it is added",
 }
