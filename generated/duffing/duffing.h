@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a569fd0b3810ade0e1a60d8bb4b5cdca50bba7da7a9921b1bd4d567a06e3601a
+ * body-sha256: bc9a5b566f4a125579ebb99272ccb2d9ba9159374a88ac451996d0c653ee6174
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -15,7 +15,8 @@ extern "C" {
 #define duffing_PHIGEN_VERSION "0.1.0"
 #define duffing_SPEC_SHA256 "ede43f8e6b701b5554dc52316d7c870d0e7f0b2ee5862a7290406e095a945c72"
 enum { duffing_COEFFICIENTS = 33 }; /* numbers that are functions of params and h, and of the time */
-enum { duffing_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
+/* past differences that the predictor reads; more would amplify rounding errors */
+enum { duffing_DIFFERENCES = 9 };
 
 typedef struct {
     double A;     /* amplitude of the drive */
@@ -40,14 +41,15 @@ typedef struct {
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
-    double x[duffing_DIM]; /* the state; change it only by the functions below */
+    double x[duffing_DIM];     /* the state; change it only by the functions below */
     double carry[duffing_DIM]; /* rounding error of x: x + carry is more accurate */
-    size_t steps; /* number of successful steps since duffing_init */
-    size_t evaluations; /* number of evaluations of the generating function, for statistics */
-    double t; /* the time of x */
-    double h; /* size of the last step; NaN before the first step */
-    duffing_params params; /* the parameters, set by duffing_init; do not change them */
-    double coef[duffing_COEFFICIENTS]; /* functions of params and h, then functions of the time too */
+    size_t steps;              /* number of successful steps since duffing_init */
+    size_t evaluations;        /* number of evaluations of the generating function, for statistics */
+    double t;                  /* the time of x */
+    double h;                  /* size of the last step; NaN before the first step */
+    duffing_params params;     /* the parameters, set by duffing_init; do not change them */
+    /* functions of params and h; then those that also depend on the time */
+    double coef[duffing_COEFFICIENTS];
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
     duffing_history history; /* predictor of the starting value of the iteration */

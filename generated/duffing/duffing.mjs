@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e9b87de690b54a53353aace70bc4632fe5f6ea1bbb12e86b5b2131915fc74c96
+ * body-sha256: 0b08f9fce42574d0455c3f8f4191a08353071d27c527c7a9d0710fa48e9590d8
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -301,7 +301,7 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size, then those of the time too. */
+  /** Coefficients of each stage: functions of parameters and step size first, then of the time. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: bb48c254dbb1541862106af9033f6672778071f74ece22969123f864c15a0c5f
+ * body-sha256: 028cdef7f5490e8a6f5155ceae17b9a524d4ab0ca538ede90f71d6ed7328ef2d
  */
 #include "food_web.h"
 #include <limits.h>
@@ -64,7 +64,7 @@ static int food_web_allowed(const food_web_params *params, size_t sites, size_t 
     return 1;
 }
 
-/* Everything that depends on parameters and the time of a flow only. */
+/* All values that depend only on parameters and on the duration of a flow. */
 static void food_web_prepare(const food_web_params *params, double h, double coef[restrict 1])
 {
     (void)params;

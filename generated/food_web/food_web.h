@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 51e9ad682652de171bcf36ea4242ce1380efddc5d6745dd3546668311e1f1fc4
+ * body-sha256: 023de1f088022387099468c3d0144eeaf83f94359a3e749d6698f1b0ac1fc59f
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -39,14 +39,14 @@ typedef struct {
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
     double *x[food_web_ARRAYS]; /* first sites of the fields, then parameters at sites */
-    double *before[food_web_DIM]; /* fields before the present steps, restored if one fails */
+    double *before[food_web_DIM]; /* fields before the present steps, restored if a step fails */
     double *gathered[food_web_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     int *bonds, *middle; /* for each site, index in other of the first bond that begins or ends there */
     int *other, *number; /* for each bond of a site, the site at its other end, and its number */
     double *at_bonds[food_web_BOND_ARRAYS]; /* for each entry of other, the parameters at the bond */
     int *colours; /* colour of each site; no bond connects two sites of the same colour */
     int colour_count, flows; /* number of colours, and of flows in a stage */
-    int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
+    int open; /* 1 if, between calls, x includes the last flow of the last step, but before does not */
     size_t far; /* number of the next steps that use full-range functions */
     size_t steps; /* number of successful steps since food_web_init */
     double t; /* time since food_web_init */

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 24 multiplications, 12 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e45f5ff5e28504f0283174c63fd0b8a250fe76899203ce89c8e1bc839dd08c01
+# body-sha256: 432b67a137b92216e810a8efd971ebea2a19ea5de82d84cdcaaa307c377b72a6
 import numpy as np
 
 VERSION = "0.1.0"
@@ -262,7 +262,7 @@ def vector_field(x, **parameters):
 
 
 def _prepare(parameters, h):
-    """Everything that depends on parameters and the time of a flow only."""
+    """All values that depend only on parameters and on the duration of a flow."""
     return [h]
 
 

@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 72b6595048b9d5251df031dbc3da601834e5e1ac75f533e08dab5b7faa6d256e
+ * body-sha256: 501577d4b2c9bfc14f7145f865ba371eccb712e4d9365017a5ccd8fb65eb4fc8
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -16,7 +16,8 @@ extern "C" {
 #define guiding_centre_SPEC_SHA256 "82d5ea90095e73077a2671c7c2e7b96d51802a2b6398fe46f5396c4225a32104"
 enum { guiding_centre_STAGES = 5 };       /* stages of a step */
 enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
-enum { guiding_centre_DIFFERENCES = 9 };  /* for the predictor; more would amplify rounding */
+/* past differences that the predictor reads; more would amplify rounding errors */
+enum { guiding_centre_DIFFERENCES = 9 };
 
 typedef struct {
     double kappa; /* twist of the field lines per unit of length */

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: cb4be610787024ee321106eed2c08dcee89ec7855c27b2eb63d680011ac3b39a
+ * body-sha256: 081934bf6f5817072eb7713dd2df5dbbc668a8d425f4bb57c41f5f9dfb5fd204
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -30,7 +30,7 @@ enum { heisenberg_LINES = 5 }; /* rows that kernels read: the row itself and its
 enum { heisenberg_ROW = 3 }; /* coefficients of one flow */
 enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { heisenberg_FLOWS = 5 }; /* flows in a step */
-enum { heisenberg_SPAN = 1 }; /* neighbouring slices that a flow reads on each side; see wavefront blocking */
+enum { heisenberg_SPAN = 1 }; /* slices that a flow reads on each side of a slice, for wavefront blocking */
 
 /* Along each axis: the smallest number of sites, whether the ends are open. */
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
@@ -58,7 +58,7 @@ static int heisenberg_allowed(const heisenberg_params *params, size_t sites)
     return isfinite(params->J);
 }
 
-/* Everything that depends on parameters and the time of a flow only. */
+/* All values that depend only on parameters and on the duration of a flow. */
 static void heisenberg_prepare(const heisenberg_params *params, double h, double coef[restrict 3])
 {
     coef[0] = -(params->J * h);

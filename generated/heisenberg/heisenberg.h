@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5104f5193f4928fd1e7fb658aba418f534ae23a35e9af2b1645c1954abaee6ba
+ * body-sha256: 59239c1b39cd08ca4615e3c6e0ae04f537615f61ea6d3448e1f5c85886aa47f2
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -37,9 +37,9 @@ typedef struct {
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
     double *x[heisenberg_ARRAYS]; /* first sites of the fields, then parameters at sites */
-    double *before[heisenberg_DIM]; /* fields before the present steps, restored if one fails */
+    double *before[heisenberg_DIM]; /* fields before the present steps, restored if a step fails */
     ptrdiff_t *lines; /* for each row: its offset, and the offsets of the rows beside it */
-    int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
+    int open; /* 1 if, between calls, x includes the last flow of the last step, but before does not */
     size_t far; /* number of the next steps that use full-range functions */
     size_t steps; /* number of successful steps since heisenberg_init */
     double t; /* time since heisenberg_init */

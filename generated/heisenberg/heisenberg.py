@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 36 additions, 28 multiplications, 10 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build heisenberg
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 95f8406640f7f9f33de1088f7f78a7900ea29b5abff2878ae57a060123b89458
+# body-sha256: 1fc741ed1c70a66d12fc7a3345895e14c086492958acc8d5254cd17c7f2081b2
 import numpy as np
 
 VERSION = "0.1.0"
@@ -191,7 +191,7 @@ def vector_field(x, **parameters):
 
 
 def _prepare(parameters, h):
-    """Everything that depends on parameters and the time of a flow only."""
+    """All values that depend only on parameters and on the duration of a flow."""
     J = parameters["J"]
     return [-(J * h), J, -h]
 

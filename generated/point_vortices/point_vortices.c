@@ -4,14 +4,14 @@
  *   lattice: all pairs of sites; any size
  *   bi-realisation: constant, symmetric
  *   generating function: S_1
- *   step: implicit, by sweeps over the sites until they change nothing
+ *   step: implicit, solved by sweeps over the sites until the solution no longer changes
  *   composition: suzuki, 5 stages of order 2
  *   one step of one site: 2 additions, 6 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: ba7a43c56ef45007d92888af250a821be36f1eab72e21f6ad2a4a1412dcaab05
+ * body-sha256: 706e2065f8dd96520d28ef677de9a8822981ce17fc6bc3bdc2192adf2784b10a
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -47,7 +47,7 @@ static int point_vortices_allowed(const point_vortices_params *params, size_t si
     return 1;
 }
 
-/* Everything that depends on parameters and the time of a stage only. */
+/* All values that depend only on parameters and on the duration of a stage. */
 static void point_vortices_prepare(const point_vortices_params *params, double h, double coef[restrict 1])
 {
     (void)params;

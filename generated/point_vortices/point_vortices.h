@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0b21b4964373fa3dff179553136d3ebc1197890b95595c54e45ed32a83aee2ca
+ * body-sha256: a68a6353a3840f7514f930e14ad7413e44ab475f7c6e33270ec5da2c34c962e7
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -48,7 +48,7 @@ typedef struct {
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
     double *x[point_vortices_ARRAYS]; /* first sites of the fields, then parameters at sites */
-    double *before[point_vortices_DIM]; /* fields before the present steps, restored if one fails */
+    double *before[point_vortices_DIM]; /* fields before the present steps, restored if a step fails */
     double *gathered[point_vortices_GATHERED]; /* for each site, sums over its bonds or over all pairs */
     /* solution of a stage before and after a sweep, with the parameters at sites */
     double *y[2][point_vortices_ARRAYS];

@@ -3,12 +3,12 @@
 #   lattice: all pairs of sites; any size
 #   bi-realisation: constant, symmetric
 #   generating function: S_1
-#   step: implicit, by sweeps over the sites until they change nothing
+#   step: implicit, solved by sweeps over the sites until the solution no longer changes
 #   composition: suzuki, 5 stages of order 2
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fed7a59d8009da9a2127d851301c16cfaf63bb3ec544df885f732b1a7e058a8b
+# body-sha256: 72edf14d744c95317fe203f02aa247e1f00c760f7654a2dbbc9442da28c65a49
 import numpy as np
 
 VERSION = "0.1.0"
@@ -326,7 +326,7 @@ def vector_field(x, **parameters):
 
 
 def _prepare(parameters, h):
-    """Everything that depends on parameters and the time of a stage only."""
+    """All values that depend only on parameters and on the duration of a stage."""
     return [h]
 
 

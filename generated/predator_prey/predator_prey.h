@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0215b1dc50b571be858eb5370844859f010b9ca3535f1578a809fc270d80690e
+ * body-sha256: c86d36902391946488f35cc9982484317e91d3f9fba7bac213679739e356f2dd
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -15,7 +15,8 @@ extern "C" {
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "68567398b4ba43e83320ab7370f0cc0065b496e42c92688e630cf74def14bede"
 enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that are functions of params and h */
-enum { predator_prey_DIFFERENCES = 9 };   /* for the predictor; more would amplify rounding */
+/* past differences that the predictor reads; more would amplify rounding errors */
+enum { predator_prey_DIFFERENCES = 9 };
 
 typedef struct {
     double growth; /* growth rate of the prey without predators */

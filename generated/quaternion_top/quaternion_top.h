@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c40ca379b08bd46ec406af7fa35967fca54221d3a88a183c77fb650bf7a19e78
+ * body-sha256: 034f9efe2a2f62864f0e759efc164d34f736dcacc4dcf0723426ddd36f8cd3be
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -16,7 +16,8 @@ extern "C" {
 #define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that are functions of params and h */
 enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs, multiples of which are subtracted from H: length */
-enum { quaternion_top_DIFFERENCES = 9 }; /* for the predictor; more would amplify rounding */
+/* past differences that the predictor reads; more would amplify rounding errors */
+enum { quaternion_top_DIFFERENCES = 9 };
 
 typedef struct {
     double I1;     /* least moment of inertia */
@@ -45,15 +46,14 @@ typedef struct {
 
 /* A solver without pointers: copies are independent solvers. Arguments may be parts of it, or overlap. */
 typedef struct {
-    double x[quaternion_top_DIM];     /* the state; change it only by the functions below */
+    double x[quaternion_top_DIM]; /* the state; change it only by the functions below */
     double carry[quaternion_top_DIM]; /* rounding error of x: x + carry is more accurate */
-    size_t steps;                     /* number of successful steps since quaternion_top_init */
-    size_t evaluations;               /* number of evaluations of the generating function, for statistics */
-    double t;                         /* time since quaternion_top_init */
-    double h;                         /* size of the last step; NaN before the first step */
-    quaternion_top_params params;     /* the parameters, set by quaternion_top_init; do not change them */
-    /* factors of the Casimirs that are subtracted from H, in their order */
-    double gauge[quaternion_top_GAUGES];
+    size_t steps; /* number of successful steps since quaternion_top_init */
+    size_t evaluations; /* number of evaluations of the generating function, for statistics */
+    double t; /* time since quaternion_top_init */
+    double h; /* size of the last step; NaN before the first step */
+    quaternion_top_params params; /* the parameters, set by quaternion_top_init; do not change them */
+    double gauge[quaternion_top_GAUGES]; /* the Casimirs, times these factors, are subtracted from H */
     double coef[quaternion_top_COEFFICIENTS]; /* functions of params and h, computed when h changes */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;

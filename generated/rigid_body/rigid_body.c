@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: a09c363a99acca0dc35990a1146059157d5fae0c5e4ef6825f720ccf8c52ee0f
+ * body-sha256: 307fee03a8dc1c23ae89fd3fd8cef3a1fc1f1eb584b2373dde85b0dfe5377c02
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -48,7 +48,8 @@ static inline double rigid_body_polynomial(const double *coefficients, int count
     return value;
 }
 
-/* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
+/* (1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs
+   it. */
 static double rigid_body_phi0(double s)
 {
     static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,

@@ -1,7 +1,7 @@
 /*
  * The declarations of rigid_body.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eed74248a12636c05d5071bd27dc6cabc8ad7f6e2ce791a22cab3cea383981ab
+ * body-sha256: 1a5bd4833e4c135d7af029cb6a4b6f7e9fc5251bc9d9ca7e18d5d819616f4f2c
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -76,7 +76,7 @@ typedef struct {
     double t; /* time since rigid_body_init */
     double h; /* size of the last step; NaN before the first step */
     rigid_body_params params; /* the parameters, set by rigid_body_init; do not change them */
-    double gauge[rigid_body_GAUGES]; /* factors of the Casimirs that are subtracted from H, in their order */
+    double gauge[rigid_body_GAUGES]; /* the Casimirs, times these factors, are subtracted from H */
     double coef[rigid_body_COEFFICIENTS]; /* functions of params and h, computed when h changes */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5c1781e0cbca9e120b70ca5acbea11e233ffc6a27b0d3965e47f99c09d294863
+ * body-sha256: 7d8ac519447a31422ad74126536019fb4c868a833169157c150e0b3f1b11d39b
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -63,7 +63,7 @@ function polynomial(coefficients, s) {
   return coefficients.reduceRight((value, c) => value * s + c, 0);
 }
 
-/** (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
+/** (1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it. */
 function phi0(s) {
   if (Math.abs(s) < 0.25) {
     return polynomial([
@@ -599,7 +599,7 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Factors of the Casimirs in GAUGE that are subtracted from H. */
+  /** The Casimirs in GAUGE, times these factors, are subtracted from H. */
   gauge;
   /** Coefficients of each stage: functions of parameters and step size. */
   coef = emptyTables();
@@ -615,8 +615,8 @@ export class Solver {
    * @param {object} options
    * @param {ArrayLike<number>} options.x0 the coordinates, in the order of COORDINATES
    * @param {Partial<Parameters>} [options.params] parameters that differ from the defaults
-   * @param {ArrayLike<number>} [options.gauge] factors of the Casimirs subtracted from H; by default they follow
-   *   from x0. For fixed factors the step is an exact Poisson map
+   * @param {ArrayLike<number>} [options.gauge] the Casimirs, times these factors, are subtracted from H; by default
+   *   the factors follow from x0. For fixed factors the step is an exact Poisson map
    */
   constructor(options = {}) {
     expectOptions(options, OPTIONS);

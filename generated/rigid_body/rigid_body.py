@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a33c3255b68ff7926a92692e7e43ae162437d9285cb130b94fcbecb175f0eba5
+# body-sha256: bb9da3698df9ac73811c5a119b64974db39d5c6e308a1c26fd6db7210378afd2
 import numpy as np
 
 VERSION = "0.1.0"
@@ -118,7 +118,7 @@ def _admissible(values):
 
 
 def _phi0(s):
-    """(1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation."""
+    """(1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it."""
     s = np.asarray(s, dtype=float)
     small = np.where(np.abs(s) < 16.0, s, 0.0)
     near = np.full_like(small, 8.586062056277845e-15)

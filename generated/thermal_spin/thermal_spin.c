@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 753345e63ff3787a6d18f80f8edb262bfd503c63274b76455e07c880b3ad3753
+ * body-sha256: 7d73fbb7d3b6c48498b7bd33ca2ca1e62cff91e801c8460180e6d62f08a60a6d
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -47,7 +47,8 @@ static inline double thermal_spin_polynomial(const double *coefficients, int cou
     return value;
 }
 
-/* (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
+/* (1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs
+   it. */
 static double thermal_spin_phi0(double s)
 {
     static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,

@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e88a82fa52168ab9e9dc7ac90cd7ef29fca1dcaf94d2d7fdbd7a820c1bd7509f
+ * body-sha256: e1bc987e07d1180b77d8d15dc6d97c42dd2ee63576dc65507b992af053dc58b1
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -52,7 +52,7 @@ typedef struct {
     double dw[thermal_spin_DRAWS]; /* increments of the noise in the last step */
     double h; /* size of the last step; NaN before the first step */
     thermal_spin_params params; /* the parameters, set by thermal_spin_init; do not change them */
-    double coef[thermal_spin_COEFFICIENTS]; /* functions of params and h, then functions of dw too */
+    double coef[thermal_spin_COEFFICIENTS]; /* functions of params and h; then those that also depend on dw */
     size_t steps_before_h; /* steps and t at the last change of h: t = t_before_h + (steps since then) h */
     double t_before_h;
 } thermal_spin_solver;

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1086952c6fd9c3801dc978895618d57e3dddb258f6bfe06455cf9fae8780e8f9
+ * body-sha256: 6e2dfc946eb2642541fab33cf922c75b04bb06af4d16fdec66bf1cc9e38edcaa
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -83,7 +83,7 @@ function polynomial(coefficients, s) {
   return coefficients.reduceRight((value, c) => value * s + c, 0);
 }
 
-/** (1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation. */
+/** (1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it. */
 function phi0(s) {
   if (Math.abs(s) < 0.25) {
     return polynomial([
@@ -405,7 +405,7 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
-  /** Coefficients of each stage: functions of parameters and step size, then those of noise or time too. */
+  /** Coefficients of each stage: functions of parameters and step size first, then of noise or time. */
   coef = emptyTables();
   /** Predictor of each stage. */
   history = FRACTIONS.map(() => new History());

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: bdca6972b1807342deffc7f2b537d94f447238c19c46e629875ddb7479132a2c
+# body-sha256: 0509956538586c9a0c5bca9306a5b2211f12821b6dc29886132087a3bee69362
 import numpy as np
 
 VERSION = "0.1.0"
@@ -123,7 +123,7 @@ def _admissible(values):
 
 
 def _phi0(s):
-    """(1 - w cot w)/s with w = sqrt(s)/2, coth for negative s: the function of the exponential bi-realisation."""
+    """(1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it."""
     s = np.asarray(s, dtype=float)
     small = np.where(np.abs(s) < 16.0, s, 0.0)
     near = np.full_like(small, 8.586062056277845e-15)

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: e9393b629893f953ec5c45aa44054b71f82d26b01d2a287c1681495740ada6e3
+ * body-sha256: e8b2a3b145b32963fff673694ca389715daf9ecafe79f72a239a3171b1b10ae1
  */
 #include "toda.h"
 #include <math.h>
@@ -48,7 +48,7 @@ static int toda_allowed(const toda_params *params, size_t sites)
     return 1;
 }
 
-/* Everything that depends on parameters and the time of a flow only. */
+/* All values that depend only on parameters and on the duration of a flow. */
 static void toda_prepare(const toda_params *params, double h, double coef[restrict 2])
 {
     (void)params;

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 31e3a3d8176ca88cae60954e635b8df95c5e769dcfc2cdc5920e5155c535dac2
+ * body-sha256: f5b45b20f9ed8ffadbd2da5b05583e8a97751a82ecf07814bff8780cad966fc9
  */
 #ifndef TODA_H
 #define TODA_H
@@ -36,8 +36,8 @@ typedef struct {
     size_t sites, rows; /* number of all sites, and of rows */
     ptrdiff_t length, width; /* sites of a row; doubles from the start of a row to that of the next */
     double *x[toda_ARRAYS]; /* first sites of the fields, then parameters at sites */
-    double *before[toda_DIM]; /* fields before the present steps, restored if one fails */
-    int open; /* 1 if before lacks the last flow of the last step, which x includes between calls */
+    double *before[toda_DIM]; /* fields before the present steps, restored if a step fails */
+    int open; /* 1 if, between calls, x includes the last flow of the last step, but before does not */
     size_t far; /* number of the next steps that use full-range functions */
     size_t steps; /* number of successful steps since toda_init */
     double t; /* time since toda_init */

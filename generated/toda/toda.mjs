@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 482403f3ec189a29fe260499931ce5065c00db2ab1395dc717a0081a4248b720
+ * body-sha256: 46f4b211d6aaa9f04f5898499f7ff7a1d3002536635af7665a1cd1449095c9a2
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -69,7 +69,7 @@ const SCHEDULE = [[0, 0], [1, 1], [0, 2], [1, 3], [0, 4], [1, 5], [0, 6], [1, 7]
 /** For each part of H, the functions that apply its flow to all sites ("sweeps"), one after the other. */
 const FLOWS = [[sweep1], [sweep2]];
 
-/** Everything that depends on parameters and the time of a flow only. */
+/** All values that depend only on parameters and on the duration of a flow. */
 function prepare(params, h, coef) {
   coef[0] = 2 * h;
   coef[1] = h;

@@ -6,7 +6,7 @@
 #   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
 # SPDX-License-Identifier: 0BSD
-# body-sha256: a52f252de521422fa0611e53e6163299e2fa51c5faf93b476cffc7eb934c51bd
+# body-sha256: ec943e8019ea0f9b298f65682ce0875bce10b278ad7a35f3290674df772ed9b7
 import numpy as np
 
 VERSION = "0.1.0"
@@ -189,7 +189,7 @@ def vector_field(x, **parameters):
 
 
 def _prepare(parameters, h):
-    """Everything that depends on parameters and the time of a flow only."""
+    """All values that depend only on parameters and on the duration of a flow."""
     return [2.0 * h, h]
 
 
