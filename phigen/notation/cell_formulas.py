@@ -51,9 +51,10 @@ def _mirrored(cell: Cell, f: str, second_field: str) -> tuple[str, str]:
 
 
 def sections(cell: Cell, max_terms: int | None = SHOWN) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Return the formulas of a lattice as text: titles of sections, each with its lines, pairs (left side, right side).
+    """Return the formulas of a lattice as text: pairs (title of a section, lines).
 
-    ``max_terms`` is the largest number of terms of an expression that are displayed; None displays all.
+    A line is a pair (left side, right side). ``max_terms`` is the largest number of terms of an expression that are
+    displayed; None displays all.
     """
     contents = [
         ("Poisson tensor of a site" if cell.is_local else "Poisson tensor", brackets(cell)),

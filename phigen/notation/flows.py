@@ -60,8 +60,10 @@ def _place(matrix: MatrixExponential, k: int) -> str:
 
 
 def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expression]]:
-    """Return the generator of a flow: its Hamiltonian, with the name "", or the nonzero components of a force by
-    name."""
+    """Return the generator of a flow as pairs (name, expression).
+
+    It is a Hamiltonian, with the name "", or a force: its nonzero components have the names of coordinates.
+    """
     if not flow.force:
         return [("", flow.hamiltonian)]
     return [(c, f) for c, f in zip(coordinates, flow.force, strict=True) if not f.is_zero]

@@ -146,7 +146,7 @@ class Declarations:
     # --- scopes
 
     def scope(self, extra: Mapping[str, Expression] | None = None) -> AllowedNames:
-        """Return the names that functions on phase space and densities of sites may use; without the time.
+        """Return the names that functions on phase space and densities of sites may use, except the time.
 
         ``extra`` has further names with their expressions.
         """
@@ -158,7 +158,7 @@ class Declarations:
         return AllowedNames(allowed_names, refused, open=self.incomplete, indices=self.indices(allowed_names))
 
     def dated_scope(self) -> AllowedNames:
-        """Return the names that functions on phase space may use if they may depend on the time."""
+        """Return the names for functions on phase space that may depend on the time."""
         scope = self.scope()
         dated = {n: self.definitions[n] for n in self.dated} | ({self.time: symbol(self.time)} if self.time else {})
         bonds = self._at_bonds(dated)
@@ -168,7 +168,7 @@ class Declarations:
         return replace(scope, names=names, refused=refused, indices=self.indices(names))
 
     def _timeless(self) -> dict[str, tuple[str, str]]:
-        """Return the time and the definitions that depend on it, with the message and hint that refuse each."""
+        """Return the time and the definitions that depend on it, each with the error (message, hint) for its use."""
         hint = "only the Hamiltonian, invariants, sections and exact solutions may"
         refused = {n: (f"this must not depend on the time, as {n!r} does", hint) for n in sorted(self.dated)}
         return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
@@ -190,7 +190,10 @@ class Declarations:
         return AllowedNames(names | dict(extra or {}), refused | self.refused, open=self.incomplete)
 
     def dated_constants(self, value_name: str) -> AllowedNames:
-        """Return the names of `constants`, the time, and definitions that depend on parameters and the time only."""
+        """Return the names that `constants` returns, and also the time and definitions that depend on the time.
+
+        These definitions may depend on parameters too, but not on coordinates.
+        """
         scope = self.constants(value_name)
         dated = {n: self.definitions[n] for n in self.dated - self.varying}
         dated |= {self.time: symbol(self.time)} if self.time else {}
@@ -374,7 +377,7 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
 
 
 def _expect_place(name: str, domain: str, declared: Declarations) -> None:
-    """Report a parameter that is declared at sites or bonds (``domain``) if the spec has no sites or no bonds."""
+    """Report a parameter with values at sites or at bonds (``domain``) if the spec has no sites or no bonds."""
     relations = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(domain)
     if relations and declared.relation not in relations:
         needs = "a lattice with a graph" if domain == "bonds" and declared.relation else "specs with lattice:"

@@ -13,7 +13,7 @@ __all__ = ["PRODUCT_BYTES", "PRODUCT_TERMS", "TAYLOR_BYTES", "number_is_bounded"
 
 #: Largest size of a spec file, in bytes.
 FILE_BYTES = 512 * 1024
-#: Largest number of YAML nodes in a file: scalars, keys included, sequences and mappings.
+#: Largest number of YAML nodes in a file. Nodes are scalars (also keys), sequences and mappings.
 YAML_NODES = 20_000
 #: Largest nesting of YAML collections.
 YAML_DEPTH = 32
@@ -56,8 +56,8 @@ SERIES_TERMS = 50_000
 #: Largest number of exponents that are stored when a polynomial and its derivatives are expanded; each monomial has one
 #: exponent for each symbol. At the limit this takes 80 MB and some seconds.
 CELLS = 8_000_000
-#: Largest estimated number of products of terms in the proof of a bi-realisation, which then takes ten seconds. A
-#: bi-realisation beyond the limit is checked at sample points instead.
+#: If the proof of a bi-realisation is estimated to need more products of terms than this, the bi-realisation is checked
+#: at sample points instead. At the limit, the proof takes ten seconds.
 PROOF_PRODUCTS = 20_000_000
 #: Largest seed of noise, which has 64 bits, and largest number of paths (members), which are numbered with 32 bits.
 SEED, MEMBERS = 2**64 - 1, 2**32

@@ -161,7 +161,7 @@ class BirealisationChoice:
     of: str = "auto"  # for product: the kind of the blocks; for pullback: the kind of the inner structure
     tau: Expression | Matrix | None = None  # for group-map: the map τ, as f(MATRIX) or as a matrix in the momenta
     spray: str | tuple[Expression, ...] = "auto"  # for spray: auto, flat, natural or the components f_j(x, p)
-    degree: int | None = None  # for spray: largest degree in p of the series; None for the degree the order needs
+    degree: int | None = None  # for spray: largest degree in p of the series; None for the degree that the order needs
     order: int | None = None
 
 
@@ -342,7 +342,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Statistic:
-    """Number that a sweep stores of an observable: a statistic over the run.
+    """Number that a sweep stores for an observable: a statistic over the run, or the value at its end.
 
     ``of`` is ``mean``, ``std`` (standard deviation) or ``error`` (of the mean); "" means the value at the end.
     """

@@ -184,7 +184,10 @@ def _average(
 
 
 def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
-    """Report an average that begins after the end of a run. The steps of the run must be equal in physical time."""
+    """Report an average that begins after the end of a run.
+
+    This is for runs whose steps are equal in physical time; with a monitor, the end is not known in advance.
+    """
     start_time, end = run_.average.after, run_.until
     end = run_.start + run_.step * run_.steps if end is None else end
     if start_time is not None and (end - start_time) * run_.step < 0:
@@ -240,7 +243,8 @@ def _steps(
 def _steps_until(
     name: str, raw: Mapping[str, Any], span: Fraction, step: Fraction | None, declared: Declarations
 ) -> int | None:
-    """Return the number of whole steps in ``span``, the time from the start to ``until``; at least 1.
+    """Return the number of whole steps in the time ``span`` from the start to ``until``; the number is at least
+    1.
 
     Returns None after errors, which are reported. With a monitor the steps are unequal in time, so that the number is
     only an estimate.

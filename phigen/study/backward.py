@@ -149,8 +149,8 @@ class Constancy:
 
     With m corrections, the changes should decrease with the power ``powers[m]`` of the step size; ``observed[m]`` is
     the measured power. ``errors`` (corrections + 1, rows) are the changes at ``times`` (rows,), up to ``end``, with
-    steps of size ``step``. ``changes`` (sizes, corrections + 1) are the largest changes for each of the step sizes
-    ``sizes``, in descending order.
+    steps of size ``step``. ``sizes`` are step sizes in descending order; ``changes`` (sizes, corrections + 1) has the
+    largest change for each of them.
     """
 
     powers: tuple[int, ...]

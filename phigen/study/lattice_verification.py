@@ -214,7 +214,7 @@ def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) 
 
 
 def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
-    """Yield the checks of the largest error of the energy, or of the energy balance, and of its drift.
+    """Yield two checks of the energy or of the energy balance: of its largest error, and of its drift.
 
     ``least`` is the relative error that rounding may cause.
     """

@@ -118,9 +118,9 @@ def reversal(method: Method, x: Floats, h: float) -> float:
 
 
 def largest_step(method: Method, states: Sequence[Floats], h: float, max_factor: float = 256.0) -> float:
-    """Return the largest factor f ≤ ``max_factor``, to 5 %, for which a step of size f·h succeeds from all states.
+    """Return the largest factor f, up to ``max_factor``, for which a step of size f·h succeeds from all states.
 
-    The result is 0 if a step of size h/64 fails.
+    The factor has an accuracy of 5 %. It is 0 if a step of size h/64 fails.
     """
 
     def works(factor: float) -> bool:

@@ -44,7 +44,8 @@ class Drift:
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors of one method in a run, which has ``rows`` rows; the first ``good`` rows are finite, and are evaluated.
+    """Errors of one method in a run with ``rows`` rows. The first ``good`` rows are finite; only they are
+    evaluated.
 
     ``exact`` is the largest error against the closed form, None if there is none. If the method fails in its first
     step, all errors are infinite. If H is not constant along the motion, ``energy`` is the error of H − work; ``work``

@@ -252,7 +252,7 @@ def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
 
 
 def time_checks(subject: Subject, gauge: Floats | None, *, quick: bool = False) -> Iterator[Check]:
-    """Yield, for systems with a monitor, the check of the observed order of the state together with the time."""
+    """Yield the check of the observed order of systems with a monitor, from errors of the state and of the time."""
     if subject.compilation.program.monitor is None or gauge is None:
         return
     main = with_time(subject.solver, subject.parameters, gauge)
@@ -451,9 +451,11 @@ def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Flo
 def _approximate(
     subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], largest: float
 ) -> tuple[str, bool, str]:
-    """Return limit, verdict and reason of failure of the Poisson defect for a bi-realisation truncated in degree d.
+    """Return limit, verdict and reason of failure for the check of the Poisson defect of an approximate
+    bi-realisation.
 
-    The defect must decrease like h^(d+1); ``largest`` is the largest measured one.
+    If the series of the bi-realisation ends at degree d in p, the defect must decrease like h^(d+1). ``largest`` is the
+    largest measured defect.
     """
     degree = subject.compilation.degree
     if degree is None:

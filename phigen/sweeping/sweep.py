@@ -35,7 +35,7 @@ from phigen.sweeping.quality import EnergyErrors, energy_errors, lattice_energy_
 #: Intended processor time of a chunk in seconds: long compared with scheduling and storing, short for a waiting user.
 _SECONDS = 4.0
 
-#: Assumed time in seconds of a step with its tangent map, which Python processes, for Lyapunov exponents.
+#: For Lyapunov exponents: assumed time, in seconds, of a step with its tangent map, which Python processes.
 _TANGENT = 40e-6
 
 #: Smallest and largest number of members of a chunk.

@@ -12,7 +12,7 @@ from phigen.symbolic.expression import Expression, topological
 
 T = TypeVar("T")
 
-#: Empty table of values that are known before an evaluation, by the ``id`` of the node; the default.
+#: Default for the table of values that are known before an evaluation, by the ``id`` of the node: an empty table.
 NOTHING: Mapping[int, Any] = MappingProxyType({})
 
 

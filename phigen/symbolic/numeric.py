@@ -107,7 +107,8 @@ def _mpmath_context(digits: int) -> Any:
 
 
 class Numbers(Arithmetic[Any]):
-    """Arithmetic of numbers of one kind: floats, fractions or mpmath numbers. ``convert`` makes them of fractions.
+    """Arithmetic of numbers of one kind: floats, fractions or mpmath numbers. ``convert`` converts a fraction to the
+    kind.
 
     ``library`` has the elementary functions, math or an mpmath context; None allows rational operations only.
     """

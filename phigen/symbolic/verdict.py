@@ -61,7 +61,8 @@ class Statement:
 def decide_zero(
     name: str, residuals: Iterable[tuple[str, Expression]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """Return the statement ``name``, that all residuals vanish identically in their symbols, with its verdict.
+    """Decide whether all residuals vanish identically in their symbols; return the statement ``name`` with its
+    verdict.
 
     ``residuals`` are pairs (label, expression); a label such as ``(x1, x2, x3)`` names the part in a refutation.
     ``positive`` are the symbols that take positive values only. ``detail`` is the detail of the statement if proved.
@@ -80,7 +81,7 @@ def decide_zero(
 def decide_elements(
     name: str, tower: Tower, residuals: Iterable[tuple[str, Poly]], positive: Collection[str] = (), detail: str = ""
 ) -> Statement:
-    """Return the statement ``name``, that elements of the ring ``tower`` are 0, with its verdict.
+    """Decide whether elements of the ring ``tower`` are 0; return the statement ``name`` with its verdict.
 
     The arguments have the meaning that they have in `decide_zero`.
     """
@@ -98,10 +99,10 @@ def decide_elements(
 def _at_points(
     name: str, pending: Sequence[tuple[str, Expression]], describe: Callable[[int], str], positive: Collection[str]
 ) -> Statement:
-    """Return the statement with the verdict from values at points, for residuals that were not reduced to 0.
+    """Return the statement ``name``, decided by the values of its residuals (``pending``) at sample points.
 
-    A nonzero value at one point refutes the statement; otherwise it is checked numerically, or undecided if no residual
-    could be evaluated. ``describe`` returns the text of the residual with this index.
+    A nonzero value at one point refutes the statement. Otherwise it is checked numerically, or undecided if there is a
+    residual that could not be evaluated at any point. ``describe`` returns the text of the residual with this index.
     """
     fewest = POINTS
     for k, (label, expression) in enumerate(pending):

@@ -28,11 +28,11 @@ ROWS = 8_000
 
 @dataclass(frozen=True)
 class Problem(ABC):
-    """A tuning problem, the run on which methods are measured: initial state, parameters, step and duration.
+    """A tuning problem: initial state, parameters, step and duration of the run on which methods are measured.
 
     Searches begin with the size ``step``; ``horizon`` is the duration. Steps and times are positive here; ``direction``
     is −1 for a run backwards in time. ``sizes`` are the sizes of a lattice, () for other systems. Times are values of
-    the ``clock``: τ if the spec has a monitor, with which all methods then work, else t.
+    the ``clock``, t or τ. It is τ if the spec has a monitor; then all methods make steps in τ.
     """
 
     start: Floats

@@ -28,7 +28,7 @@ DENSE, SETTLING, FOLLOWED = 256, 8, 16
 def scales(problem: Problem, method: Candidate) -> tuple[float, float]:
     """Return the time span over which candidates are measured, and the largest step that resolves the motion.
 
-    ``method`` is that of the setting of the spec, whose speed determines the time span.
+    ``method`` is the method that the spec states; its speed determines the time span.
     """
     h = problem.step
     scan_steps = steps_in(min(problem.horizon, 500 * h), h)

@@ -40,9 +40,10 @@ EQUAL = 1.1
 
 @dataclass(frozen=True)
 class Finalist:
-    """A method with its proposed step, which a run over the time ``point.time`` has confirmed.
+    """A method with a step size, measured in a run over the time ``point.time``.
 
-    ``seconds`` are its processor times in seconds per unit of simulated time, one for each round of timings.
+    ``seconds`` are the processor times of the method in seconds per unit of simulated time, one for each round of
+    timings.
     """
 
     curve: Curve
@@ -250,7 +251,7 @@ def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
 
 
 def _present(tuner: Tuner, current: Curve) -> Finalist | None:
-    """Return the setting of the spec with the step of the run, measured; None if it fails or there is no time."""
+    """Measure the setting of the spec with the step of the run; None if the run fails or there is no time for it."""
     h = tuner.problem.step
     span = confirming_span(tuner, current, h) if tuner.clock.left(CONFIRMED) > 0 else 0.0
     point = tuner.measures[current.bounded](tuner.methods[current.key], h, span) if span else None
