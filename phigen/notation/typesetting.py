@@ -18,7 +18,7 @@ LINE = 31.0
 INDENT, INDENTED = "\\quad ", 1.0
 #: Fraction of a line that may stay empty if this avoids a break one level deeper inside parentheses.
 _SHORTER = 0.35
-#: Number of levels by which a break between factors counts as deeper than one before a sign at the same place.
+#: A break between factors counts as this number of levels deeper in parentheses than a break before a sign.
 _FACTORS = 4
 #: A fraction, root or exponent that is wider than this fraction of a line is written inline, so that it can be broken.
 _WIDE = 0.6

@@ -131,10 +131,10 @@ class ProductForm:
 
 @dataclass(frozen=True)
 class PullbackForm:
-    """A Poisson structure that is given in other coordinates y, named ``coordinates``, in the form ``of``.
+    """A Poisson structure that is given in other coordinates y.
 
-    ``map`` has y as expressions in the coordinates x of the spec, ``inverse`` has x as expressions in y; None if the
-    spec does not state it.
+    The names of y are ``coordinates``; the form of the structure in y is ``of``. ``map`` has y as expressions in the
+    coordinates x of the spec, ``inverse`` has x as expressions in y; it is None if the spec does not state it.
     """
 
     coordinates: tuple[str, ...]

@@ -27,7 +27,8 @@ def did_you_mean(word: str, candidates: Iterable[str], others: Mapping[str, str]
 def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = MappingProxyType({})) -> str:
     """Return the candidate that a word probably stands for; "" if there is none.
 
-    ``others`` maps words to candidates. If it has no candidate for the word, one with a similar name is chosen.
+    ``others`` maps words to candidates. For a word that is not in ``others``, a candidate with a similar name is
+    chosen.
     """
     if len(word) > limits.NAME_LENGTH:
         return ""

@@ -199,7 +199,10 @@ def expect_rows_to_average(run_: Run, declared: Declarations) -> None:
 def crossed(
     name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: AllowedNames
 ) -> Expression | None:
-    """Return the expression under ``section`` or ``stop`` (``key``), whose zeros a run finds; report a constant one."""
+    """Return the expression under ``section`` or ``stop`` (``key``), whose zeros a run finds.
+
+    An expression that is constant along every run is reported.
+    """
     section = declared.formula(raw.get(key), scope)
     constant = {n for n, p in declared.parameters.items() if p.at == "all"}
     if section is not None and not declared.incomplete and constant.issuperset(symbols_of(section)):

@@ -48,7 +48,7 @@ _DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")
 # generated functions would be called instead.
 _LIBRARY = re.compile(r"pthread_\w+|posix_\w+|inet6_\w+|argp_err_exit|acc|atomic|cnd|fanotify|inotify|mtx|res|sem|si")
 
-#: Last words of names that are refused, with the symbol that would clash. NAME_default_params has the default
+#: Last words of refused names of specs, with the symbol that would clash. NAME_default_params has the default
 #: parameters of the spec NAME; for a spec NAME_default, it would also be the type of its parameters.
 CLASHING_ENDS = {
     "default": "default_params",

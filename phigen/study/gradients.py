@@ -30,8 +30,8 @@ _FORWARD_WEIGHTS = ((1, 6.0), (2, -15 / 2), (3, 20 / 3), (4, -15 / 4), (5, 6 / 5
 #: The error of a derivative is relative to the derivative, or to this fraction of the function value if that is larger,
 #: because finite differences cannot resolve smaller derivatives.
 _LEAST = 1e-3
-#: Number of random directions in which the initial state is displaced; and largest number of coordinates for which
-#: tangent vectors are all unit vectors, instead of random vectors.
+#: _DIRECTIONS: number of random directions in which the initial state is displaced. _MOST_COLUMNS: for states with at
+#: most this number of coordinates, the tangent vectors are all unit vectors; for longer states they are random.
 _DIRECTIONS, _MOST_COLUMNS = 3, 64
 
 #: Result of a check: its name, the measured value, the limit, and the cause to report if the value exceeds the limit.

@@ -34,9 +34,10 @@ def strong_order(
 ) -> float:
     """Return the strong order of the NumPy solver; NaN if a step fails.
 
-    It is the power of the step size with which the error at the end of the same Wiener paths decreases, for the steps
-    h, h/2, h/4, … Reference solutions follow the piecewise linear interpolation of a path; they use only the vector
-    fields. ``x0`` has the shape (fields, *sizes). ``paths`` is the number of paths.
+    Errors at the end of a run are measured with the steps h, h/2, h/4, … along the same Wiener paths. The strong order
+    is the power of the step size with which these errors decrease. Reference solutions follow the piecewise linear
+    interpolation of a path; they use only the vector fields. ``x0`` has the shape (fields, *sizes). ``paths`` is the
+    number of paths.
     """
     solver = lattice_solver_of(compilation, "numpy")
     noise = compilation.program.noise

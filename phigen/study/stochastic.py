@@ -24,10 +24,11 @@ def strong_order(
 ) -> float:
     """Return the strong order of a solver.
 
-    It is the power of the step size with which the error at the end of the same Wiener paths decreases, for the steps
-    h, h/2, h/4, … An increment of a coarse step is the sum of the increments of the fine steps inside it. Reference
-    solutions follow the piecewise linear interpolation of a path, use only the vector fields, and converge to the
-    Stratonovich solution. ``steps`` is the number of steps of size h along a path.
+    Errors at the end of a run are measured with the steps h, h/2, h/4, … along the same Wiener paths. The strong order
+    is the power of the step size with which these errors decrease. An increment of a coarse step is the sum of the
+    increments of the fine steps inside it. Reference solutions follow the piecewise linear interpolation of a path, use
+    only the vector fields, and converge to the Stratonovich solution. ``steps`` is the number of steps of size h along
+    a path.
     """
     draws, finest = solver.interface.draws, steps << (LEVELS + BEYOND)
     begin = t0 if solver.interface.time else None

@@ -48,7 +48,8 @@ _SHORT = 40
 def differences(
     job: store.Job, plan: Plan, solver: Mapping[str, Any], spec: Spec, listed: Mapping[str, Floats]
 ) -> list[str]:
-    """Return phrases for messages, one for each difference of the sweep in a store from the requested sweep.
+    """Return phrases for messages, one for each difference between the sweep in a store and the requested
+    sweep.
 
     The requested sweep has the ``plan``, the ``solver`` (as `store.solver_data` describes it), the ``spec``, and the
     values ``listed`` of a file of members.

@@ -178,7 +178,7 @@ def _place(e: Expression) -> Any:
 
 
 def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
-    """Return a node without simplification, for passes that have chosen the form of the expression for code."""
+    """Return a node without simplification, for passes that have already chosen the form that the code shall have."""
     return _node(op, args, value)
 
 
@@ -536,7 +536,7 @@ def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> lis
         if any(slopes[id(a)] for a in node.args):
             for partial, a in zip(partials(node), node.args, strict=True):
                 for name, d in slopes[id(a)].items():
-                    # In sums, the most frequent nodes, the partial derivative is 1, and the product is left out.
+                    # Sums are the most frequent nodes. Their partial derivatives are 1, so the product is left out.
                     term = d if partial is ONE else mul(partial, d)
                     row[name] = add(row[name], term) if name in row else term
         slopes[id(node)] = {name: d for name, d in row.items() if not d.is_zero}

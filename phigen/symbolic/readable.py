@@ -138,7 +138,7 @@ def _written(e: Expression) -> str:
 def infix(e: Expression) -> str:
     """Return the expression as text of any length, with as few parentheses as possible.
 
-    Parsing the result gives an equal expression, but possibly another tree, unlike for the function `text`.
+    Parsing the result gives an equal expression, but possibly as another tree.
     """
 
     def wrap(part: tuple[str, int], level: int) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-#: Kinds of symbols that phigen adds: momentum (covector), variation, cotangent, initial value, gauge of a Casimir. The
-#: other symbols of a kind differ by a key, such as the name of a coordinate.
+#: Kinds of symbols that phigen adds: momentum (covector), variation, cotangent, initial value, gauge of a Casimir.
+#: Symbols of one kind differ by a key, such as the name of a coordinate.
 MOMENTUM, VARIATION, COTANGENT, INITIAL, GAUGE = "p", "v", "bar", "x0", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
 #: Kind of the entries of exp(tA) − 1 for a constant matrix A. The key is the number of the matrix, row and column.

@@ -441,7 +441,9 @@ class Tower(Arithmetic[Poly]):
         return bool(self.numerator(element) == 0)
 
     def _is_nonzero_at_a_point(self, element: Poly) -> bool:
-        """Whether an element has a nonzero value at a point; not tested for fewer generators than `MANY_GENERATORS`."""
+        """Whether an element has a nonzero value at a sample point; False if it has fewer than `MANY_GENERATORS`
+        generators.
+        """
         degrees = element.degrees()
         if sum(degrees[self._index[g.name]] > 0 for g in self.generators) < MANY_GENERATORS:
             return False

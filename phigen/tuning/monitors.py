@@ -268,7 +268,9 @@ def _largest(solver: Solver, problem: Problem, states: Floats) -> float:
 
 @dataclass(frozen=True)
 class _Run:
-    """Result of a run with one step size: largest energy error, infinite if a step failed, and processor time."""
+    """Result of a run with one step size: largest energy error and processor time. If a step failed, the error is
+    infinite.
+    """
 
     h: float
     steps: float

@@ -17,7 +17,7 @@ from phigen.spec.names import BIREALISATIONS, LOGARITHMIC
 from phigen.splitting.parts import split as split_in_parts
 from phigen.symbolic.expression import Expression, symbol
 
-#: Name that stands for a choice in the spec that no word describes: formulas, or options of a bi-realisation.
+#: Name for a choice in the spec for which there is no word: formulas, or options of a bi-realisation.
 OWN = "as in the spec"
 
 #: Orders that are tried for series without composition; for the kind canonical-euler, order 1 is tried too, which is
@@ -34,8 +34,8 @@ GAUSS_ORDERS = (4, 8, 12, 16)
 #: Word for ``kind`` of a setting with ``scheme: auto``, in which phigen chooses the scheme.
 AUTO = "auto scheme"
 
-#: Compositions that are tried for near-integrable H = A + εB, with their orders: one for each order of the error in ε
-#: and h, and two with a corrector, whose steps are the cheapest.
+#: Compositions that are tried for near-integrable H = A + εB, with their orders. Each composition without a corrector
+#: has another order of the error in ε and h. The two with a corrector have the cheapest steps.
 NEAR_INTEGRABLE = (
     ("saba-8-2", 2),
     ("wisdom-holman-17", 2),

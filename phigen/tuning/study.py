@@ -20,11 +20,12 @@ from phigen.tuning.timing import nanoseconds_per_step
 from phigen.tuning.trials import Point
 from phigen.tuning.tuner import Notify, TimeBudget, Tuner
 
-#: CONFIRMING: share of the time budget for the run that confirms a step. PATIENCE: factor by which this run may exceed
-#: its share. ATTEMPTS: number of steps that are tried for one method.
+#: The search measures methods in short runs; a longer run then confirms the step that it proposes for a method.
+#: CONFIRMING: share of the time budget for such a run. PATIENCE: the run may take this multiple of the share. ATTEMPTS:
+#: number of steps that are tried for one method.
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
-#: FINALISTS: number of best methods that are confirmed and timed. BEHIND: their largest cost relative to the best one.
-#: ROUNDS: number of rounds of timings.
+#: FINALISTS: number of methods, the best ones, whose steps are confirmed and timed. BEHIND: largest cost of these
+#: methods relative to the best one. ROUNDS: number of rounds of timings.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
 #: After this share of the time budget, methods are no longer tested in longer runs. If none has passed this test yet,
 #: the tests continue until one passes, with one step for each method.
@@ -107,7 +108,7 @@ class Tuning:
 
     @property
     def closest(self) -> tuple[Curve, Point]:
-        """The smallest measured error of a phigen method: the curve of the method, and the point."""
+        """The smallest measured error of phigen methods, as the curve of a method and the point on it."""
         measured_points = [(c, p) for c in self.curves for p in c.points if c.setting]
         return min(measured_points, key=lambda pair: pair[1].error)
 
