@@ -195,7 +195,7 @@ def leaves(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 def test_a_certificate_in_which_any_value_was_changed_is_refused() -> None:
-    """In each field one value is changed, in lists one of the entries. The digest of the certificate no longer fits."""
+    """For each field of a certificate, one value is changed. The digest in the certificate then no longer fits."""
     whole, files = certificate("pendulum")
     fields = {tuple(key for key in path if isinstance(key, str)): path for path in leaves(whole)}
     for path in fields.values():
@@ -287,7 +287,7 @@ def polynomial_of(c: dict[str, Any]) -> Any:
 
 
 def shortened(c: dict[str, Any]) -> None:
-    """Set the linear coefficient of the polynomial to 0."""
+    """Set the linear coefficient of the first polynomial in a certificate to 0."""
     numbers = [op for op in polynomial_of(c)["operations"] if op[0] == "number"]
     sorted(numbers, key=lambda op: -abs(op[1]))[1][1] = 0.0
 
@@ -456,8 +456,8 @@ def test_derivatives_are_limits_of_differences() -> None:
 @pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("name", ["pendulum_euler", "satellite_wheels"])
 def test_the_list_of_operations_in_doubles_is_the_c_bit_for_bit(name: str) -> None:
-    """Double precision arithmetic along the list of operations gives the state of the C, for steps without iterations,
-    if the C is compiled without fused multiply-add.
+    """The list of operations in a certificate, executed in double precision, gives the bits of the C. This holds for
+    steps without iterations, if the C is compiled without fused multiply-add.
     """
     c, files = certificate(name)
     (only,) = c["stages"]

@@ -76,9 +76,8 @@ def test_commands_work(phigen, in_tmp):
     phigen("new", "tumbler")
     for command in commands:
         measured, budget = None, 1
-        while (
-            not (measured and "To paste into the spec" in measured.stdout) and budget < 100
-        ):  # a busy machine measures fewer settings in the budget
+        # A busy machine measures fewer settings in the budget, so the budget is raised until tune proposes lines for the spec.
+        while not (measured and "To paste into the spec" in measured.stdout) and budget < 100:
             measured = phigen(*shlex.split(command), "--budget", str(budget))
             budget *= 5
         assert measured.exit_code == 0, measured.stderr

@@ -25,7 +25,9 @@ DIMENSIONS = {
 
 
 def constants(name, size):
-    """Return the structure constants {(i, j): {k: c}} of a named algebra, with indices from 1 and numbers as texts."""
+    """Return the structure constants of a named algebra, [E_i, E_j] = Σ c E_k, as {(i, j): {k: c}} with indices from 1
+    and numbers as texts.
+    """
     rows = named(name, size).constants.items()
     return {(i + 1, j + 1): {k + 1: str(c) for k, c in row.items()} for (i, j), row in rows}
 

@@ -42,7 +42,7 @@ def enumerate_as(formulas):
 
 def test_nambu_bracket_on_three_coordinates_is_grad_h_cross_grad_c():
     s = system("x y z", "{nambu: ['(x**2+y**2+z**2)/2']}", "x*2+y*3+z*5")
-    # ∇H × ∇C with ∇H = (2, 3, 5), ∇C = (x, y, z)
+    # The expected field is ∇H × ∇C with ∇H = (2, 3, 5) and ∇C = (x, y, z).
     x, y, z = map(symbol, s.coordinates)
     residuals = zip(s.vector_field(), (3 * z - 5 * y, 5 * x - 2 * z, 2 * y - 3 * x), strict=True)
     assert decide_zero("field", [("", f - g) for f, g in residuals]).verdict == PROVED

@@ -47,7 +47,7 @@ def test_contradicting_structure_constants_name_the_pair():
 
 
 def test_failing_jacobi_identity_names_the_triple_and_the_component():
-    # [E1, E2] = E3, [E1, E3] = E1: the double brackets of (E1, E2, E3) add up to a multiple of E3.
+    # With [E1, E2] = E3 and [E1, E3] = E1, the double brackets of (E1, E2, E3) add up to a multiple of E3 instead of 0.
     with pytest.raises(SpecError, match=r"Jacobi identity fails for \(E1, E2, E3\).*E3"):
         from_structure_constants(3, {0: {1: {2: ONE}, 2: {0: ONE}}})
 

@@ -83,7 +83,7 @@ def test_canonical_euler_axioms_hold_with_casimir_coordinates(side):
     assert [i for i, d in enumerate(realisation.displacement) if d.is_zero] == fixed
 
 
-# -- controls that must fail ---------------------------------------------------------------------------
+# -- wrong maps, which must be refuted
 
 LOG = "{log_canonical: [[0, 1], [-1, 0]]}"
 LOG3 = "{log_canonical: [[0, 1, 1], [-1, 0, 1], [-1, -1, 0]]}"

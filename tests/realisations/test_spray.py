@@ -340,7 +340,7 @@ def test_flat_spray_is_karasevs_construction(coordinates, poisson):
 
 
 def test_flat_spray_of_so3_is_the_exponential_series():
-    # α = x + ½ p×x + φ(|p|²) p×(p×x), φ(s) = 1/12 + s/720 + s²/30240 + …
+    # The expected map is α = x + ½ p×x + φ(|p|²) p×(p×x) with φ(s) = 1/12 + s/720 + s²/30240 + …
     s = system("x y z", SO3)
     realisation = realise(s, replace(FLAT, degree=6))
 

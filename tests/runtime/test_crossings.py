@@ -34,7 +34,8 @@ def test_crossings_of_the_oscillator_are_at_the_exact_times(target):
 
 
 def test_crossings_of_the_pendulum_are_at_the_exact_times():
-    # From rest at the angle a: sin(q/2) = k sn(t + K, k), k = sin(a/2); q rises through 0 at t = 3K, 7K, …
+    # For a start from rest at the angle a, sin(q/2) = k sn(t + K, k) with k = sin(a/2) and the complete elliptic
+    # integral K = K(k). So q rises through 0 at t = 3K, 7K, …
     angle = 2.0
     k = np.sin(angle / 2) ** 2
     quarter = ellipk(k)

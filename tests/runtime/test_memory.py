@@ -83,8 +83,8 @@ def alike(solver, x):
     solver.ensemble(np.tile(x, (9, 1, 1)), 0.05, 1)
 
 
-#: Calls that allocate arrays: words of the error, the target, the free memory in states of the chain with which the
-#: call is refused and with which it succeeds, and the call.
+#: Calls that allocate arrays. Each entry has words of the error, the target, the free memory with which the call is
+#: refused and the free memory with which it succeeds (both in units of one state of the chain), and the call.
 TAKING = [
     ("tangent vectors", "numpy", 499, 500, carry),
     ("the arrays of 500 tangent vectors", "c", 1338, 1340, carry),
