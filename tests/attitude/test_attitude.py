@@ -429,7 +429,7 @@ def test_so4_has_the_attitude_of_the_whole_motion():
     assert np.abs(run.attitude[-1].ravel() - exact).max() < 1e-11
 
 
-def test_what_casimirs_turn_keeps_a_matrix_orthogonal_for_a_long_time():
+def test_rotations_by_casimirs_keep_matrices_orthogonal():
     """The rotation by the Casimirs over a long time is computed by repeated doubling of a short one. The doubling must
     not also double the deviation of the matrix from orthogonality that rounding causes.
     """
@@ -470,7 +470,7 @@ def test_flows_may_turn_by_any_angle(target, h):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("case", ["body", "body, split"])
-def test_after_a_kick_a_body_turns_as_one_that_starts_there(case, target):
+def test_a_body_after_a_kick_rotates_as_in_a_new_session(case, target):
     """The Casimirs that the gauge subtracts from H rotate the body at a rate that depends on the momentum. A kick along
     the momentum changes this rate, too.
     """

@@ -455,7 +455,7 @@ def test_derivatives_are_limits_of_differences() -> None:
 
 @pytest.mark.thin(2, of_all=1)
 @pytest.mark.parametrize("name", ["pendulum_euler", "satellite_wheels"])
-def test_the_list_of_operations_in_doubles_is_the_c_bit_for_bit(name: str) -> None:
+def test_operations_in_double_precision_have_the_bits_of_the_c(name: str) -> None:
     """The list of operations in a certificate, executed in double precision, gives the bits of the C. This holds for
     steps without iterations, if the C is compiled without fused multiply-add.
     """
@@ -512,7 +512,7 @@ def test_truncation_of_a_polynomial_counts() -> None:
         assert math.cos(math.sqrt(0.5)) - 0.75 <= float(error) < 1.1 * 0.5**2 / 24
 
 
-def test_kernels_that_read_the_state_without_its_carry_are_wrong_by_it() -> None:
+def test_bound_covers_kernels_that_ignore_the_compensation_term() -> None:
     """The kernel computes the increment x − 1 without rounding error for x near 1. But it reads x without the
     compensation term (carry), while the exact map is taken at x + carry; the bound must contain this difference.
     """
@@ -523,7 +523,7 @@ def test_kernels_that_read_the_state_without_its_carry_are_wrong_by_it() -> None
         assert 2.0**-53 <= float(bound) < 1.1 * 2.0**-53
 
 
-def test_errors_of_a_stage_reach_flows_of_the_next_that_read_what_flows_before_them_moved() -> None:
+def test_errors_of_a_stage_reach_flows_of_the_next_stage() -> None:
     """The first stage gives q a large error. In the second stage a drift q += p is followed by a kick p −= 4q, which
     reads q as start + displacement. So the error of p must be four times that of q.
     """
@@ -694,7 +694,7 @@ def test_schedules_of_endless_loops_are_refused() -> None:
         _block(iter(["for (int k = 0; k < 99999999999; ++k) {", "}"]))
 
 
-def test_the_runtime_is_the_one_that_the_theorems_are_about() -> None:
+def test_the_runtime_has_the_lines_that_the_proofs_assume() -> None:
     """docs/certify.md proves properties of these functions of the C runtime. If this test fails after a change, the
     proofs on that page must be checked again.
     """

@@ -76,7 +76,7 @@ def test_commands_work(phigen, in_tmp):
     phigen("new", "tumbler")
     for command in commands:
         measured, budget = None, 1
-        # A busy machine measures fewer settings in the budget, so the budget is raised until tune proposes lines for the spec.
+        # A busy machine measures fewer settings in the budget, so the budget is raised until tune proposes a setting.
         while not (measured and "To paste into the spec" in measured.stdout) and budget < 100:
             measured = phigen(*shlex.split(command), "--budget", str(budget))
             budget *= 5

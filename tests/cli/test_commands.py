@@ -127,7 +127,7 @@ def test_show_log_canonical_s3_and_modified_hamiltonian(phigen):
     assert second["modified_hamiltonian"]["power"] == 2
 
 
-def test_terms_that_are_too_many_are_told_and_the_others_shown(phigen, in_tmp, monkeypatch):
+def test_a_series_with_too_many_terms_is_shown_up_to_the_limit(phigen, in_tmp, monkeypatch):
     """The printed series ends before the first term that is too long when expanded. Generated code does not expand
     terms: it evaluates the series as a graph of shared subexpressions.
     """
@@ -364,7 +364,7 @@ def test_demo_keeps_the_casimir_at_roundoff_up_to_the_singularity(phigen, target
     assert x8 < 1e-8 < x2 < x_rk
 
 
-def test_check_tells_what_a_target_of_the_spec_refuses(phigen, in_tmp):
+def test_check_reports_targets_that_cannot_have_the_solver(phigen, in_tmp):
     """Like ``phigen build``, ``phigen check`` reports an error for each target of the spec that cannot have the solver,
     with the place in the spec.
     """

@@ -231,7 +231,7 @@ NOISY = SWING.replace("order: 8", "order: 2\nnoise: {kick: {hamiltonian: q, ampl
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize("scheme", ["series", "splitting"])
-def test_means_are_of_members_that_made_the_steps_of_the_run(phigen, write, scheme):
+def test_means_are_over_members_with_the_steps_of_the_run(phigen, write, scheme):
     """The first of two members is the run itself. The standard error of two values is their distance from the mean, so
     the final state lies at this distance.
     """
@@ -303,7 +303,7 @@ def test_an_interrupted_run_with_given_times_goes_on_to_the_same_bytes(phigen, w
     assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
 
 
-def test_a_duration_stays_with_another_step_and_steps_do_too(phigen, write):
+def test_another_step_keeps_the_duration_or_the_number_of_steps(phigen, write):
     """With another step size, a run keeps its ``duration``, by a shorter last step if necessary, or its ``steps``. With
     a monitor the duration is in τ, where a shorter step is refused.
     """
@@ -386,7 +386,7 @@ def test_tune_measures_up_to_the_end_of_the_run(phigen, write, asked, text, name
 
 
 @pytest.mark.slow
-def test_tune_finds_an_orbit_in_tau_and_tells_lines_for_the_run(phigen, write):
+def test_tune_measures_orbits_in_tau_and_proposes_lines_for_the_run(phigen, write):
     """All methods make their steps in τ, so that their orbits can be compared at equal τ."""
     spec = write("spec.yaml", BODY.replace("stride: 5", "stop: x1 + 10"))
     result = phigen("tune", spec, "--accuracy", 0.001, "--budget", 8, "--measure", "orbit", "--json")

@@ -97,7 +97,7 @@ def test_sizes_that_do_not_fit_say_so(phigen, lattice, sizes, code, message):
     assert (result.exit_code, message in " ".join(result.stderr.split())) == (code, True)
 
 
-def test_the_lattice_of_a_system_written_out_has_what_runs_of_lattices_have(phigen, tmp_path):
+def test_runs_of_a_system_that_becomes_a_lattice_have_whole_steps(phigen, tmp_path):
     """Runs of lattices end with a whole step and store states after whole steps. So the run up to t = 3.05 becomes a
     run of 30 steps of 0.1.
     """

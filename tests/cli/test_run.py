@@ -66,7 +66,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bytes(phigen, in_tmp, name, targ
     assert sorted(p.name for p in in_tmp.iterdir()) == [f"a.{suffix}"] + ["a.csv-metadata.json"] * (suffix == "csv")
 
 
-def test_a_run_interrupted_before_its_first_step_starts_once(phigen, in_tmp):
+def test_a_run_interrupted_before_its_first_step_stores_its_start_once(phigen, in_tmp):
     """The resumed run stores the initial state once, whether the checkpoint of step 0 was written before this state was
     stored or after.
     """

@@ -180,7 +180,7 @@ def test_bits_are_those_of_the_c(free, version, tmp_path):
 
 
 @pytest.mark.parametrize("version", [2, 3])
-def test_communication_steps_that_do_not_divide_leave_the_grid_alone(free, version, tmp_path):
+def test_communication_points_between_steps_do_not_change_the_state(free, version, tmp_path):
     """One run has communication points between two steps of the solver. At the last point, which both runs have, the
     states are equal. Casimir and norm of the quaternion are constant at all points.
     """

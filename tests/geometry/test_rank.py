@@ -36,7 +36,7 @@ def test_neither_multiples_of_a_prime_nor_denominators_with_it_lower_the_rank():
     assert generic_ranks([[[number(Fraction(1, PRIMES[0] * PRIMES[1]))]]]) is None
 
 
-def test_numbers_are_looked_at_once(monkeypatch):
+def test_constant_matrices_are_evaluated_once(monkeypatch):
     """Constant matrices are evaluated at one point only. The gradients of linear Casimirs are constant, and large
     algebras have hundreds of them.
     """

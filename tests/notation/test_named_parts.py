@@ -34,7 +34,7 @@ def damped_spin():
     return compile_spec(specification)
 
 
-def test_long_flows_are_written_by_what_they_share(damped_spin):
+def test_long_flows_are_printed_with_names_for_common_parts(damped_spin):
     """The formulas of a flow are printed in lines of less than 160 characters: the images, then the names of common
     subexpressions, each defined by earlier names. Together they have the values of the flow.
     """

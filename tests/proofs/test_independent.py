@@ -257,7 +257,7 @@ def test_positive_symbols_stay_positive():
     assert decide("equality", [("", sympy.Abs(u), u)], [], "").verdict == REFUTED
 
 
-def test_the_time_is_kept_and_what_was_compared_is_said():
+def test_the_time_limit_holds_and_the_error_names_the_compared_terms():
     """The error names the terms that were compared in time. On a busy machine the time is doubled until two terms are
     compared.
     """
@@ -277,7 +277,7 @@ def test_the_time_is_kept_and_what_was_compared_is_said():
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.slow
-def test_the_time_is_kept_where_python_drops_exceptions():
+def test_the_time_limit_holds_where_python_ignores_exceptions():
     """Python ignores exceptions in destructors, and also in callbacks of weak references, which caches of expressions
     call often. The time limit must end the work nevertheless.
     """

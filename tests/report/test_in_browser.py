@@ -416,7 +416,7 @@ def test_lattices_fit_a_telephone(browser, page_path, panels):
 # -- the page as a whole
 
 
-def test_turning_by_itself_respects_reduced_motion(browser):
+def test_automatic_rotation_respects_reduced_motion(browser):
     def yaw_after_a_click():
         browser.key("0")
         browser.value("document.getElementById('viewer-turn').click()")

@@ -172,7 +172,7 @@ def test_no_crossings_at_rest_or_away_from_the_section():
     assert len(oscillator("c").section([1, 0], 0.1, 100, lambda x: x[:, 0] - 2)) == 0
 
 
-def test_steps_too_large_to_be_made_from_scratch_are_divided(monkeypatch):
+def test_steps_to_a_crossing_are_divided_if_they_do_not_converge(monkeypatch):
     """A step to a crossing begins without the predictor of the running session, so the iteration may not converge for a
     large step, which is then divided. In this test all steps above 0.03 fail, except the regular steps of 0.1.
     """

@@ -82,7 +82,7 @@ def test_vmap_is_a_loop(solver, axes):
 
 
 @pytest.mark.slow
-def test_members_share_a_parameter_in_any_way(solver):
+def test_derivatives_by_a_shared_parameter_are_sums_over_members(solver):
     """The derivative by a shared parameter I2 is the sum over the members, whether these are the leading axis of x, or
     vmap runs over x inside the derivative, or over I2 outside of it.
     """

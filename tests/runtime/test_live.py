@@ -51,7 +51,7 @@ def test_a_kick_moves_to_another_leaf_and_energy_which_are_kept_from_then_on(nam
 
 
 @pytest.mark.parametrize("target", TARGETS)
-def test_orbits_of_a_monitor_are_those_of_the_energy_after_the_kick(target):
+def test_a_kick_gives_a_monitor_the_new_energy_level(target):
     """A kick changes the energy H, and the session takes the new energy level e = −H. With the old level, K = g(H + e),
     the Hamiltonian of a step with the monitor g, would not vanish, and the orbit would have another eccentricity.
     """

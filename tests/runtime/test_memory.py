@@ -99,7 +99,7 @@ TAKING = [
 
 @pytest.mark.thin(2)
 @pytest.mark.parametrize(("words", "target", "refused", "allowed", "call"), TAKING)
-def test_vectors_members_and_ways_back_are_refused_where_they_do_not_fit(
+def test_tangent_vectors_members_and_reverse_passes_that_do_not_fit_are_refused(
     chain, words, target, refused, allowed, call, monkeypatch
 ):
     solver, x = compile(chain, target=target, tangent=True, adjoint=True), np.zeros((2, 12))
@@ -112,7 +112,7 @@ def test_vectors_members_and_ways_back_are_refused_where_they_do_not_fit(
 
 
 @pytest.mark.parametrize("steps", [0, 1])
-def test_there_is_room_for_one_step_to_go_back_or_it_is_refused(chain, steps, monkeypatch):
+def test_a_reverse_pass_without_memory_for_one_step_is_refused(chain, steps, monkeypatch):
     solver, x = compile(chain, target="c", adjoint=True), np.zeros((2, 12))
     session = solver.backend.start(x, {})
     least = session._c.trail_size(session._address, 1)

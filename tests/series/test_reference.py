@@ -187,7 +187,7 @@ def test_the_sign_has_no_derivative():
     assert Sign(v - u) == -Sign(u - v)
 
 
-def test_terms_of_even_index_are_zero_as_they_are_written():
+def test_even_terms_are_zero_without_simplification():
     """The even terms are the number 0 before any relations between functions are used. Otherwise they would be large
     expressions equal to 0, which would enter all later terms.
     """

@@ -100,9 +100,7 @@ def test_drift_tells_growth_from_oscillation():
     ("turns", "error", "telling"),
     [(25, 1e-3, True), (11, 1e-3, True), (5, 1e-3, False), (0.4, 1e-3, False), (25, 1e-15, False)],
 )
-def test_last_tenth_is_compared_with_the_first_if_that_has_seen_the_motion_and_errors_are_not_of_rounding(
-    turns, error, telling
-):
+def test_growth_is_measured_if_the_run_has_enough_periods_and_errors_above_rounding(turns, error, telling):
     t = np.linspace(0, 2 * np.pi * turns, 3001)
     assert math.isfinite(drift_of(1 + error * np.sin(t) ** 2, t).growth) == telling
 
@@ -136,7 +134,7 @@ def test_errors_are_relative_to_the_value_at_the_start_or_to_the_terms_that_canc
 
 
 @pytest.mark.parametrize("constant", [0, 5])
-def test_energy_that_is_zero_at_the_start_is_measured_in_its_terms_whatever_constant_it_has(constant):
+def test_error_of_an_energy_that_is_zero_at_the_start_is_relative_to_its_terms(constant):
     """H = p²/2 − cos q + constant at q = π/2, p = 0. Without the constant H is 0 there, and errors are relative to the
     size of its terms. With the constant they are relative to H.
     """
