@@ -50,7 +50,7 @@ def test_load_gives_a_system_that_knows_its_spec():
 
 
 @pytest.mark.parametrize("source", [str(RIGID_BODY), RIGID_BODY, spec.load(RIGID_BODY)], ids=["text", "path", "spec"])
-def test_compile_takes_what_one_has(source):
+def test_compile_accepts_files_names_specs_and_systems(source):
     assert phigen.compile(source, target="numpy", order=2).order == 2
 
 
@@ -79,7 +79,7 @@ def test_system_from_sympy_compiles_and_takes_parameters():
         solver.step([1, 1], h=0.1, k=-1)
 
 
-def test_the_order_that_nobody_asked_for_is_the_same_everywhere(tmp_path):
+def test_default_order_is_the_same_everywhere(tmp_path):
     """The default order is 4 for specs in files, for specs in Python, in the JSON schema and for a splitting."""
     text = "phigen: 1\nname: lv\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
     (tmp_path / "lv.yaml").write_text(text)
@@ -182,7 +182,7 @@ def test_error_of_load_shows_the_line(tmp_path):
 
 
 @pytest.mark.parametrize("lines", [2, 2000])
-def test_a_text_in_place_of_a_file_hears_what_reads_it(lines):
+def test_error_for_a_text_in_place_of_a_file_name_names_the_right_function(lines):
     """`phigen.compile` takes a file name. If it receives the text of a spec, the error names the function for texts,
     also for a text that is too long to be a file name.
     """

@@ -8,7 +8,7 @@ import pytest
 
 
 @pytest.mark.slow
-def test_who_asks_for_slow_tests_only_is_told_how_to_have_them_made():
+def test_selection_without_quick_tests_mentions_all():
     file = Path(__file__).with_name("test_tutorial.py")
     command = [sys.executable, "-m", "pytest", "-p", "no:xdist", "-p", "no:cacheprovider", file]
     process = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -25,13 +25,13 @@ BUILD = "from phigen.cli import main; main()"
 
 
 @pytest.mark.parametrize("name", golden.WHOLE)
-def test_whole_solver_is_what_is_made_of_the_spec(name):
+def test_golden_files_of_a_whole_solver_are_current(name):
     expected = {path.name: path.read_text(encoding="utf-8") for path in (GENERATED / name).iterdir()}
     assert golden.solver_files(name) == expected, "the file is out of date; `make golden` updates it"
 
 
 @pytest.mark.parametrize("name", golden.PARTIAL)
-def test_part_of_its_own_is_what_is_made_of_the_spec(name):
+def test_golden_file_of_a_partial_solver_is_current(name):
     current = golden.part(name, golden.solver_files(name), golden.of_whole_solvers())
     assert (golden.PARTS / f"{name}.txt").read_text(encoding="utf-8") == current, (
         "the file is out of date; `make golden` updates it"

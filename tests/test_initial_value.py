@@ -68,7 +68,7 @@ def test_an_event_ends_the_integration_where_it_is_met():
     assert (ours.sol, ours.h, ours.t[0]) == (None, 0.05, 2)
 
 
-def test_what_is_not_reached_is_told_by_the_status():
+def test_status_says_that_the_end_was_not_reached():
     lotka = phigen.solve_ivp(solver_of("lotka_volterra"), (0, 1), [-3, 5, 0.001], h=0.01)  # infinite at t = 0.2554
     assert lotka.status == -1
     assert not lotka.success

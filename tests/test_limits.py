@@ -134,7 +134,7 @@ def nested(depth):
     return spec(*PLANE, f"d{depth - 1}") + "definitions:\n" + "".join(f"  {d}\n" for d in definitions)
 
 
-def test_derivatives_keep_no_room_for_terms_that_they_do_not_have():
+def test_derivatives_reserve_no_memory_for_missing_terms():
     """A derivative of a polynomial in flint reserves memory for as many terms as the polynomial has, here 550 MB
     instead of 5. phigen must not keep this memory.
     """
@@ -152,7 +152,7 @@ def pages():
     return int(Path("/proc/self/statm").read_text().split()[0])
 
 
-def test_functions_inside_functions_are_each_looked_at_once(monkeypatch):
+def test_nested_functions_are_visited_once(monkeypatch):
     seen = []
     visit = Tower.visit
     monkeypatch.setattr(Tower, "visit", lambda self, node, args: seen.append(node) or visit(self, node, args))
@@ -187,7 +187,7 @@ def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkey
         graph_form([h], names_, [])
 
 
-def test_what_lasts_counts_how_much_of_it_is_done(monkeypatch):
+def test_long_stages_report_their_progress(monkeypatch):
     """Stages of the compiler that take long report progress, and their counts reach the announced totals."""
     monkeypatch.setattr(expression, "MANY", 20)
     monkeypatch.setattr(sampled.limits, "PROOF_PRODUCTS", 0)
@@ -221,7 +221,7 @@ def test_products_of_matrices_are_counted_as_they_would_be_made():
     assert OperationCount(true, lambda name: name == "fixed").matrix(left, repeated) == true
 
 
-def test_equal_columns_of_matrices_are_looked_at_once(monkeypatch):
+def test_equal_columns_of_matrices_are_counted_once(monkeypatch):
     work = []
     monkeypatch.setattr(OperationCount, "_total", lambda self, terms: work.append(terms))
     a, b = symbol("a"), symbol("b")

@@ -38,7 +38,7 @@ def test_a_folder_in_the_way_of_one_file_stops_all(in_tmp):
     assert tree() == {"folder": None}
 
 
-def test_what_was_begun_leaves_nothing_if_it_is_interrupted(in_tmp):
+def test_interrupted_writing_leaves_no_files(in_tmp):
     with suppress(KeyboardInterrupt), replacing(Path("a")) as file:
         file.write(b"half")
         raise KeyboardInterrupt

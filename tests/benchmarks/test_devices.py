@@ -35,7 +35,7 @@ def cells(text, title):
     return [dict(zip(table[0], row, strict=True)) for row in table[2:]]
 
 
-def test_times_of_steps_leave_out_what_all_runs_have():
+def test_times_of_steps_exclude_the_constant_part_of_a_run():
     """The time of a step excludes the part that does not depend on the number of steps. Here a run takes 0.5 s for
     copies, plus 70 ps for each member and step; 7,143 steps of a million members take another 0.5 s.
     """

@@ -157,7 +157,7 @@ def test_without_its_package_the_target_says_what_to_install(monkeypatch):
         phigen.compile("pendulum_euler", "cuda")
 
 
-def test_the_module_in_place_of_cupy_has_its_signatures():
+def test_imitation_of_cupy_has_the_signatures_of_cupy():
     """The functions of the imitation have the signatures of the installed CuPy, which can be imported without a
     graphics card.
     """

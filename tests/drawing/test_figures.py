@@ -193,7 +193,7 @@ def test_colours_stand_out_on_light_and_dark_pages(colour):
     assert (luminance(colour) + 0.05) / (dark + 0.05) > 3
 
 
-def test_without_matplotlib_the_command_that_installs_it_is_told(monkeypatch):
+def test_without_matplotlib_the_error_names_the_command_that_installs_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(MissingPackageError, match="not installed\n  hint: pip install matplotlib") as raised:
         error_figure({"a": spiral()})

@@ -228,7 +228,7 @@ def test_check_proves_that_brackets_of_logarithms_are_constant():
     assert any("log v1" in s.name and s.verdict == "proved" for s in statements)
 
 
-def test_check_proves_what_a_step_is():
+def test_check_proves_the_momentum_map_of_a_step():
     statements = examine(spec_of("kowalevski_gauss")).groups["Gauss collocation, collective"]
     assert {s.verdict for s in statements} == {"proved", "checked numerically"}
     assert any("quadratic momentum map" in s.name and s.verdict == "proved" for s in statements)

@@ -44,7 +44,7 @@ def test_positions_follow_from_momenta():
     assert (sweeps.iterated, sweeps.followers) == ((2, 3), (0, 1))
 
 
-def test_what_no_unknown_depends_on_is_not_iterated():
+def test_unknowns_that_no_other_depends_on_are_not_iterated():
     sweeps = reduced(NAMBU)
     assert (sweeps.iterated, sweeps.followers) == ((1,), (0,))
 

@@ -53,7 +53,7 @@ def test_named_algebras_have_star_algebras(family, size):
             assert algebra.commutator(algebra.basis[i], algebra.basis[j]) == expected
 
 
-def test_oscillator_algebra_has_one():
+def test_oscillator_algebra_has_a_star_algebra():
     algebra = quaternionic(OSCILLATOR)
     assert algebra is not None
     assert (algebra.dimension, algebra.sound) == (6, True)
@@ -70,7 +70,7 @@ def test_change_of_basis_with_parameters():
     assert (algebra.dimension, algebra.sound) == (4, True)
 
 
-def test_algebras_of_matrices_have_one_of_matrices():
+def test_matrix_algebras_have_star_algebras_of_matrices():
     """so(5) preserves a form on R⁵, so its star algebra is that of 5×5 matrices. sl(3) and se(4) preserve no form, so
     their star algebras act on vectors and covectors.
     """

@@ -115,7 +115,7 @@ def test_a_step_that_is_too_large_fails_soon(target):
 
 
 @pytest.mark.parametrize("target", ["c", "small"])
-def test_kicks_and_new_steps_forget_what_was_predicted(target):
+def test_kicks_and_new_step_sizes_discard_predictions(target):
     """After a kick and a change of h, a solver continues as a new solver would from the same state."""
     compilation = compiled("so4_manakov", 8, "gauss")
     method = methods(compilation)[target]

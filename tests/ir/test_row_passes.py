@@ -50,7 +50,7 @@ def test_a_sweep_reads_neighbours_in_place_and_adds_to_what_it_has_read() -> Non
         """)  # fmt: skip
 
 
-def test_a_compensated_sweep_carries_what_rounding_leaves_out() -> None:
+def test_compensated_sweep_stores_compensation_terms() -> None:
     function = built(Role.SWEEP, ir.Store(P, symbol("h")))
     expect(row_loops.sweep(function, rows(lattice("fput")), compensated=True), """
         discard coef

@@ -78,7 +78,7 @@ def test_flows_take_polynomials_near_zero():
 
 
 @pytest.mark.parametrize(("dimension", "able"), [(3, True), (40, False)])
-def test_what_needs_too_much_room_is_not_computed_in_lanes(dimension, able):
+def test_steps_that_need_too_much_memory_are_not_computed_in_lanes(dimension, able):
     names = [f"x{i}" for i in range(dimension)]
     rows = [[(j - i) if abs(i - j) == 1 else 0 for j in range(dimension)] for i in range(dimension)]
     text = f"coordinates: {names}\npoisson: {{matrix: {rows}}}\nhamiltonian: {' + '.join(f'{n}**2' for n in names)}\n"

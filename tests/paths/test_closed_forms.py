@@ -50,7 +50,7 @@ def test_paths_and_closed_form_converge_to_the_same_flow(name, order):
 
 
 @pytest.mark.parametrize("name", slow_but(["log-canonical"], ["so(3)", "log-canonical"]))
-def test_both_keep_the_casimir_to_roundoff(name):
+def test_paths_and_closed_form_keep_the_casimir_to_roundoff(name):
     text, start, h, casimir = BOTH[name]
     casimir = casimir or (lambda x: x[0] * x[2] / x[1])
     for compilation in (compile_text(text, 2), compile_paths(text, 2)):

@@ -97,7 +97,7 @@ def test_error_bars_over_draws_are_those_of_the_mean_of_the_draws():
     assert axes.get_title() == "mean(M), mean of 7 draws ± standard error"
 
 
-def test_what_is_no_observable_is_told():
+def test_unknown_observables_are_refused():
     with pytest.raises(phigen.SpecError, match=r"keep: 'mean\(kinetik\)' is not known"):
         phigen.spec.loads(DRIVEN.replace("mean(kinetic)", "mean(kinetik)"))
     with pytest.raises(phigen.SpecError, match=r"keep: 'median\(kinetic\)' is not known"):

@@ -119,7 +119,7 @@ def test_draws_do_not_depend_on_chunks(members):
 
 
 @pytest.mark.slow
-def test_what_is_kept_of_members_is_that_of_single_runs(spec, cluster, tmp_path, small_chunks):
+def test_stored_values_of_members_agree_with_single_runs(spec, cluster, tmp_path, small_chunks):
     """A sweep from the command line stores for each member what a single run gives: the final state, the largest
     errors, the number of crossings, the Lyapunov exponent, and frames.
     """
@@ -225,7 +225,7 @@ def test_runs_that_do_not_end_with_the_same_whole_step_are_refused(spec, end, ov
         ({"over": {n: {"from": 1, "to": 2, "count": 10**6} for n in ("I2", "I3")}}, "members, the limit is"),
     ],
 )
-def test_what_cannot_be_swept_is_told_before_anything_is_started(options, said):
+def test_invalid_sweeps_are_refused_before_they_start(options, said):
     with pytest.raises((TypeError, ValueError), match=said):
         phigen.sweep("rigid_body", **{"over": {"I2": [1, 2]}, **options})
 
@@ -288,7 +288,7 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped_and_another_is_refused(sp
 
 
 @pytest.mark.slow
-def test_a_full_disk_is_told_and_nothing_is_lost(spec, cluster, tmp_path, small_chunks):
+def test_full_disk_is_reported_and_no_member_is_lost(spec, cluster, tmp_path, small_chunks):
     """After two chunks workers cannot write files larger than 64 bytes: the sweep reports a full disk, and can be
     continued later.
     """
@@ -314,7 +314,7 @@ def test_a_full_disk_is_told_and_nothing_is_lost(spec, cluster, tmp_path, small_
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_goes_away_is_told(spec, tmp_path, small_chunks, monkeypatch):
+def test_loss_of_the_scheduler_is_reported(spec, tmp_path, small_chunks, monkeypatch):
     monkeypatch.setattr(clusters, "PATIENCE", "0.5s")
     patience = dask.config.set({"distributed.comm.timeouts.connect": "500ms", "distributed.scheduler.worker-ttl": None})
     local = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
@@ -332,7 +332,7 @@ def test_a_scheduler_that_goes_away_is_told(spec, tmp_path, small_chunks, monkey
 
 
 @pytest.mark.parametrize(("end", "steps"), [("duration: 6", 120), ("until: 6", 120), ("steps: 60", 60)])
-def test_another_step_leaves_a_run_as_long_as_it_is_in_time(end, steps):
+def test_another_step_size_keeps_the_duration_of_a_run(end, steps):
     run = api._run_of(specs.loads(BODY.replace("steps: 60", end)), None, None, None, 0.05, None, None)
     assert run.steps == steps
     assert end_of_its_own(SweepSettings("s", run.name), run, monitored=False) == ""
@@ -426,7 +426,7 @@ runs: {go: {sizes: [4], initial: {q: "i", p: 0}, step: 0.1, steps: 20}}
 """
 
 
-def test_only_what_determines_results_makes_another_sweep(cluster, tmp_path):
+def test_only_changes_that_determine_results_refuse_a_stored_sweep(cluster, tmp_path):
     """A stored sweep can be continued with other titles or targets in the spec, but not with other equations, sections,
     starts of lattices or listed members.
     """

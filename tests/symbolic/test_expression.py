@@ -41,7 +41,7 @@ def test_equal_formulas_are_one_node_which_is_forgotten_with_its_last_use():
     assert {*expression._NODES} <= before
 
 
-def test_order_of_terms_is_that_of_their_contents_whichever_is_made_first():
+def test_order_of_terms_depends_only_on_their_contents():
     """The order of terms in a sum depends only on their contents. Terms of equal depth are ordered by a hash of the
     content, which is computed on demand.
     """

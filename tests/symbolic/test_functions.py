@@ -48,7 +48,7 @@ def test_derivatives_are_those_of_the_value(name):
 
 
 @pytest.mark.parametrize("name", names("known"))
-def test_what_readers_see_has_the_same_value(name):
+def test_familiar_forms_have_the_same_value(name):
     (known,) = familiar([of(name)])
     assert not FUNCTIONS[known.op].own if known.op in FUNCTIONS else known.op
     for x, y in points(name):

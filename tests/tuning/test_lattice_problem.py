@@ -117,7 +117,7 @@ def test_settings_of_lattices_mean_what_is_built():
     assert (series.kind, series.composition, series.lines()[0]) == ("auto", "auto", "scheme: series")
 
 
-def test_of_a_budget_that_is_used_up_only_the_setting_of_the_spec_is_left(monkeypatch):
+def test_used_up_budget_leaves_only_the_setting_of_the_spec(monkeypatch):
     """If the time budget is used up, the setting of the spec is measured at one step, confirmed and timed once. No
     other candidate and no classical method is measured.
     """

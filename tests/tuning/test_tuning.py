@@ -445,7 +445,7 @@ def test_variants_compose_symmetric_methods_only():
 # -- building candidates
 
 
-def test_what_does_not_apply_is_told_and_what_takes_too_long_is_ended():
+def test_inapplicable_settings_are_reported_and_slow_ones_stopped():
     specification, system, _ = described("henon_heiles")
     outcomes = dict(
         build_all(specification, system, [Setting("cayley", 4), Setting("constant", 2)], time.perf_counter() + 600)
