@@ -344,9 +344,10 @@ class CompiledSplitting(_CompiledSystem):
 
     @property
     def symmetric(self) -> bool:
-        """Whether a step of size −h is the inverse of a step of size h; with a corrector only up to terms of order ε².
+        """Whether a step of size −h is the inverse of a step of size h.
 
-        ε is the size of the small part of H.
+        If the method has a corrector (a map before the first step, whose inverse follows the last), this holds only up
+        to terms of order ε², where ε is the size of the small part of H.
         """
         schedule = self.program.step.flow_schedule
         return schedule is None or len(schedule.end) < 2

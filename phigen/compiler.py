@@ -350,9 +350,9 @@ def _compile_splitting(spec: Spec, source: System, clock: _Clock) -> CompiledSpl
 def _parts(spec: Spec, system: System) -> SplitHamiltonian:
     """Return H as a sum of parts, each with its flow.
 
-    With the key ``coordinates_from``, there is a part for each body. The exact flow of a whole motion, such as a Kepler
-    motion, is not used with a monitor, or if it would be the only part and the spec names a composition. Free rigid
-    bodies may be parts if `_turns_bodies` allows it.
+    With the key ``coordinates_from``, there is a part for each body. Some parts have a known motion as a whole, such as
+    a Kepler motion. Their exact flow is not used with a monitor (dt = g dτ), nor if such a part would be the only one
+    and the spec names a composition. Free rigid bodies may be parts if `_turns_bodies` allows it.
     """
     if spec.coordinates_from:
         return split_bodies(system, spec.coordinates_from)

@@ -341,10 +341,11 @@ class _Domain:
             self._stage(self.joined - 1, far=True)
 
     def _stage(self, number: int, far: bool = False) -> None:
-        """Make one sweep (an update of sites) over all planes of this process; with ``far``, by full-range functions.
+        """Make one sweep (an update of sites) over all planes of this process; with ``far``, by full-range
+        functions.
 
-        If the sweep reads halos that are out of date, they are requested first. The inner planes are updated while the
-        halos are being received, and the outer planes after that.
+        If the sweep reads halos (copies of neighbouring planes) that are out of date, they are requested first. The
+        inner planes are updated while the halos are being received, and the outer planes after that.
         """
         stage, (first, end) = self.stages[number], self.own
         way = 1 if far or self.far else 0
@@ -366,7 +367,7 @@ class _Domain:
         """Send the planes that neighbouring processes read, and request planes from them.
 
         ``fields`` is a bit mask of the coordinates to be exchanged. Returns (request, coordinate, planes of the halo,
-        buffer) for each message to be received.
+        buffer) for each message to be received, where the halo consists of the copies of neighbouring planes.
         """
         (behind, ahead), (first, end), (reach_behind, reach_ahead) = self.beside, self.own, self.reach
         requests, sent = [], []
@@ -387,7 +388,9 @@ class _Domain:
         return requests
 
     def _received(self, requests: Sequence[tuple[Any, int, tuple[int, int], Floats]]) -> None:
-        """Wait for the requested planes of neighbouring processes, and copy them into the halos of this process."""
+        """Wait for the requested planes of neighbouring processes, and copy them into the halos, the copies of these
+        planes.
+        """
         begin = time.perf_counter()
         _mpi().Request.Waitall([request for request, *_ in requests])
         self.waiting += time.perf_counter() - begin

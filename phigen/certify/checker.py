@@ -365,9 +365,10 @@ def stalling(stage: Any, factor: Matrix, noise: Matrix, low: Matrix, high: Matri
 
 
 def step(c: Any, X: Balls, T: Ball, leaf: Any) -> tuple[Balls, Balls]:
-    """Return bounds for the errors of a step from states in X, and intervals that contain the states after the step.
+    """Return bounds for the errors of a step from states in X, and intervals that contain the states after the
+    step.
 
-    Stages are treated one after another; ``leaf`` has their boxes of unknowns.
+    The stages of the step are treated one after another; ``leaf`` has the boxes for the unknowns of each stage.
     """
     total, n = column([ZERO] * len(X)), len(X)
     for stage, part in zip(c["stages"], leaf["stages"], strict=True):

@@ -146,7 +146,7 @@ def _splitting(facts: Mapping[str, Any], n: int) -> list[Stage]:
 
 def _flows(facts: Mapping[str, Any], schedule: Sequence[Sequence[int]], n: int) -> Stage:
     listing, rows = Listing(), dict[int, list[int]]()
-    # with a monitor, the C has one more coordinate, the physical time
+    # with a monitor (dt = g dτ), the C has one more coordinate, the physical time
     extra_coordinates = max(0, 1 + max(i for pairs in facts["moves"].values() for i, _ in pairs) - n)
     zeros = [listing.input("exact", 0.0)] * extra_coordinates
     state, start = listing.inputs("x", n) + zeros, listing.inputs("start", n) + zeros

@@ -50,11 +50,10 @@ class Beginning:
 
 
 def level(interface: Interface, by_keyword: dict[str, Any]) -> float | None:
-    """Return the energy level e that the argument ``gauge`` sets for a lattice with a monitor, and remove this
-    argument.
+    """Return the energy level e that the argument ``gauge`` sets, and remove this argument.
 
-    Returns None if the argument is missing; e is then −H of the initial state. Raises `ValueError` unless the value is
-    one finite number.
+    Only lattices with a monitor (dt = g dτ) have this argument. Returns None if it is missing; e is then −H of the
+    initial state. Raises `ValueError` unless the value is one finite number.
     """
     if not interface.monitored or "gauge" not in by_keyword:
         return None

@@ -265,7 +265,7 @@ class CLatticeSession:
         return float(self._c.solver_time(self._address))
 
     def hold(self, level: float) -> None:
-        """Set the energy level e of a lattice with a monitor; by default e is −H of the initial state."""
+        """Set the energy level e of a lattice with a monitor (dt = g dτ); by default e is −H of the initial state."""
         self._set_clock(np.array([level, *self._clock()["passed"][1:]]))
 
     def _set_clock(self, clock: Floats) -> None:
@@ -286,9 +286,9 @@ class CLatticeSession:
             self._set_clock(arrays["passed"])
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes); with a monitor, the energy level e becomes −H(x).
+        """Replace the state by ``x`` (coordinates, *sizes).
 
-        Raises `BackendError` if x is not finite.
+        With a monitor (dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
         """
         self._move("set_state", x)
 

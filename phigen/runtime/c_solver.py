@@ -128,7 +128,7 @@ class CSolver:
     def _expect_parameters(self, members: Members) -> None:
         """Raise `BackendError` if no step is possible with the parameters of an ensemble that has no members.
 
-        With a monitor nothing is checked: whether the monitor is positive depends on an initial state.
+        With a monitor g (dt = g dτ) nothing is checked: whether g is positive depends on an initial state.
         """
         if hasattr(self._c, "monitor"):
             return

@@ -89,7 +89,7 @@ class LatticeSession(Protocol):
         ...
 
     def hold(self, level: float) -> None:
-        """Set the energy level e of a lattice with a monitor; by default e is −H of the initial state."""
+        """Set the energy level e of a lattice with a monitor (dt = g dτ); by default e is −H of the initial state."""
         ...
 
     def advance(self, h: float, steps: int) -> None:
@@ -117,9 +117,9 @@ class LatticeSession(Protocol):
         ...
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes); with a monitor, the energy level e becomes −H(x).
+        """Replace the state by ``x`` (coordinates, *sizes); time, step number and parameters are unchanged.
 
-        Time, step number and parameters are unchanged. Raises `BackendError` if x is not finite.
+        With a monitor (dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
         """
         ...
 
@@ -239,7 +239,7 @@ class LatticeTrajectory:
         return f"<LatticeTrajectory of ({', '.join(self.coordinates)}) on {sizes} sites: {len(self)} frames>"
 
     def _repr_html_(self) -> str:
-        """Return a table for notebooks: the first and the last frame, and the errors of conserved quantities."""
+        """Return a table for notebooks: the first and the last state, and the errors of conserved quantities."""
         return cast(str, display("page of a lattice trajectory")(self))
 
     def plot(self) -> Figure:

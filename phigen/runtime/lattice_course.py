@@ -105,9 +105,9 @@ class LatticeCourse:
         return twin
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes); with a monitor, the energy level e becomes −H(x).
+        """Replace the state by ``x`` (coordinates, *sizes).
 
-        Raises `BackendError` if x is not finite.
+        With a monitor (dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
         """
         self._anchor = {}
         self.sites.place(x)
@@ -120,8 +120,8 @@ class LatticeCourse:
     def set_parameters(self, values: Mapping[str, Any]) -> None:
         """Replace the parameters. The state, the time and the random numbers are unchanged.
 
-        Compensation terms and predictors are dropped, as at a new start. With a monitor, the energy level e becomes −H
-        of the state. Raises `StepError` if no step is possible with the parameters.
+        Compensation terms and predictors are dropped, as at a new start. With a monitor (dt = g dτ), the energy level e
+        becomes −H of the state. Raises `StepError` if no step is possible with the parameters.
         """
         sites, steps, draws = self.sites, self.steps, self.at.draws
         clock = Clock(self._clock.after(steps), self._clock.h, steps)

@@ -80,8 +80,8 @@ class LiveSession:
         return self
 
     def _go_on(self, values: dict[str, Any], begin: Clock) -> None:
-        """Store new parameters, and the clock ``begin``, by which time is counted from now on unless there is a
-        monitor.
+        """Store new parameters and the clock ``begin``. Without a monitor (dt = g dτ), time is counted by this clock
+        from now on.
         """
         self.parameters = values
         if not self.solver.interface.monitored:

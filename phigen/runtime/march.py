@@ -190,7 +190,8 @@ def _states(
     """Advance a session to ``target`` steps. Yield, for each block of steps, first step number, states, marks and
     crossings.
 
-    With a finder or with ``see_tangent``, all steps of the block are yielded, else every ``stride``-th and the last.
+    A mark (`Mark`) belongs to each state. With a finder or with ``see_tangent``, all steps of the block are yielded,
+    else every ``stride``-th and the last.
     """
     marks: list[Mark] = []
 

@@ -131,7 +131,7 @@ class NumpyLatticeSession:
         return float(sum(self._sites.clock))
 
     def hold(self, level: float) -> None:
-        """Set the energy level e of a lattice with a monitor; by default e is −H of the initial state."""
+        """Set the energy level e of a lattice with a monitor (dt = g dτ); by default e is −H of the initial state."""
         self._sites.level = level
 
     def resume(self, h: float, steps: int, arrays: Mapping[str, Any]) -> None:
@@ -144,9 +144,9 @@ class NumpyLatticeSession:
         self._tell_time()
 
     def place(self, x: Floats) -> None:
-        """Replace the state by ``x`` (coordinates, *sizes); with a monitor, the energy level e becomes −H(x).
+        """Replace the state by ``x`` (coordinates, *sizes).
 
-        Raises `BackendError` if x is not finite.
+        With a monitor (dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if x is not finite.
         """
         if not np.isfinite(x).all():
             raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())

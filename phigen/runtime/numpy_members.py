@@ -107,7 +107,7 @@ class MemberBatch:
             self._running = True
 
     def _end_run(self) -> None:
-        """Apply the inverse of the corrector, which was applied before a sequence of steps.
+        """Apply the inverse of the corrector, a map that was applied before a sequence of steps.
 
         Members whose result is not finite fail, and get back their states from before the sequence.
         """
@@ -122,7 +122,8 @@ class MemberBatch:
     def _state(self) -> tuple[Floats, Floats]:
         """Return the states of the remaining members, and the compensation terms of these states.
 
-        Between a corrector and its inverse, the inverse is applied to the states that are returned.
+        If the method has a corrector, a map before the first step, its inverse is applied to the states that are
+        returned.
         """
         if not self._running:
             return self.x, self._carry

@@ -184,9 +184,10 @@ class NumpySession:
             self._commit(*self._attempted_step())
 
     def _run_corrected(self, steps: int) -> None:
-        """Make steps, with the corrector of the method before the first step, and its inverse after the last.
+        """Make steps between the corrector of the method and its inverse.
 
-        If no step succeeds, or a corrector fails, the state is unchanged.
+        The corrector is a map before the first step; its inverse is applied after the last step. If no step succeeds,
+        or if one of these two maps fails, the state is unchanged.
         """
         start, status = (self._x, self._carry, self.steps), ""
         try:
@@ -206,8 +207,10 @@ class NumpySession:
             raise BackendError(status, self.steps, self._x.copy())
 
     def _follow(self, flows: str) -> None:
-        """Apply a corrector to the state; ``flows`` is the name of the list, in the module, of the flows of the
-        corrector.
+        """Apply the corrector of the method, or its inverse, to the state.
+
+        A corrector is a map before the first step of a run. ``flows`` is the name of the list, in the module, of its
+        flows.
         """
         x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
         if not np.isfinite(x).all():
@@ -286,7 +289,7 @@ class NumpySession:
         return session
 
     def _now(self) -> float:
-        """Return the physical time of the present state; not used with a monitor."""
+        """Return the physical time of the present state; not used with a monitor, which rescales time."""
         return self._t + (self.steps - self._counted) * self._h if self.steps > self._counted else self._t
 
     def _prepare(self, h: float) -> None:

@@ -102,7 +102,7 @@ class Session(Followed, Protocol):
     def place(self, x: Floats) -> None:
         """Replace the state by ``x`` (DIM,); time, step number and parameters are unchanged.
 
-        With a monitor, the energy level e becomes −H(x). Raises `BackendError` if ``x`` is not admissible.
+        With a monitor (dt = g dτ), the energy level e becomes −H(x). Raises `BackendError` if ``x`` is not admissible.
         """
         ...
 

@@ -484,8 +484,8 @@ class Solver(Named[Backend, Interface]):
         ``threads`` is explained at `ensemble`.
 
         Derivatives are exact to round-off. The gauge (the multiples of Casimirs that are subtracted from H) is held
-        fixed. With a monitor, the energy level e = −H(x0) is differentiated by x0. There are no derivatives of times
-        and attitudes. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
+        fixed. With a monitor (dt = g dτ), the energy level e = −H(x0) is differentiated by x0. There are no derivatives
+        of times and attitudes. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
         """
         values = arguments.together(parameters, by_keyword)
         threads = threads if threads is None else arguments.count(threads, "threads", 1)

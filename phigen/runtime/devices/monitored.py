@@ -15,7 +15,7 @@ from phigen.runtime.modules import load_module
 
 
 class MonitoredSession(DeviceLatticeSession):
-    """A session of a lattice with a monitor, whose steps are equal in τ, not in time t.
+    """A session of a lattice with a monitor (dt = g dτ): steps are equal in τ, not in time t.
 
     The device sends one number for each flow, on which the duration of the flow depends.
     """
@@ -31,7 +31,9 @@ class MonitoredSession(DeviceLatticeSession):
         """Do nothing. The energy level is computed at the end of ``__init__``, when the arrays on the device exist."""
 
     def _hold_level(self) -> None:
-        """Set the energy level e to −H of the state. Raises `BackendError` if the monitor is not positive there."""
+        """Set the energy level e to −H of the state. Raises `BackendError` if the monitor g (dt = g dτ) is not positive
+        there.
+        """
         with np.errstate(all="ignore"):
             try:
                 self._sites.level = self._monitoring._level(self._sites, None)
