@@ -1,7 +1,8 @@
 """Registry of the functions that make formulas, tables and figures of systems, compilations and trajectories.
 
 `phigen.notation` and `phigen.drawing` import the classes of systems and trajectories, so these classes cannot import
-notation and drawing. They call `display` with a name instead; the module of that name is imported on its first use.
+notation and drawing. These classes call `display` with a name instead; the module of that name is imported on its first
+use.
 """
 
 from __future__ import annotations

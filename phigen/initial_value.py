@@ -157,7 +157,7 @@ class _Problem:
     def offset(self) -> float:
         """The difference between times as the user counts them and times of the solver.
 
-        It is 0 if the Hamiltonian depends on the time; otherwise times of the solver begin at 0.
+        The difference is 0 if the Hamiltonian depends on the time; otherwise times of the solver begin at 0.
         """
         return 0.0 if self.solver.interface.time else self.begin
 

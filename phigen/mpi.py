@@ -7,10 +7,10 @@
 
     mpirun -n 8 python script.py
 
-A plane is the set of all sites with one index of the first axis. Each process has adjacent planes. It runs the C solver
-on its planes and on copies of the neighbouring planes (a halo). Before a sweep (an update of sites) that reads the
-halo, the process requests it from its neighbours by mpi4py, and works on its inner planes until the halo has arrived.
-The states are bitwise equal to those of `LatticeSolver`, for any number of processes.
+A plane is the set of all sites with one index of the first axis. Each process has adjacent planes, and runs the C
+solver on its planes and on copies of the neighbouring planes (a halo). Before a sweep (an update of sites) that reads
+the halo, the process requests it from its neighbours by mpi4py, and works on its inner planes until the halo has
+arrived. The states are bitwise equal to those of `LatticeSolver`, for any number of processes.
 """
 
 from __future__ import annotations

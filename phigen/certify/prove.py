@@ -36,7 +36,7 @@ PASSES = 8
 #: larger one it is harder to prove that the iteration contracts.
 GROWTH = 1.25
 
-#: Largest compensation term after a Gauss step, in units of 2^-53 times the largest value of the coordinate. It
+#: Largest compensation term after a Gauss step, in units of 2^-53 times the largest value of the coordinate. The term
 #: contains the rounding error of the state, and that of its change, which is at most twice as large.
 GAUSS_CARRY = 3.03
 
@@ -45,7 +45,7 @@ GAUSS_CARRY = 3.03
 LEAST_REACH = 0.05
 
 #: Addition to the bounds for the distance of iterates from the solution, relative to the unknowns, for steps whose C
-#: uses finite differences. It exceeds the distances of these differences.
+#: uses finite differences. The addition exceeds the distances of these differences.
 DIFFERENCES = arb(2) ** -20
 
 #: Largest number of bisections of a box; its volume is then 2^-40 of the volume of the domain.

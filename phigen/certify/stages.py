@@ -11,8 +11,8 @@ from flint import arb
 from phigen.certify.checker import Evaluation, RefusedError, column
 from phigen.certify.reader import GeneratedC, PathReader
 
-#: Largest compensation term after a step, in units of 2^-53 times the largest absolute value of the coordinate. It is
-#: the rounding error of one addition, at most 1 of these units, with a margin.
+#: Largest compensation term after a step, in units of 2^-53 times the largest absolute value of the coordinate. The
+#: term is the rounding error of one addition, at most 1 of these units, with a margin.
 CARRY = 1.01
 
 #: Least contraction rate that certificates assume. The C estimates this rate to decide when the iteration for a Gauss

@@ -43,7 +43,8 @@ PLATFORMS = {
 #: functions of FMI are exported, and debugging symbols are removed.
 FLAGS = ("-ffp-contract=off", "-fvisibility=hidden", "-s")
 
-#: Time limit of a compilation in seconds. It includes the first use of zig for a platform, which builds libraries.
+#: Time limit of a compilation in seconds. The limit includes the first use of zig for a platform, which builds
+#: libraries.
 TIMEOUT = 1200.0
 
 _PACKAGE = "ziglang"

@@ -182,7 +182,7 @@ def _stacked(values: Sequence[Any], stages: int | None, dtype: Any) -> Any:
 def _inverse_mixing(table: Tableau, dtype: Any) -> Any:
     """Return (μ⁻¹)ᵀ, where μ is the matrix of weights that gives the unknowns at the stages from the increments.
 
-    It converts predicted unknowns to increments.
+    This matrix converts predicted unknowns to increments.
     """
     return jnp.asarray(np.linalg.inv(np.array(table.mixing)).T, dtype)
 

@@ -48,8 +48,8 @@ def flow(
     as the weights of a network. ``parameters`` are parameters of π by name; missing ones have their defaults.
 
     f returns the last state, of the same shape (…, DIM) as x0. With a ``stride``, f returns all rows of
-    `Solver.integrate`, (…, rows, DIM). f is written in JAX and has the precision of x0. It can be used with `jit` and
-    `vmap`, on every device of XLA. It has derivatives in forward and in reverse mode, computed from the linearised
+    `Solver.integrate`, (…, rows, DIM). f is written in JAX and has the precision of x0. f can be used with `jit` and
+    `vmap`, on every device of XLA. f has derivatives in forward and in reverse mode, computed from the linearised
     equations of each step.
 
     Steps are those of ``scheme: gauss`` at this order: Poisson maps, for any H and step size, if the bracket is

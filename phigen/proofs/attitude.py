@@ -306,8 +306,9 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
         half = [total(sign * c * p[a] / 2 for a in n for m, c in algebra.bracket(a, i).items() if m == k) for k in n]
         square = [total(c * p[a] * p[b] / 4 for (j, a, b, m), c in terms.items() if (j, m) == (i, k)) for k in n]
         momenta = (beta, alpha) if group.spatial else (alpha, beta)
-        # ⟨β, (1 + P/2) E_i (1 − P/2)⟩ = ⟨α, (1 − P/2) E_i (1 + P/2)⟩ if x is the momentum in space. If x is the
-        # momentum in the body, P has the other sign.
+        # With the matrix P of p and the matrices E_i of the basis, and if x is the momentum in space:
+        # ⟨β, (1 + P/2) E_i (1 − P/2)⟩ = ⟨α, (1 − P/2) E_i (1 + P/2)⟩.
+        # If x is the momentum in the body, P has the other sign.
         first_equation = [total((h - q) * x for h, q, x in zip(half, square, momenta[0], strict=True)), momenta[0][i]]
         less = [total((-h - q) * x for h, q, x in zip(half, square, momenta[1], strict=True)), momenta[1][i]]
         residuals.append((f"E_{i + 1}", total(first_equation) - total(less)))

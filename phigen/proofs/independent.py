@@ -69,7 +69,7 @@ class Agreement:
 
 
 class OutOfTimeError(BaseException):
-    """The time limit was reached. This is a `BaseException`, so that no handler for exceptions catches it."""
+    """The time limit was reached. The class is a `BaseException`, so that no handler for exceptions catches it."""
 
 
 def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Agreement]:
@@ -113,8 +113,8 @@ def _limit(compilation: CompiledSeries, step: str, reached: int, reason: str) ->
 def time_limit(seconds: float) -> Iterator[None]:
     """Return a context that raises `OutOfTimeError` after a number of seconds.
 
-    It has no effect outside the main thread, which alone receives signals. Python drops an exception that is raised in
-    a destructor or in the callback of a weak reference, so the exception is raised again every second.
+    The context has no effect outside the main thread, which alone receives signals. Python drops an exception that is
+    raised in a destructor or in the callback of a weak reference, so the exception is raised again every second.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

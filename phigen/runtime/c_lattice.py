@@ -360,7 +360,7 @@ class CLatticeSession:
 class CLattice:
     """Solver of a lattice over the shared library of generated C files (name → text).
 
-    It is a `phigen.runtime.lattice.LatticeBackend`.
+    The object is a `phigen.runtime.lattice.LatticeBackend`.
     """
 
     target = "c"

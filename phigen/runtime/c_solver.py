@@ -2,8 +2,8 @@
 
 Besides the documented functions, this module calls ``size_t NAME_solver_size(void)``; ``size_t
 NAME_solver_steps_done(const NAME_solver *)``, the number of successful steps since ``NAME_init``; and with a monitor
-``double NAME_solver_time(const NAME_solver *)``. It reads only the first member of the solver's struct, ``x[DIM]`` of
-double or float; otherwise the struct is copied and stored as bytes.
+``double NAME_solver_time(const NAME_solver *)``. This module reads only the first member of the solver's struct,
+``x[DIM]`` of double or float; otherwise the struct is copied and stored as bytes.
 """
 
 from __future__ import annotations
@@ -291,8 +291,8 @@ class CSolver:
         """Whether the derivatives of all members can be computed together, by one call of C for each segment of the
         run.
 
-        This is not possible for several segments if H depends on the time or if Casimirs are subtracted from H: the C
-        would choose the time and the multiples of Casimirs anew at the start of each segment.
+        A common computation is not possible for several segments if H depends on the time or if Casimirs are subtracted
+        from H: the C would choose the time and the multiples of Casimirs anew at the start of each segment.
         """
         if not hasattr(self._c, "pullback_each"):
             return False

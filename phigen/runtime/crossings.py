@@ -325,7 +325,8 @@ class CrossingFinder(Generic[C]):
     ) -> tuple[float, C] | None:
         """Return the zero of g in a step, as a fraction of the step and a session at the zero; None if it is not found.
 
-        Newton's method starts from the zero on the collocation polynomial. It may not converge at a double zero of g.
+        Newton's method starts from the zero on the collocation polynomial. The iteration may not converge at a double
+        zero of g.
         """
         fraction = root(lambda at: self._on_polynomial(step, [at])[0], low, at_low, high, at_high)
         value_before, value_after = self._on_polynomial(step, [fraction - _DIFFERENCE, fraction + _DIFFERENCE])

@@ -209,8 +209,8 @@ class NumpySession:
     def _follow(self, flows: str) -> None:
         """Apply the corrector of the method, or its inverse, to the state.
 
-        A corrector is a map before the first step of a run. ``flows`` is the name of the list, in the module, of its
-        flows.
+        A corrector is a map before the first step of a run. The module has the flows of this map in a list
+        with the name ``flows``.
         """
         x, carry = self._module._followed(getattr(self._module, flows), self._stages[0], self._x, self._carry)
         if not np.isfinite(x).all():
@@ -358,7 +358,7 @@ class NumpySession:
 class NumpySolver:
     """Loaded solver in NumPy, made from the text of a generated module: a `phigen.runtime.backend.Backend`.
 
-    It needs no compiler, and makes the steps of all members of an ensemble together.
+    This solver needs no compiler, and makes the steps of all members of an ensemble together.
     """
 
     target = "numpy"

@@ -1,7 +1,7 @@
 """Provenance of files: the spec and the run from which a table, store, figure or film was made.
 
 An origin is one line of ASCII text, ``phigen origin: SPEC RUN DIGEST``, followed by the command if that is not ``phigen
-run``. It is stored in an array ``origin`` of a ``.npz``, in an attribute of a Zarr store, and in the metadata of
+run``. The line is stored in an array ``origin`` of a ``.npz``, in an attribute of a Zarr store, and in the metadata of
 figures, films and pages. A ``.csv`` cannot contain it, since some programs would read it as data. The origin of a
 ``.csv`` is in the file ``FILE-metadata.json`` beside it, where the W3C recommendation "Metadata Vocabulary for Tabular
 Data" puts metadata.

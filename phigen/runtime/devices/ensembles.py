@@ -40,8 +40,8 @@ _LOCAL_BYTES = 512
 class DeviceSolver:
     """Solver that integrates ensembles on a device, and leaves all other computations to the solver ``host``.
 
-    It is a `phigen.runtime.backend.Backend`. ``files`` contain the generated header for devices. ``defined`` are macros
-    for it: NAME_GROUP is the number of work items in a group, which does not affect results.
+    The object is a `phigen.runtime.backend.Backend`. ``files`` contain the generated header for devices. ``defined``
+    are macros for it: NAME_GROUP is the number of work items in a group, which does not affect results.
     """
 
     def __init__(
@@ -208,7 +208,8 @@ class DeviceSolver:
     def _has_common_coefficients(self, members: Members) -> bool:
         """Whether all members can share their coefficients, which are then one argument of the kernel.
 
-        This needs equal parameters, equal step sizes, and equal multiples of the Casimirs that are subtracted from H.
+        Sharing needs equal parameters, equal step sizes, and equal multiples of the Casimirs that are subtracted from
+        H.
         """
         same = np.ndim(members.h) == 0 and not any(np.ndim(v) for v in members.parameters.values())
         has_chosen_gauge = self._holds_gauge and self._gauge is None

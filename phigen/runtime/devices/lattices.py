@@ -25,8 +25,8 @@ from phigen.runtime.numpy_lattice import NumpyLattice, NumpyLatticeSession
 class DeviceLattice(NumpyLattice):
     """Solver of a lattice on a device, with a generated NumPy module for computations on the host.
 
-    It is a `phigen.runtime.lattice.LatticeBackend`. ``files`` contain the generated header for devices, and ``defined``
-    are macros for it, such as NAME_GROUP, the number of work items in a group.
+    The object is a `phigen.runtime.lattice.LatticeBackend`. ``files`` contain the generated header for devices, and
+    ``defined`` are macros for it, such as NAME_GROUP, the number of work items in a group.
     """
 
     def __init__(
