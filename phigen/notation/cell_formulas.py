@@ -1,6 +1,6 @@
-"""Formulas of a lattice, for display: those of one site (a cell) and its relations to other sites.
+"""Formulas of a lattice, for display. They describe one site (a cell) and its relations to other sites.
 
-They are brackets, the density of H, Casimirs, invariants, and the vector field at a site.
+The formulas are brackets, the density of H, Casimirs, invariants, and the vector field at a site.
 """
 
 from __future__ import annotations
@@ -91,8 +91,8 @@ def _densities(cell: Cell) -> list[tuple[str, Expression]]:
 def rates(cell: Cell) -> list[tuple[str, Expression]]:
     """Return the equations of motion at a site of a grid, as tuples of left side (a text) and right side.
 
-    For a lattice without axes (a graph, or pairs of sites), the left sides are derivatives ∂h/∂x of the densities of H,
-    of a site and of a bond or pair.
+    For a lattice without axes (a graph, or pairs of sites), the left sides are derivatives ∂h/∂x instead, where h is
+    the density of H of a site, and then that of a bond or pair.
     """
     if cell.relation == GRID:
         return [(f"d{f}/dt", e) for f, e in vector_field(cell).items()]

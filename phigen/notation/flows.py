@@ -70,9 +70,9 @@ def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expre
 
 
 def formulas(compilation: CompiledSplitting, max_terms: int | None) -> list[tuple[str, str]]:
-    """Return the parts of H, and the coordinates after the time h of each flow, as pairs of a name and a text.
+    """Return pairs of a name and a text: the parts of H, and for each flow the coordinates after the time h.
 
-    In long formulas, repeated subexpressions are called σ_1, σ_2, …; their definitions follow those formulas. The
+    In long formulas, repeated subexpressions are called σ_1, σ_2, …; their definitions follow the formulas. The
     matrices of exponentials come last.
     """
     equations: list[tuple[str, str]] = []
@@ -92,7 +92,8 @@ def formulas(compilation: CompiledSplitting, max_terms: int | None) -> list[tupl
 
 
 def schedule(step: Step) -> list[tuple[int, float]]:
-    """Return the flows of a step in their order, as pairs of the number of the part, from 0, and the fraction of h.
+    """Return the flows of a step in their order, as pairs (number of the part, fraction of h); numbers count
+    from 0.
 
     If the step is no splitting, the list is empty.
     """
@@ -103,7 +104,7 @@ def schedule(step: Step) -> list[tuple[int, float]]:
 def described(compilation: CompiledSplitting) -> dict[str, object]:
     """Return the parts of H and the flows of a step as plain data, for JSON.
 
-    ``flows`` has pairs of the number of the part, from 1, and the fraction of the step, in the order of application.
+    ``flows`` has pairs (number of the part, fraction of the step) in the order of application; numbers count from 1.
     ``generators`` has the matrices A of exponentials E = exp(hA) − 1, row by row.
     """
     parts = []

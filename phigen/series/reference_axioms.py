@@ -75,7 +75,10 @@ class _Parts:
         return self.functions.total(terms)
 
     def _part(self, f: int, degree: int, c: int | None = None) -> Any:
-        """Return the part of some degree in p of component ``f`` of (α, β) or, with ``c``, of its derivative by x_c."""
+        """Return the part of degree ``degree`` in p of component ``f`` of (α, β).
+
+        With ``c``, return the part of this degree of the derivative of the component by x_c.
+        """
         key = (f, degree, c)
         if key not in self._known:
             series_of_component = self._maps[f] if c is None else self._slopes[f][c]
@@ -89,5 +92,7 @@ class _Parts:
         return prod(powers, start=self.functions.ring(1))
 
     def _covector_slope(self, f: int, degree: int, c: int) -> Any:
-        """Return the derivative by p_c of the part of a given degree in p of component ``f`` of (α, β)."""
+        """Return the derivative by p_c of the part of degree ``degree`` in p; the part is that of component ``f`` of
+        (α, β).
+        """
         return self._part(f, degree).diff(self.functions.element(self._p[c]))

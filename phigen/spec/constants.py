@@ -9,7 +9,8 @@ from typing import Any
 from phigen.symbolic.expression import Expression, fold
 from phigen.symbolic.numeric import Numbers, evaluate_precisely
 
-#: Decimal digits of the evaluation. A double has 16; the others are reserve for cancellations inside the formula.
+#: Decimal digits of the evaluation. A double has 16; the other digits are a reserve for cancellations inside the
+#: formula.
 DIGITS = 77
 
 

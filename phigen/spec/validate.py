@@ -306,7 +306,8 @@ def _noise(raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dic
 def _gauge(
     raw: str | Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations
 ) -> str | dict[str, Expression]:
-    """Return the value of ``gauge``: auto, none, or the multiples of Casimirs, by name, that are added to H.
+    """Return the value of ``gauge``: auto, none, or the multiples of Casimirs, by name, that are subtracted
+    from H.
 
     The multiples must be constant along trajectories, so those that depend on coordinates are reported.
     """

@@ -269,7 +269,7 @@ class _Builder:
         return 1 if raw[:1] in ("'", '"') and raw[1:-1] == event.value else None
 
     def places(self, event: Any) -> tuple[tuple[int, int], ...]:
-        """Return line and column of each character of a text that is not a blank, and of the end of the text.
+        """Return line and column of each non-blank character of a text, and of the end of the text.
 
         The text spans several lines, which YAML joins by changing blanks only. If other characters differ from those in
         the file, the text has escapes; then the places are unknown, and the result is ().

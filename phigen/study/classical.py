@@ -61,7 +61,7 @@ def implicit_midpoint(f: Field, x: Floats, h: float) -> Floats:
 
 
 def dormand_prince(f: Field, x: Floats, h: float) -> Floats:
-    """Return the state after a step of size h of DOP853, the method of Dormand and Prince of order 8."""
+    """Return the state after a step of DOP853, the method of Dormand and Prince with the order 8."""
     stages: list[Floats] = []
     for row in dop853.A:
         stages.append(f(x + h * _combination(stages, row)))

@@ -1,6 +1,6 @@
 """Verification of lattices: properties of their solvers, measured on a run and on small lattices.
 
-The identity DΦ π DΦᵀ = π∘Φ of Poisson maps is measured on a lattice of a few sites, whose initial states are those of
+The identity DΦ π DΦᵀ = π∘Φ of Poisson maps is measured on a lattice of a few sites. Their initial states are taken from
 sites of the run. The identity is proved for all sizes; the measurement detects errors of the generated code.
 """
 

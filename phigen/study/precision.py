@@ -14,10 +14,10 @@ from phigen.study import classical
 from phigen.study.race import OWN, Race, Runner
 from phigen.symbolic.arrays import Floats
 
-#: Largest numbers of doublings and of halvings of the step of the run, by which step sizes are chosen.
+#: The step of the run is doubled up to COARSER times and halved up to FINER times, to obtain several step sizes.
 COARSER, FINER = 6, 7
-#: ROUNDS: number of repetitions of a measurement of time, of which the fastest counts. LEAST_SECONDS: least duration of
-#: a repetition, which may contain several runs. MOST_SECONDS: a run that takes longer is the last one of its method.
+#: ROUNDS: how often a time is measured; the shortest time counts. LEAST_SECONDS: least duration of a measurement, which
+#: may contain several runs. MOST_SECONDS: a run that takes longer is the last one of its method.
 ROUNDS, LEAST_SECONDS, MOST_SECONDS = 5, 2e-3, 0.05
 #: Only the beginning of a run is studied. These numbers of steps are tried for it in this order until the errors show
 #: the order of the solver, because the errors may grow too fast in a long run.
@@ -131,9 +131,9 @@ def error_of(state: Floats, target: Floats) -> float:
 def slope(errors: Mapping[int, float], floor: float) -> float:
     """Return the observed order, from the ``errors`` by number of steps.
 
-    The order is log₂ of the quotient of the errors with n and 2n steps, the median for the three largest n in the
-    asymptotic range, where errors are neither rounding errors nor very large. It is NaN if this range contains no such
-    n.
+    The order is log₂ of the quotient of the errors with n and 2n steps, where both errors are in the asymptotic range:
+    they are neither rounding errors nor very large. The result is the median for the three largest n; NaN if there is
+    no such n.
     """
     # If the error grows from one number of steps to the next, it is rounding error.
     floor = max([floor, *(b for a, b in pairwise(errors.values()) if a < b and a < SMALL)])

@@ -252,7 +252,7 @@ def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
 
 
 def time_checks(subject: Subject, gauge: Floats | None, *, quick: bool = False) -> Iterator[Check]:
-    """Yield the check of the observed order of systems with a monitor, from errors of the state and of the time."""
+    """Yield a check for systems with a monitor: the observed order, from errors of the state and of the time."""
     if subject.compilation.program.monitor is None or gauge is None:
         return
     main = with_time(subject.solver, subject.parameters, gauge)

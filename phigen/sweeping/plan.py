@@ -59,12 +59,12 @@ class Plan:
 
     @property
     def grid(self) -> tuple[Axis, ...]:
-        """The axes that are dimensions of the results: those with a number of values."""
+        """The axes with a number of values, which are dimensions of the results."""
         return tuple(axis for axis in self.axes if axis.size)
 
     @property
     def drawn(self) -> tuple[Axis, ...]:
-        """The axes whose values are drawn at random for each member, and which are no dimensions."""
+        """The axes without a number of values, which are no dimensions: a value is drawn at random for each member."""
         return tuple(axis for axis in self.axes if not axis.size)
 
     @property

@@ -400,6 +400,6 @@ ROOTS = {"sqrt": _library("sqrt"), "cbrt": _library("cbrt")}
 
 
 def written_in(language: str) -> dict[str, str]:
-    """Return the spelling of functions and roots in a language, for those that the generated file does not define."""
+    """Return the spelling, in a language, of the functions and roots that the generated file does not define."""
     spellings = {f.name: f.written[language] for f in FUNCTIONS.values() if language in f.written}
     return spellings | {name: forms[language] for name, forms in ROOTS.items()}

@@ -239,7 +239,8 @@ class Taylor:
         return self.ring.combine(terms)
 
     def _analytic(self, e: Expression, a: list[Any], i: int) -> Any:
-        """Return the coefficient of tⁱ of φ(a) or of a derivative of φ at a, by its power series at 0.
+        """Return the coefficient of tⁱ in f(a) by the power series of f at 0, where f is φ or a derivative of
+        φ.
 
         φ is the function of the exponential bi-realisation. ``a`` has the coefficients of the argument; `ValueError` is
         raised if the first one is not 0.

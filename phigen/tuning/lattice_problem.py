@@ -177,7 +177,8 @@ class LatticeProblem(Problem):
 def lattice_problem(
     compilation: Compilation, run: Run, settings: Mapping[str, float], step: float, span: float, direction: float
 ) -> LatticeProblem:
-    """Return the tuning problem of a run of a lattice; ``settings`` are values of parameters that replace others.
+    """Return the tuning problem of a run of a lattice; ``settings`` are parameters that replace those of the
+    run.
 
     ``step`` and ``span`` are the step size and the duration of the run, both positive; ``direction`` is 1 or −1. A run
     on a large grid is measured on a smaller grid if possible. Raises `SpecError` if the run cannot start.
