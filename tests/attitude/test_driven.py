@@ -46,7 +46,7 @@ def made(case, order=2):
 
 
 def product(a, b):
-    """Return the product of two quaternions."""
+    """Return the product of two quaternions (w, x, y, z)."""
     return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
 
 

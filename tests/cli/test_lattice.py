@@ -1,4 +1,6 @@
-"""Lattices on the command line."""
+"""Lattices on the command line: ``phigen show``, ``check`` and ``verify``, expansions, and systems that become
+lattices.
+"""
 
 from __future__ import annotations
 

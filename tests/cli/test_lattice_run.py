@@ -1,4 +1,4 @@
-"""Runs of lattices on the command line."""
+"""Runs of lattices on the command line: output, sizes, figures, pages, verification, and the continuation of runs."""
 
 from __future__ import annotations
 

@@ -75,12 +75,12 @@ class Instance:
         self.raw.exitInitializationMode()
 
     def get(self, *names):
-        """Return the values of variables."""
+        """Return the values of the variables with these names."""
         get = self.raw.getFloat64 if self.version == 3 else self.raw.getReal
         return [float(v) for v in get([self.numbers[name] for name in names])]
 
     def set(self, values):
-        """Set variables by name."""
+        """Set variables, given as a mapping of names to values."""
         put = self.raw.setFloat64 if self.version == 3 else self.raw.setReal
         put([self.numbers[name] for name in values], list(values.values()))
 

@@ -36,5 +36,5 @@ def typed(original: System) -> System:
 
 
 def texts(expressions: object) -> list[str]:
-    """Return the expressions as texts."""
+    """Return the expressions as texts, for comparison with expected formulas."""
     return [str(e) for e in expressions]  # type: ignore[attr-defined]

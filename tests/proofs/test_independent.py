@@ -144,8 +144,8 @@ def test_a_wrong_series_of_paths_is_refuted(monkeypatch):
 
 
 class Misprinted:
-    """The series of a compilation with a misprint of the paper: in S_4 the bracket {{α*H, S_2}, S_1} has the factor
-    1/3! instead of 1/4.
+    """The series of a compilation with a misprint of the paper (arXiv:2303.15883): in S_4 the bracket {{α*H, S_2}, S_1}
+    has the factor 1/3! instead of 1/4.
     """
 
     def __init__(self, compilation):

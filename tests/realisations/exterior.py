@@ -29,7 +29,7 @@ def wedge(left: Sequence[Expression], right: Sequence[Expression]) -> Form:
 
 
 def combine(*parts: tuple[Fraction | int, Form]) -> Form:
-    """Return a linear combination of forms."""
+    """Return the linear combination of forms for pairs of a coefficient and a form."""
     keys = sorted({key for _, form in parts for key in form})
     return {key: total(number(Fraction(c)) * form[key] for c, form in parts if key in form) for key in keys}
 
@@ -46,7 +46,7 @@ def pull_back(form: Form, images: Sequence[Expression], names: Sequence[str]) ->
 
 
 def differential(f: Expression, names: Sequence[str]) -> list[Expression]:
-    """Return the components of df."""
+    """Return the components of df in the variables ``names``."""
     return [derivatives([f], name)[0] for name in names]
 
 
@@ -82,12 +82,12 @@ def is_flow(images: Sequence[Expression], field: Sequence[Expression], names: Se
 
 
 def at_time(images: Sequence[Expression], time: Fraction | int) -> list[Expression]:
-    """Return the flow for a fixed time."""
+    """Return the flow ``images`` at a fixed time, in which `TIME` no longer occurs."""
     return substitute(images, {TIME: number(Fraction(time))})
 
 
 def after(outer: Sequence[Expression], inner: Sequence[Expression], names: Sequence[str]) -> list[Expression]:
-    """Return the composition outer ∘ inner."""
+    """Return the composition outer ∘ inner of two maps of the variables ``names``."""
     return substitute(outer, dict(zip(names, inner, strict=True)))
 
 

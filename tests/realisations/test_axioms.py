@@ -115,7 +115,7 @@ def test_midpoint_is_no_realisation_of_a_lie_poisson_tensor():
 
 def cayley_with(quotient: int):
     """Return the statements on α = x + p×x/quotient + (p·x)p/quotient² and β(x, p) = α(x, −p) for so(3)*. The paper
-    prints the quotient 4; the right one is 2.
+    (arXiv:2303.15883) prints the quotient 4; the right one is 2.
     """
     a, b = f"2/{quotient}", f"4/{quotient}**2"
     dot = "(p_x*x + p_y*y + p_z*z)"

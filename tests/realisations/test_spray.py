@@ -1,4 +1,6 @@
-"""Poisson sprays: the two examples of the paper step by step, closed forms, the formal series, and refusals."""
+"""Poisson sprays: the two examples of the paper (arXiv:2303.15883) step by step, closed forms, the formal series, and
+refusals.
+"""
 
 from __future__ import annotations
 
@@ -84,7 +86,7 @@ def test_symplectic_example_flow_form_and_psi():
     corrected = combine((1, canonical(2)), (-1, {(2, 3): number(1)}))
     assert equal(omega, corrected)
     assert equal(pull_back(corrected, PSI, Z), canonical(2))
-    assert same(PSI, at_time(flow, -HALF))  # ψ is the flow for time −½
+    assert same(PSI, at_time(flow, -HALF))  # ψ is the flow of the spray for the time −½
     alpha, beta = PSI[:2], after(at_time(flow, 1), PSI, Z)[:2]
     assert same(alpha, [Q - HALF * B, P + HALF * A])
     assert same(beta, [Q + HALF * B, P - HALF * A])
@@ -360,7 +362,7 @@ HAMILTONIANS = ["x**2/2 + y**2/4 + z**2/6", "x*y + z", "x*y*z + y**2", "exp(x) +
 
 
 def terms_of(s, realisation, count):
-    """Return S_1 … S_count as expressions."""
+    """Return the terms S_1 … S_count of the series of a bi-realisation, as expressions."""
     series = polynomial_series(s.hamiltonian, realisation.alpha, s.coordinates, [], count, symmetric=True)
     return [series.tower.expression(term) for term in series.terms]
 

@@ -38,7 +38,7 @@ runs:
 
 @pytest.fixture(scope="session")
 def page_path(tmp_path_factory, compiled_solvers):
-    """Return the path of the page."""
+    """Write the page of `SPEC` once, and return its path."""
     folder = tmp_path_factory.mktemp("report")
     (folder / "attack.yaml").write_text(SPEC, encoding="utf-8")
     arguments = ["report", str(folder / "attack.yaml"), "--lyapunov", "--quick", "-o", str(folder / "attack.html")]

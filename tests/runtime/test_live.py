@@ -88,7 +88,7 @@ def test_the_momentum_in_space_is_constant_after_an_impulse_too(target):
 
 
 def turned(q, v):
-    """Return the vector v of the body frame in the space frame, by the attitude quaternion q."""
+    """Return the components in space of a vector v of the body frame, for an attitude quaternion q = (w, x, y, z)."""
     t = 2 * np.cross(q[1:], v)
     return v + q[0] * t + np.cross(q[1:], t)
 

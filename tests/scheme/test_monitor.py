@@ -183,7 +183,8 @@ def test_until_and_at_without_a_monitor(target):
 def test_a_session_goes_on_from_its_bytes_with_its_time_and_its_e(kepler, target):
     backend = kepler[1][target].backend
     whole, first = backend.start(START, {}), backend.start(START, {})
-    whole.advance(STEP, 64)  # steps are made in blocks; a block that ends early may round differently
+    # Steps are made in blocks, which 32 and 64 steps fill. A block that ends early may round differently.
+    whole.advance(STEP, 64)
     first.advance(STEP, 32)
     resumed = backend.restored(first.saved(), {})
     resumed.advance(STEP, 32)

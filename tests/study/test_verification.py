@@ -200,7 +200,7 @@ def test_a_gauge_is_held_fixed():
     assert verification.failures == []
 
 
-# -- the command
+# -- phigen verify
 
 
 @pytest.fixture
