@@ -619,6 +619,17 @@ def test_a_step_whose_coefficients_are_not_finite_fails_as_one_whose_state_is_no
         assert failure.value.status == "NOT_FINITE"
 
 
+@pytest.mark.parametrize("energy", ["z + x/3", "z + x*cos(t)"])
+def test_coefficients_call_functions_that_are_defined_before(energy: str) -> None:
+    """Without a dependence of ∇H on the state, steps of the series compute φ once, with the coefficients."""
+    time = "time: t\n" if "t)" in energy else ""
+    text = f"lattice: {{axes: [i]}}\n{time}coordinates: [x, y, z]\npoisson: {{lie_algebra: so(3)}}\nscheme: series\n"
+    compilation = compile_text(f"{text}hamiltonian: {energy}\n")
+    x = np.array([[0.6] * 4, [0.0] * 4, [0.8] * 4])
+    ends = [lattice_solver_of(compilation, target).integrate(x, 0.1, 4).x[-1] for target in ("c", "numpy")]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-15)
+
+
 def test_rotors_turn_by_angles_up_to_the_limit_of_the_functions() -> None:
     text = "lattice: {axes: [i]}\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
     compilation = compile_text(f"{text}hamiltonian: p**2/2 - cos(q[i+1] - q) - cos(q)\n")

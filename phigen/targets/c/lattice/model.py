@@ -12,6 +12,7 @@ from phigen.scheme.steps import Sweeps
 from phigen.scheme.sweep_facts import band, reach
 from phigen.spec.model import Parameter, Reduction
 from phigen.spec.names import OVER, REDUCTIONS
+from phigen.targets.c import functions
 from phigen.targets.c.kernels import function
 from phigen.targets.c.language import members
 from phigen.targets.c.lattice.layout import (
@@ -179,7 +180,9 @@ def model(program: Program, step: Sweeps) -> str:
     prepare += "\n" + function(program, step.refresh) if step.refresh else ""
     allowed = are_allowed(program.parameters, members(program), graph=layout.graph)
     texts = [*(rendered(program, f"{part}.c", values) for part in ("lattice", "lattice_flows"))]
-    return "".join([*texts, commented(allowed, program), "\n", prepare])
+    unprinted = [step.equation.slope] if step.equation and not layout.slopes else ()
+    called = [f"{text}\n" for text in functions.called(program, unprinted)]
+    return "".join([*texts, commented(allowed, program), "\n", *called, prepare])
 
 
 def _constants(layout: Layout, has: Mapping[str, bool]) -> Iterator[tuple[str, int, str]]:

@@ -50,10 +50,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """
     layout = layout_of(program, step)
     loops, equation = RowLoops(layout), step.equation
-    texts = [
-        *functions.called(program, [equation.slope] if equation and not layout.slopes else ()),
-        *functions.phi_lanes(program, set(rows.small_argument)),
-    ]
+    texts = functions.phi_lanes(program, set(rows.small_argument))
     texts += functions.near_rows(program, [f for f in rows.small_argument if f not in SPECIAL])
     if step.parts:
         texts += _PartLoops(loops, rows, step.parts).texts()
