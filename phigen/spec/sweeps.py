@@ -64,6 +64,8 @@ def sweep(
     _expect_sense(result, runs.get(run), place, declared, incomplete=incomplete)
     if run in runs and (end := end_of_its_own(result, runs[run], monitored=monitored)):
         _fail((*place, "run") if raw.get("run") else place, end, declared, "give the run steps: instead")
+    if run in runs and (reason := average_obstacle(result, runs[run], monitored=monitored)):
+        _fail((*place, "keep"), reason, declared, "give the sweep a run with stride:, and without after:")
     return result
 
 
@@ -99,6 +101,22 @@ def end_of_its_own(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
         return f"{statement} after the duration {float(run.duration):.9g}"
     if run.until is not None and (monitored or varied or whole((run.until - run.start) / run.step) is None):
         return f"{statement} at the time {float(run.until):.9g}"
+    return ""
+
+
+def average_obstacle(sweep: SweepSettings, run: Run, *, monitored: bool) -> str:
+    """Return the reason why a sweep cannot average observables over the rows of this run; "" if it can.
+
+    Sweeps average over states after whole steps, or over their frames, and know the times of steps only if these are
+    equal in physical time.
+    """
+    averages = [word for word in sweep.keep if word.partition("(")[0] in STATISTICS and word.endswith(")")]
+    if not averages:
+        return ""
+    if run.is_timed and not sweep.frames:
+        return f"{averages[0]}: sweeps average over whole steps, but the rows of the run {run.name} are at given times"
+    if monitored and run.average.after is not None:
+        return f"{averages[0]}: sweeps with a monitor do not know the physical times that average: after: needs"
     return ""
 
 

@@ -22,7 +22,7 @@ from phigen.spec import limits
 from phigen.spec.model import Axis, Run, Spec, Statistic, SweepSettings
 from phigen.spec.names import KEPT, STATISTICS, SWEEP_NAMES
 from phigen.spec.runs import with_step
-from phigen.spec.sweeps import end_of_its_own
+from phigen.spec.sweeps import average_obstacle, end_of_its_own
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,6 +177,8 @@ def _sweep_of(
     sweep = replace(sweep, **changes)
     if end := end_of_its_own(sweep, run, monitored=spec.monitor is not None):
         raise ValueError(f"{end}; give the run steps instead")
+    if reason := average_obstacle(sweep, run, monitored=spec.monitor is not None):
+        raise ValueError(f"{reason}; choose a run with a stride, and without after")
     strange = [what for what in sweep.keep if what not in KEPT and Statistic.read(what, spec.recorded) is None]
     if strange:
         known = ", ".join([*KEPT, *spec.recorded, *(f"{of}({n})" for n in spec.recorded for of in STATISTICS)])

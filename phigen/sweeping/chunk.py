@@ -172,6 +172,7 @@ def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
         for sign in signs:
             along = sign * np.sign(some.h) * values
             counts[part] += ((along[:-1] < 0) & (along[1:] >= 0)).sum(axis=0)
+            counts[part] += (along[:1] == 0).any(axis=0) & (along[1:2] > 0).any(axis=0)  # a start on the section
     return counts
 
 

@@ -59,15 +59,15 @@ def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: 
     ``numbers`` are the step numbers of the rows. If all rows are before ``plan.after``, the results are NaN.
     """
     values = _values(job, solver, members, rows, numbers)
-    after = job.plan.after
-    if after is not None:
+    counted = np.ones(values.shape[:2], dtype=bool)
+    if job.plan.after is not None:
         t = members.t0 + numbers[:, np.newaxis] * members.h
-        early = np.sign(members.h) * (t - after) < 0
-        values = np.where(early[..., np.newaxis], np.nan, values)
-    counted = np.isfinite(values).sum(axis=0)
+        counted = np.sign(members.h) * (t - job.plan.after) >= 0
+    weights = counted.astype(np.float64)[..., np.newaxis]
+    values = np.where(counted[..., np.newaxis], values, 0.0)
     with np.errstate(all="ignore"):
-        mean = np.nansum(values, axis=0) / counted
-        deviation = np.sqrt(np.nansum((values - mean) ** 2, axis=0) / (counted - 1))
+        mean = values.sum(axis=0) / weights.sum(axis=0)
+        deviation = np.sqrt((weights * (values - mean) ** 2).sum(axis=0) / (weights.sum(axis=0) - 1))
     return mean, deviation
 
 

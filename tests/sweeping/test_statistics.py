@@ -164,3 +164,43 @@ def test_the_temperature_curve_of_the_page_is_that_of_theory():
         assert error < 0.01
         assert bonds.mean() == pytest.approx(expected, abs=4 * error)
     assert (data["error(bonds)"] > 0).all()
+
+
+@pytest.mark.slow  # it starts a cluster of workers
+def test_a_row_without_a_value_makes_the_mean_nan_as_in_a_run():
+    text = DRIVEN.replace("observables: {", "observables: {root: sqrt(q), ").replace("std( inside )", "mean(root)")
+    spec = phigen.spec.loads(text)
+    data, mean = phigen.sweep(spec, workers=1), phigen.averages(phigen.compile(spec).run("swing"))["root"].mean
+    assert np.isnan([mean, *data["mean(root)"].values.ravel()]).all()
+    assert np.isfinite(data["mean(kinetic)"]).all()
+
+
+@pytest.mark.slow  # it starts a cluster of workers
+def test_a_start_on_the_section_is_a_crossing_as_in_a_run():
+    """A start counts if the section function leaves 0 in the direction of the run."""
+    text = DRIVEN.replace("steps: 60", "section: q - 0.9, steps: 60").replace("kinetic, mean(kinetic)", "crossings")
+    spec = phigen.spec.loads(text)
+    data = phigen.sweep(spec, over={"p": [-0.3, 0.0, 0.3]}, workers=1, keep=["crossings"])
+    counts = [
+        len(phigen.compile(spec).section([0.9, p], 0.1, 60, lambda x, t: x[:, 0] - 0.9, t0=0.5).t)
+        for p in (-0.3, 0, 0.3)
+    ]
+    assert data.crossings.values.tolist() == counts
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ("steps: 60", "steps: 60, every: 0.4", "sweeps average over whole steps, but the rows of the run swing"),
+        ("steps: 60", "steps: 60, at: [0.7, 2]", "sweeps average over whole steps, but the rows of the run swing"),
+        ("steps: 60", "steps: 60, average: {after: 2}", "sweeps with a monitor do not know the physical times"),
+    ],
+)
+def test_averages_that_a_sweep_makes_of_other_rows_than_a_run_are_refused(old, new, reason):
+    text = DRIVEN.replace("order: 2", "order: 2\nmonitor: 1 + q**2") if "monitor" in reason else DRIVEN
+    changed = text.replace(old, new)
+    with pytest.raises(phigen.SpecError, match=rf"mean\(kinetic\): {reason}"):
+        phigen.spec.loads(changed)
+    spec = phigen.spec.loads(changed.replace('kinetic, mean(kinetic), "std( inside )"', "kinetic"))
+    with pytest.raises(ValueError, match=rf"std\(inside\): {reason}"):
+        phigen.sweep(spec, keep=["std(inside)"])
