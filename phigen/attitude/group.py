@@ -100,10 +100,11 @@ def refused(system: System, message: str, hint: str = "") -> SpecError:
 
 
 def _rotations(system: System, algebra: LieAlgebra) -> Group:
-    """Return the group for quaternions: of three coordinates that form so(3), and of the vectors that these rotate.
+    """Return the group for quaternions: three coordinates that form so(3), and the triples of coordinates that so(3)
+    rotates.
 
-    If the algebra consists of so(3) and one vector, it is se(3). Raises `SpecError` unless exactly one such triple
-    exists.
+    If the algebra consists of so(3) and one vector, it is se(3). Raises `SpecError` unless exactly one triple of
+    coordinates forms so(3).
     """
     triples = [(r, s) for r in combinations(range(algebra.dimension), 3) if (s := _sign(algebra, r))]
     if len(triples) != 1:
@@ -200,9 +201,10 @@ def _matrices(system: System, algebra: LieAlgebra, kind: str) -> Group:
 
 
 def _is_spatial(system: System, algebra: LieAlgebra) -> bool:
-    """Whether x are momenta in space: by the sign of the bracket in the spec or, without one, in the brackets of so(3).
+    """Whether x are momenta in space, not in the body.
 
-    If the algebra is given in another way, and is not so(3), x count as momenta in the body.
+    If the spec states π as a Lie algebra, its key ``sign`` decides. Otherwise the signs of the brackets decide for
+    so(3), and x of any other algebra count as momenta in the body.
     """
     if isinstance(system.form, LieAlgebraForm):
         return system.form.sign > 0

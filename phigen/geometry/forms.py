@@ -139,7 +139,8 @@ def _minor(
     """Return the determinant of the last k rows, restricted to k ``columns``, by expansion along the first of these
     rows.
 
-    ``minors`` stores the results by their columns: there are 2ⁿ of them, while an expansion without this has n! terms.
+    ``minors`` stores each determinant by its columns. There are 2ⁿ sets of columns, while an expansion that stores
+    nothing has n! terms.
     """
     if not columns:
         return ONE

@@ -1,4 +1,4 @@
-"""Systems made of a system: the system of a block of π, and a structure in other coordinates."""
+"""Systems with H = 0 that are derived from a system: for a block of π, and for a structure in other coordinates."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from phigen.symbolic.expression import ZERO
 
 
 def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> System:
-    """Return a system with H = 0 in the given coordinates, with π by ``form`` and with the parameters of ``system``.
+    """Return a system with H = 0 in the given ``coordinates``, with the π of ``form`` and the parameters of
+    ``system``.
 
-    Its Casimirs and invariants are left empty, without a search. Raises the errors of `structure`.
+    It has no Casimirs and no invariants, since none are searched for. Raises the errors of `structure`.
     """
     matrix, shape = structure(form, coordinates)
     return replace(
@@ -33,9 +34,9 @@ def part(system: System, coordinates: Sequence[str], form: PoissonForm) -> Syste
 
 
 def block_of(system: System, indices: Sequence[int]) -> System:
-    """Return the system with H = 0 of the coordinates of a block of π, given by their indices.
+    """Return a system with H = 0 for a block of π; ``indices`` are those of the coordinates of the block.
 
-    Its form of π is the one that the spec states for this block, if there is one, else the matrix.
+    If the spec states a form of π for this block, the system has this form, else the matrix of the block.
     """
     names = tuple(system.coordinates[i] for i in indices)
     if isinstance(system.form, ProductForm):

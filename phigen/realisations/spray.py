@@ -116,7 +116,7 @@ def _differences(space: Cotangent, alpha: GradedFunction) -> tuple[Expression, E
     """Return the components of α − x and β − α for one coordinate, from the parts of this component of α by degree in
     p.
 
-    It is used that β(x, p) = α(x, −p).
+    β follows from α, since β(x, p) = α(x, −p).
     """
     displacement = space.tower.combine(f for k, f in alpha.items() if k > 0)
     odd = space.tower.combine(f for k, f in alpha.items() if k % 2)

@@ -16,7 +16,7 @@ from phigen.splitting.flow import Term
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: Number of pairs of terms above which the progress display shows the decision which pairs commute.
+#: If phigen must decide for more than this number of pairs of terms whether they commute, progress is displayed.
 MIN_PAIRS_FOR_PROGRESS = 100
 
 

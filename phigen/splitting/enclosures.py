@@ -25,8 +25,8 @@ BITS = 200
 
 
 def enclosed(name: str, exponential: MatrixExponential, values: Mapping[str, float]) -> Statement:
-    """Return the statement that the matrix exp(tA) − 1 is exact up to rounding; ``values`` are those of the parameters
-    in A.
+    """Return the statement that exp(tA) − 1 is computed exactly up to rounding, for the ``values`` of the parameters in
+    A.
 
     ``name`` is the name of the statement.
     """

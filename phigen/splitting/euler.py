@@ -109,7 +109,7 @@ class Addition:
         return cls(x, factors, levels, conditions, p, r, call(AMPLITUDE, time, p, r))
 
     def sorted(self, values: Vector) -> tuple[Expression, Expression, Expression]:
-        """Return three values that belong to the axes i in the order of increasing E_i."""
+        """Return the three ``values``, one for each axis i, in the order of increasing E_i."""
         return sorted_by(self.conditions, values)
 
     def changes(self) -> list[Expression]:
@@ -124,7 +124,8 @@ class Addition:
         versine = 8 * z * power(1 + z, -2)  # 1 − C without cancellation
         losses = self._at_lowest([versine] * 3, [d * square / (1 + r) for d, r in zip(gaps_above, roots, strict=True)])
         divisor = c**2 - low * square
-        # The difference σ_j σ_k − D, without cancellation: for large D from 1 − σ_j and 1 − σ_k, which are then small.
+        # The differences σ_j σ_k − D, without cancellation. For large D they are computed from 1 − σ_j and 1 − σ_k,
+        # which are then small.
         gaps = [
             call("choose", divisor - _HALF, high * square - (u + v - u * v), sigma[j] * sigma[k] - divisor)
             for j, k, u, v in ((j, k, losses[j], losses[k]) for j, k in CYCLIC)
@@ -166,8 +167,10 @@ def _order(levels: Vector) -> tuple[Expression, Expression, Expression]:
 
 
 def sorted_by(conditions: Sequence[Expression], values: Vector) -> tuple[Expression, Expression, Expression]:
-    """Return three values that belong to the axes i in the order of increasing E_i; ``conditions`` are those of
-    `_order`."""
+    """Return the three ``values``, one for each axis i, in the order of increasing E_i.
+
+    ``conditions`` are the results of `_order`.
+    """
     second, third, last = conditions
     lower, upper = call("choose", second, *values[:2]), call("choose", second, values[1], values[0])
     low, upper_pair = call("choose", third, lower, values[2]), call("choose", third, values[2], lower)

@@ -49,7 +49,7 @@ class Solution:
 
 
 def solve(ring: Ring, motion: LinearMotion) -> Solution:
-    """Return exp(tA)w − w for the coordinates of a linear motion. Raises `NoClosedFormError`."""
+    """Return the increments exp(tA)w − w of the coordinates of a linear motion. Raises `NoClosedFormError`."""
     w = [ring.monomial(m) for m in motion.basis]
     if len(w) == 1:
         growth = ring.expression(motion.matrix[0][0] * ring.tower.variable(TIME))
@@ -77,7 +77,7 @@ def _powers(ring: Ring, a: Matrix) -> list[Matrix]:
 
 
 def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]]) -> Solution | None:
-    """Return the solution Σ t^k A^k w/k! of ẇ = Aw if a power of A vanishes, else None.
+    """Return the increments Σ_{k≥1} t^k A^k w/k! of the solution of ẇ = Aw if a power of A vanishes, else None.
 
     ``powers`` are A, A², …, and ``images`` are Aw, A²w, …
     """
@@ -94,7 +94,7 @@ def _nilpotent(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[P
 
 
 def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
-    """Return the solution of ẇ = Aw if A^{a+1} = dA^a for some d, else None.
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw if A^{a+1} = dA^a for some d, else None.
 
     ``powers`` are A, A², …, and ``images`` are Aw, A²w, …
     """
@@ -118,7 +118,7 @@ def _scaling(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 
 
 def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Poly]], a: int) -> Solution | None:
-    """Return the solution of ẇ = Aw if A^{a+2} = −cA^a for some c, else None.
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw if A^{a+2} = −cA^a for some c, else None.
 
     ``powers`` are A, A², …, and ``images`` are Aw, A²w, …
     """
@@ -140,10 +140,10 @@ def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 def _without_quotients(
     ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], c: Poly, a: int
 ) -> Solution | None:
-    """Return the solution of ẇ = Aw with A^{a+2} = −cA^a by entire functions of s = ct², without dividing by c; None if
-    there is none.
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = −cA^a, without dividing by c.
 
-    sin and 1 − cos of the angle √s are computed from functions of half the angle.
+    They are computed by entire functions of s = ct². Returns None if there is no such form. sin and 1 − cos of the
+    angle √s are computed from functions of half the angle.
     """
     t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
     if a == 1:
@@ -156,7 +156,8 @@ def _without_quotients(
 
 
 def _solution_of_scaled_matrix(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Expression) -> Solution:
-    """Return the solution of ẇ = Aw with A³ = −cA by entire functions of ``s`` = ct².
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A³ = −cA, by entire functions of ``s``
+    = ct².
 
     A is written as fM with a factor f that does not depend on the state, and f multiplies the time. M²w is computed as
     M times Mw where that needs fewer operations than the entries of M², as for cross products.
@@ -181,10 +182,11 @@ def _static_factor(ring: Ring, a: Matrix) -> Poly:
 def _circular(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """Return the solution of ẇ = Aw with A^{a+2} = −e²A^a, by sin and cos of θ = te, the ``angle``.
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = −e²A^a, for a = 1 or 2.
 
-    The matrix exp(tA) − 1 is sin(θ)A/e + (1 − cos θ)A²/e² for a = 1, and tA + (1 − cos θ)A²/e² + (θ − sin θ)A³/e³ for a
-    = 2. ``first`` is Aw, ``units`` are the quotients of A^k w and e^k.
+    Let θ = te be the ``angle``. The matrix exp(tA) − 1 is sin(θ)A/e + (1 − cos θ)A²/e² for a = 1, and tA + (1 − cos
+    θ)A²/e² + (θ − sin θ)A³/e³ for a = 2. ``first`` is Aw. ``units`` are the vectors A^k w/e^k that these formulas
+    contain: for k = 1 and 2 if a = 1, for k = 2 and 3 if a = 2.
     """
     sine, versine = call("sin", angle), call("versin", angle)
     if a == 1:
@@ -197,9 +199,10 @@ def _circular(
 def _hyperbolic(
     first: Sequence[Expression], units: Sequence[Sequence[Expression]], angle: Expression, a: int
 ) -> Solution:
-    """Return the solution of ẇ = Aw with A^{a+2} = e²A^a, by sinh and cosh of θ = te, the ``angle``.
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw with A^{a+2} = e²A^a, for a = 1 or 2.
 
-    cosh θ − 1 is written as 2 sinh²(θ/2). ``first`` is Aw, ``units`` are the quotients of A^k w and e^k.
+    The formulas are those of `_circular` with sinh and cosh in place of sin and cos; cosh θ − 1 is written as 2
+    sinh²(θ/2). The arguments are those of `_circular` too.
     """
     s, c = call("sinh", angle / 2), call("cosh", angle / 2)
     if a == 1:
@@ -241,8 +244,9 @@ def _ratio(ring: Ring, a: Matrix, b: Matrix, guess: Matrix) -> Poly | None:
 
 
 def _quotients(ring: Ring, elements: Sequence[Poly], divisor: Poly) -> list[Expression] | None:
-    """Return the quotients of the elements and the divisor as expressions; None unless the ring contains all of
-    them."""
+    """Return the elements, each divided by the ``divisor``, as expressions; None unless the ring contains all
+    quotients.
+    """
     divided = [divmod(e, divisor) for e in elements]
     return (
         None
@@ -261,8 +265,7 @@ class _Root:
 
 
 def _root(ring: Ring, c: Poly) -> _Root | None:
-    """Return c written as plus or minus a square, of an element of the ring times the square root of a number; else
-    None."""
+    """Return c as ±(scale·element)²; None if c does not have this form. The scale is the square root of a number."""
     content, factors = c.factor()
     if any(multiplicity % 2 for _, multiplicity in factors):
         return None

@@ -1,7 +1,8 @@
 """The exact flow of a part of H, as increments of the coordinates.
 
-A part is a sum of terms that commute with one another. If its equations of motion have a closed form, this is the flow.
-Otherwise the flow is the composition of the flows of the terms, whose order does not matter since they commute.
+A part is a sum of terms that commute with one another. If its equations of motion can be solved as a whole, their
+solution is the flow. Otherwise the flow is the composition of the flows of the terms; their order does not matter,
+since the terms commute.
 """
 
 from __future__ import annotations
@@ -29,9 +30,10 @@ from phigen.symbolic.tower import Poly, Tower
 #: Motions whose flows have formulas of their own, which are proved by identities in independent symbols.
 Motion = KeplerMotion | RelativeMotions | EulerMotion
 
-#: Methods for linear equations ẇ = Aw; each value includes those before it. CLOSED_FORMS: formulas for exp(tA).
-#: EXPONENTIALS: matrices exp(tA) that are computed as numbers before the steps. SMALL_MATRICES: formulas for exp(tA) if
-#: A depends on the state and has at most four rows.
+#: Methods for linear equations ẇ = Aw, in the order in which they are tried. A function with such a method as its
+#: argument tries this method and those before it. CLOSED_FORMS: formulas for exp(tA). EXPONENTIALS: matrices exp(tA)
+#: that are computed as numbers before the steps. SMALL_MATRICES: formulas for exp(tA) if A depends on the state and has
+#: at most four rows.
 CLOSED_FORMS, EXPONENTIALS, SMALL_MATRICES = range(3)
 
 #: Words for reports: a linear motion by a matrix exponential that is computed before the steps.
@@ -166,10 +168,12 @@ def composed(coordinates: Sequence[str], flows: Sequence[Flow]) -> Flow:
 
 
 def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False, methods: int = CLOSED_FORMS) -> Flow | str:
-    """Return the flow of a sum of terms, from its equations of motion as a whole, or the reason why there is none.
+    """Return the flow of a sum of terms, from its equations of motion as a whole, or the reason why there is
+    none.
 
-    ``linear`` admits only linear equations, whose solutions have full relative precision even for small coordinates; a
-    difference from a constant sum would not. ``methods`` is `CLOSED_FORMS`, `EXPONENTIALS` or `SMALL_MATRICES`.
+    ``linear`` admits only linear equations, since their solutions have full relative precision even for small
+    coordinates. By other methods a coordinate may be the difference of a constant sum and other coordinates, which has
+    lower relative precision. ``methods`` is `CLOSED_FORMS`, `EXPONENTIALS` or `SMALL_MATRICES`.
     """
     g = total(t.expression for t in terms)
     field = ring.field(ring.tower.combine(t.element for t in terms))

@@ -37,7 +37,7 @@ def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
 
 
 def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms with those summed whose vector fields have monomials that cancel.
+    """Return the terms, with sums in place of terms whose vector fields have monomials that cancel each other.
 
     Returns None if there are no such terms, or if no sum has a flow.
     """
@@ -60,8 +60,9 @@ def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
 
 
 def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
-    """Return a list with the sum of several terms as its only element; None if there is only one term, or no flow of
-    the sum."""
+    """Return a list with one element, the sum of several terms. Returns None if there is only one term, or if the sum
+    has no flow.
+    """
     if len(group) == 1:
         return None
     sum_of_terms = Term(total(t.expression for t in group), ring.tower.combine(t.element for t in group))
@@ -79,10 +80,10 @@ def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:
 
 
 def _with_linear(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms with those summed that are linear in the coordinates of an algebra, times constants of the
-    motion.
+    """Return the terms, with a sum in place of all linear terms.
 
-    Returns None if all these terms commute with each other, or if their sum has no flow.
+    A linear term is a coordinate of a Lie algebra times factors that are constant along its flow (`_is_linear`).
+    Returns None if all linear terms commute with each other, or if their sum has no flow.
     """
     algebra = _algebra(ring)
     linear: list[Term] = []

@@ -44,7 +44,7 @@ def reduced(ring: Ring, field: Sequence[Poly]) -> Reduced | None:
         return None
     forms: dict[int, Expression] = {}
     integrals: dict[str, Expression] = {}
-    for relation in relations:  # its last coordinate has the factor 1, and no other relation has it
+    for relation in relations:  # the last coordinate has the factor 1, and is in no other relation
         pivot = moving[max(relation)]
         other_terms = total(
             number(rational(c)) * symbol(ring.coordinates[moving[k]]) for k, c in relation.items() if moving[k] != pivot

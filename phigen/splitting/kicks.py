@@ -25,8 +25,9 @@ from phigen.splitting.terms import hamiltonian_terms
 from phigen.symbolic.expression import gradient, symbol, symbols_of
 from phigen.symbolic.tower import Poly
 
-#: Largest number of monomials of {V, {V, T}} with which phigen tests whether it commutes with V, and makes a modified
-#: kick. The second number is for expressions with roots, for which tests for zero take much longer.
+#: Largest number of monomials of {V, {V, T}} for which phigen tests by brackets whether V commutes with {V, {V, T}},
+#: and for which it makes a modified kick. The second number is for expressions with roots, for which tests for zero
+#: take much longer.
 MOST_MONOMIALS, MOST_WITH_ROOTS = 200, 40
 
 

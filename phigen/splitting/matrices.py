@@ -87,7 +87,9 @@ class StaticSolution:
 
 
 def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
-    """Return the solution exp(tA)w − w of linear equations ẇ = Aw, if A can be computed before the steps; else None."""
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw, if A can be computed before the steps; else
+    None.
+    """
     rows = _static_rows(ring, motion)
     if rows is None:
         return None

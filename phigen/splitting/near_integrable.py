@@ -30,7 +30,7 @@ SMALL = 0.02
 
 
 def with_motions(ring: Ring, terms: Sequence[Term], *, rigid: bool) -> list[Term] | None:
-    """Return the terms of H with each Kepler motion as a single term; these terms come first. None if there are no
+    """Return the terms of H with each Kepler motion as a single term, first in the list. Returns None if there are no
     motions.
 
     If ``rigid``, free rigid bodies are single terms too. Only terms of one body belong to its motion: (p_1 + p_2)² is
@@ -49,9 +49,9 @@ def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> i
     """Return the index of the part εB of a near-integrable H = A + εB; None if H does not consist of a large and a
     small part.
 
-    If parameters are declared small, εB is the part whose terms have such a factor. This rule does not apply if a small
-    parameter is also a divisor, such as the small mass in p²/2m. Without the rule, the part without Kepler motions and
-    rigid bodies is εB if its coefficients are small.
+    If parameters are declared small, εB is the part whose terms have such a parameter as a factor. This rule does not
+    apply if a small parameter is also a divisor, such as the small mass in p²/2m. Where the rule does not apply, εB is
+    the part without Kepler motions and rigid bodies, provided that its coefficients are small.
     """
     if len(parts) != 2:
         return None

@@ -20,8 +20,8 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Poly
 
-#: Largest number of companions whose multiples are subtracted from terms: Casimirs and similar functions, see
-#: `phigen.splitting.regrouping`.
+#: Largest number of companions whose multiples are subtracted from terms. Companions are Casimirs and similar
+#: functions; see `phigen.splitting.regrouping`.
 MAX_COMPANIONS = 3
 
 
@@ -73,7 +73,7 @@ def split(system: System, *, motions: bool = True, rigid: bool = True) -> SplitH
         if rank < least:
             best, least = SplitHamiltonian(flows, small=small_index), rank
         if best and best.small is not None:
-            break  # no division is better than a large and a small part
+            break  # a division into a large and a small part is always preferred
     if best is None:
         raise _refusal(system, refused)
     return (
@@ -133,10 +133,11 @@ def _candidates(
 
 
 def _with_whole_summands(ring: Ring, listed: Sequence[Expression]) -> list[Term] | None:
-    """Return the terms of H, in which summands that have a flow as a whole are not expanded; None if there are no such
-    summands.
+    """Return the terms of H. A summand that has a flow as a whole is one term, and is not expanded into
+    monomials.
 
-    An example on so(3) is (v·m)²: it rotates m about v, while its monomials do not commute with each other.
+    An example on so(3) is (v·m)²: it rotates m about v, while its monomials do not commute with each other. Returns
+    None if there are no such summands.
     """
     whole_terms: list[Term] = []
     remaining: list[Expression] = []
@@ -175,8 +176,9 @@ def _without_companions(system: System, conflicts: Conflicts, terms: list[Term])
 
 
 def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
-    """Return the flows, in which two parts are merged into one if the equations of their sum are linear with a closed
-    form."""
+    """Return the flows after merging parts: two parts become one if the equations of their sum are linear with a closed
+    form.
+    """
     for i, first in enumerate(flows):
         for second in flows[i + 1 :]:
             if first.has_motion or second.has_motion:

@@ -23,8 +23,8 @@ from phigen.splitting.terms import joined, monomial_terms
 from phigen.symbolic.expression import Expression, total
 from phigen.symbolic.tower import Poly
 
-#: Largest number of coordinates that are closed under brackets for which a search for Casimirs of these brackets is
-#: made.
+#: Largest number of coordinates of a sub-bracket (`_companions`) up to which Casimirs of the sub-bracket are searched
+#: for.
 MOST_COORDINATES = 8
 
 
@@ -60,8 +60,8 @@ def _companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> 
     """Yield functions C whose multiples may be subtracted from terms: Casimirs of π, and quadratic Casimirs of
     sub-brackets.
 
-    A sub-bracket is that of the smallest set of coordinates which is closed under brackets and contains those of two
-    terms that do not commute.
+    Two terms that do not commute have a sub-bracket. It is the bracket of certain coordinates: the smallest set that
+    contains the coordinates of both terms and is closed under brackets.
     """
     ring, candidates = conflicts.ring, list(system.casimirs.values())
     closures: set[tuple[int, ...]] = set()
@@ -95,8 +95,10 @@ def _casimirs_within(system: System, inside: Sequence[int]) -> list[Expression]:
 
 
 def by_blocks(system: System, ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
-    """Return the terms, in which those are summed that depend on the same two or more blocks of π; None if there are
-    none."""
+    """Return the terms, with a sum in place of all terms that depend on the same two or more blocks of π.
+
+    Returns None if there are no such terms.
+    """
     block_of = {i: k for k, block in enumerate(blocks(system.coordinates, system.poisson)) for i in block}
     groups: dict[tuple[int, ...], list[Term]] = {}
     for n, term in enumerate(terms):

@@ -1,9 +1,10 @@
-"""The solution exp(tA)w − w of linear equations with at most four rows, by the theorem of Cayley and Hamilton.
+"""The increments exp(tA)w − w of the solution of linear equations with at most four rows, by the theorem of Cayley and
+Hamilton.
 
-It is used if no shorter closed form is known. The entries of A may depend on coordinates that are constant along the
-flow. If A⁴ = Σ_{j<4} a_j A^j, the increments are Σ F_k A^k w, where the F_k are the functions of t and the a_j in
-`phigen.symbolic.remainders`. A matrix with three rows is extended by zeros. For two rows, let τ be the trace of A and B
-= A − τ/2. Then B² is a number −d, and exp(tA) = e^{τt/2}(cos √(dt²) + B sin(√(dt²))/√d).
+The formulas are used if no shorter closed form is known. The entries of A may depend on coordinates that are constant
+along the flow. If A⁴ = Σ_{j<4} a_j A^j, the increments are Σ F_k A^k w, where the F_k are the functions of t and the
+a_j in `phigen.symbolic.remainders`. A matrix with three rows is extended by zeros. For two rows, let τ be the trace of
+A and B = A − τ/2. Then B² is a number −d, and exp(tA) = e^{τt/2}(cos √(dt²) + B sin(√(dt²))/√d).
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ Matrix = Sequence[Sequence[Poly]]
 
 
 def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
-    """Return the solution exp(tA)w − w of linear equations ẇ = Aw, or None if A has more than `MOST_ROWS` rows."""
+    """Return the increments exp(tA)w − w of the solution of ẇ = Aw; None if A has more than `MOST_ROWS` rows."""
     rows = len(motion.basis)
     if rows > MOST_ROWS:
         return None
@@ -51,7 +52,9 @@ def solve(ring: Ring, motion: LinearMotion) -> Solution | None:
 
 
 def _of_two_rows(ring: Ring, motion: LinearMotion) -> Solution:
-    """Return the solution for two rows by functions of s = dt²; 1 − cos √s is computed as s sinroot(s/4)²/2."""
+    """Return the increments for a matrix A with two rows, by functions of s = dt²; 1 − cos √s is computed as s
+    sinroot(s/4)²/2.
+    """
     (a, b), (c, d) = motion.matrix
     half_trace = ring.tower.constant(Fraction(1, 2)) * (a + d)
     w = [ring.monomial(m) for m in motion.basis]

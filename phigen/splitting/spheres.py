@@ -70,7 +70,7 @@ class _Sphere:
         """
         zero, n = self.ring.tower.zero, range(self.size)
         a = [[zero if i == j else zero - rates[i].get(self._monomial(j, j, j), zero) for j in n] for i in n]
-        for i in n[1:]:  # a number added to the diagonal has no effect, so a[0][0] is 0
+        for i in n[1:]:  # a number added to the diagonal has no effect; it is chosen such that a[0][0] = 0
             a[i][i] = rates[0].get(self._monomial(0, i, i), zero)
         if any(a[i][j] != a[j][i] for i in n for j in n) or not self._moves(rates, a, [(j,) for j in n]):
             return None
@@ -79,7 +79,7 @@ class _Sphere:
             minors = (m[i][j] * m[k][h] - m[i][h] * m[k][j] for i in n for k in n[:i] for j in n for h in n[:j])
             pivot = next((k for k in n if m[k][k] != 0), None)
             if pivot is not None and all(e == 0 for e in minors):
-                common = reduce(lambda p, q: p.gcd(q), m[pivot])  # its gcd, such as a strength, may be 0
+                common = reduce(lambda p, q: p.gcd(q), m[pivot])  # divided out, since a common factor may be 0
                 v = [self.ring.expression(e / common) for e in m[pivot]]
                 return self._drawn(v, total(self.ring.expression(m[i][i]) for i in n))
         return None

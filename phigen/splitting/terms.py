@@ -59,7 +59,7 @@ def monomial_terms(ring: Ring, element: Poly) -> list[Term]:
 
 
 def joined(ring: Ring, terms: Iterable[Term]) -> list[Term]:
-    """Return the terms, in which those that depend on the same set of coordinates are summed.
+    """Return the terms, with a sum in place of all terms that depend on the same set of coordinates.
 
     Constants are added to the first of the sums.
     """
