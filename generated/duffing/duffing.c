@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 0e1c920cf911b283bfc55b59ddbf71811fc3aefeb090cca01f66bf3037566f26
+ * body-sha256: 5a66af85252e20380b3f6c273bcaeefa8007931444d9229e5969f3534eca064e
  */
 #include "duffing.h"
 #include <float.h>
@@ -21,7 +21,7 @@ const duffing_params duffing_default_params = { 0.1, 1.2 };
 
 enum { duffing_PREPARED = 22 };       /* first coefficients, which depend on params and h only */
 enum { duffing_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
-#define duffing_TOLERANCE 1e-20       /* largest accepted error of a solution, relative to it */
+#define duffing_TOLERANCE 1e-20       /* iteration ends at an estimated relative error below this */
 
 /* Midpoint of the step, at which time-dependent coefficients are evaluated. */
 #define duffing_middles 0.5
@@ -137,7 +137,7 @@ void duffing_vector_field(const duffing_params *params, double t, const double x
     out[1] = q + A * cos(omega * t) - q * (q * q);
 }
 
-#define duffing_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define duffing_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int duffing_finite(const double *values, int count)
@@ -194,7 +194,7 @@ static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[d
 }
 
 /* ---- Predictors ---- */
-#define duffing_REACH 4.0 /* largest distance from the last value, relative to it */
+#define duffing_REACH 4.0 /* largest relative distance of a prediction from the last value */
 
 /* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
    there the equation of a step has solutions unrelated to the motion. */
@@ -232,8 +232,8 @@ static void duffing_remember(duffing_history *history, const double value[duffin
     if (history->count < duffing_DIFFERENCES) ++history->count;
 }
 
-#define duffing_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
-#define duffing_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
+#define duffing_PLAUSIBLE 1.5         /* relative length of steps above which the energy is checked */
+#define duffing_MAX_ENERGY_CHANGE 0.5 /* accepted relative change of energy if it is checked */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -258,7 +258,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define duffing_FLOOR 1e-6 /* least size of a component of y, as a fraction of the largest */
+#define duffing_FLOOR 1e-6 /* components of y count as at least this share of the largest */
 
 #define duffing_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0b08f9fce42574d0455c3f8f4191a08353071d27c527c7a9d0710fa48e9590d8
+ * body-sha256: 06132315cb3a076286c7d16069ace1c4eb6eeb754e442a6884768ff0c1c92696
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -58,7 +58,7 @@ const COEFFICIENTS = 33;
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** Largest accepted error of the solution y of a stage, relative to y. */
+/** The iteration ends when the error of y, relative to y, is estimated to be below this. */
 const TOLERANCE = 1e-20;
 
 /** Everything that depends on parameters and step size only. */
@@ -173,10 +173,10 @@ function vectorField(params, t, x, out) {
   out[1] = q + params.A * Math.cos(params.omega * t) - q * (q * q);
 }
 
-/** A step size for which coefficients are finite. */
+/** Step size of the evaluation that checks the parameters. */
 const PROBE_STEP = 1e-100;
 
-/** Least size of a component of y, as a fraction of the largest. */
+/** Components of y count as at least this share of the largest. */
 const FLOOR = 1e-6;
 
 /** A correction below this may be rounding. */
@@ -184,14 +184,14 @@ const NEARLY_SOLVED = 1e-8;
 /** Ratio of successive corrections below NEARLY_SOLVED that shows rounding. */
 const SHRINKING = 0.25;
 
-/** Accepted length of steps, relative to state and motion. */
+/** Relative length of steps above which the energy is checked. */
 const PLAUSIBLE = 1.5;
-/** Largest relative change of energy in longer steps. */
+/** Accepted relative change of energy if it is checked. */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** Largest distance from the last value, relative to it. */
+/** Largest relative distance of a prediction from the last value. */
 const REACH = 4.0;
-/** Number of stored differences; higher ones would amplify rounding errors. */
+/** Number of stored differences; differences of higher order would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 // ---- Errors ----

@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: b33a66b8541d714fbcc30d7914cc6aae652452ede475e5b6e7b597eca6bd0fdb
+# body-sha256: c72ab4829c5f4417ca983c781b607aa5690a4abafe11b19ea7531b4f9025b1c6
 import numpy as np
 
 VERSION = "0.1.0"
@@ -80,7 +80,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # a step size for which coefficients are finite
+PROBE_STEP = 1e-100  # step size of the evaluation that checks the parameters
 
 
 def _numbers(values):
@@ -212,8 +212,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
+PLAUSIBLE = 1.5  # relative length of steps above which the energy is checked
+MAX_ENERGY_CHANGE = 0.5  # accepted relative change of energy if it is checked
 
 
 def _plausible(stage, x, end):
@@ -239,7 +239,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # least size of a component of y, as a fraction of the largest
+FLOOR = 1e-6  # components of y count as at least this share of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
 SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; Observables
- * body-sha256: 028cdef7f5490e8a6f5155ceae17b9a524d4ab0ca538ede90f71d6ed7328ef2d
+ * body-sha256: d4f776c87557cdd4ba8167b421724bab7318afecace363a8733e0c189f102357
  */
 #include "food_web.h"
 #include <limits.h>
@@ -311,7 +311,7 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
 }
 
 /* ---- The lattice ---- */
-#define food_web_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define food_web_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 enum { food_web_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 

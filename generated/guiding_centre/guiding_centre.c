@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: 719c14399d33bd20683b6008076f265c8f57b97987061d3036e165f91287e5f0
+ * body-sha256: 9630e04068c9a2861a651edf693d838d465bbd1cfc7bc0d93863f85067b67136
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -116,7 +116,7 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
     out[3] = t19 * t17 - t12 * t18 - t1 * t21;
 }
 
-#define guiding_centre_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define guiding_centre_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int guiding_centre_finite(const double *values, int count)
@@ -176,7 +176,7 @@ static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centr
 }
 
 /* ---- Predictors ---- */
-#define guiding_centre_REACH 4.0 /* largest distance from the last value, relative to it */
+#define guiding_centre_REACH 4.0 /* largest relative distance of a prediction from the last value */
 
 /* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
    there the equation of a step has solutions unrelated to the motion. */
@@ -214,8 +214,8 @@ static void guiding_centre_remember(guiding_centre_history *history, const doubl
     if (history->count < guiding_centre_DIFFERENCES) ++history->count;
 }
 
-#define guiding_centre_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
-#define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
+#define guiding_centre_PLAUSIBLE 1.5         /* relative length of steps above which the energy is checked */
+#define guiding_centre_MAX_ENERGY_CHANGE 0.5 /* accepted relative change of energy if it is checked */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -444,25 +444,24 @@ static void guiding_centre_path_field(const double *coef, const double p[4], con
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
     guiding_centre_LONGEST_PATH = 128, /* largest number of pieces of a path, a power of 2 */
-    /* largest number of pieces of all paths of a solve; steps that need more have errors of the size of the
-       state */
+    /* largest number of pieces of all paths in the solution for p; with more, errors are as large as x */
     guiding_centre_MOST_PIECES = 512,
-    /* iterations with the approximate Jacobian before its contraction is checked */
+    /* iterations before it is checked whether the approximate Jacobian is good enough */
     guiding_centre_PATIENCE = 3,
 };
 /* terms of a series below this, relative to the path, are rounding */
 #define guiding_centre_NEGLIGIBLE 1e-17
-/* smaller coordinates are measured relative to this fraction of their sum */
+/* coordinates count as at least this fraction of the sum of all coordinates */
 #define guiding_centre_LEAST_SHARE 1e-5
-/* rounding of the slope of a path, relative to the path and its slope */
+/* accepted error of the slope of a path, relative to the path and its slope */
 #define guiding_centre_ROUNDED_SLOPE 2e-15
-/* difference of arguments in a difference quotient, relative to p: the root of rounding */
+/* increment of p in a difference quotient, relative to p: about the square root of a rounding error */
 #define guiding_centre_DIFFERENCE 1e-7
 #define guiding_centre_SOLVED 4e-16        /* a residual below this, relative to p, is rounding */
 #define guiding_centre_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
 /* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 #define guiding_centre_SHRINKING 0.25
-/* largest reduction factor of the residual by an iteration with a useful Jacobian */
+/* largest ratio of successive residuals with which the approximate Jacobian is good enough */
 #define guiding_centre_CONTRACTING 0.05
 
 /* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to

@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 14 additions, 68 multiplications, 4 divisions, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build guiding_centre
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 12314714d1ef9b836f1792e33544ece0325fe3734c4229525c9b9d1523099daf
+# body-sha256: 1c5be7fa739c4b5e0a69da8634d3e399d34ee9aa21e064700ba895ece381f930
 import numpy as np
 
 VERSION = "0.1.0"
@@ -82,7 +82,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # a step size for which coefficients are finite
+PROBE_STEP = 1e-100  # step size of the evaluation that checks the parameters
 
 
 def _numbers(values):
@@ -178,16 +178,16 @@ def _generate(coef, y):
 
 
 LONGEST_PATH = 128  # largest number of pieces of a path, a power of 2
-MOST_PIECES = 512  # largest number of pieces of all paths of a solve; steps that need more have errors of the size of the state
-PATIENCE = 3  # iterations with the approximate Jacobian before its contraction is checked
+MOST_PIECES = 512  # largest number of pieces of all paths in the solution for p; with more, errors are as large as x
+PATIENCE = 3  # iterations before it is checked whether the approximate Jacobian is good enough
 NEGLIGIBLE = 1e-17  # terms of a series below this, relative to the path, are rounding
-LEAST_SHARE = 1e-5  # smaller coordinates are measured relative to this fraction of their sum
-ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, relative to the path and its slope
-DIFFERENCE = 1e-7  # difference of arguments in a difference quotient, relative to p: the root of rounding
+LEAST_SHARE = 1e-5  # coordinates count as at least this fraction of the sum of all coordinates
+ROUNDED_SLOPE = 2e-15  # accepted error of the slope of a path, relative to the path and its slope
+DIFFERENCE = 1e-7  # increment of p in a difference quotient, relative to p: about the square root of a rounding error
 SOLVED = 4e-16  # a residual below this, relative to p, is rounding
 NEARLY_SOLVED = 1e-12  # a residual below this may be rounding: see SHRINKING
 SHRINKING = 0.25  # ratio of successive residuals below NEARLY_SOLVED that shows rounding
-CONTRACTING = 0.05  # largest reduction factor of the residual by an iteration with a useful Jacobian
+CONTRACTING = 0.05  # largest ratio of successive residuals with which the approximate Jacobian is good enough
 
 
 def _holds(coef, p, m, slope):
@@ -474,8 +474,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
+PLAUSIBLE = 1.5  # relative length of steps above which the energy is checked
+MAX_ENERGY_CHANGE = 0.5  # accepted relative change of energy if it is checked
 
 
 def _plausible(stage, x, end):

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Wavefront (temporal)
  *   blocking; Observables; Caller-driven stepping
- * body-sha256: 081934bf6f5817072eb7713dd2df5dbbc668a8d425f4bb57c41f5f9dfb5fd204
+ * body-sha256: 7446daa75de1105589676192760470b3655237ed1817a84ec87d4be4f41d3fb1
  */
 #include "heisenberg.h"
 #include <math.h>
@@ -518,7 +518,7 @@ static void heisenberg_vector_field_row(const heisenberg_row *row, double *restr
 }
 
 /* ---- The lattice ---- */
-#define heisenberg_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define heisenberg_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 #ifdef _OPENMP
 #ifdef __cplusplus

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; The energy level e = -H(x0), a constant of a trajectory, and
  *   the monitor dt/dtau; The solver
- * body-sha256: 39ad8aa75548731769c63858d88307ddeb9ca3f4e032af8f37b99026f2a9b89e
+ * body-sha256: 5e6ffa3225e6881da96d6f2d6b32c811fdf6c3e42eac34b3bd0df8392e55c6af
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -75,7 +75,7 @@ double kepler_eccentric_monitor(const kepler_eccentric_params *params, const dou
     return 1.0 / (t3 + 0.5 * (oblateness * (t3 * (t3 * t3)) * (1.0 - 3.0 * (t1 / t2))));
 }
 
-#define kepler_eccentric_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define kepler_eccentric_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* ---- The explicit step ---- */
 static int kepler_eccentric_finite(const double *values, int count)

@@ -7,7 +7,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: b8cec3b9c07cb531cdaa34d79faf01a04f7daea6bcc082d3b52defafc557b052
+# body-sha256: 51dfc9c7ddc26e8b11a89aefef1fe1d63ee4a0b0823222b3118078dcb5f11954
 import numpy as np
 
 VERSION = "0.1.0"
@@ -80,7 +80,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # a step size for which coefficients are finite
+PROBE_STEP = 1e-100  # step size of the evaluation that checks the parameters
 
 
 def _numbers(values):
@@ -189,7 +189,7 @@ def _choose_gauge(parameters, x):
 
 
 def _monitor(parameters, x):
-    """Dt/dtau, which has to be positive."""
+    """The rate dt/dtau, which has to be positive."""
     oblateness = parameters["oblateness"]
     q1 = x[..., 0]
     q2 = x[..., 1]

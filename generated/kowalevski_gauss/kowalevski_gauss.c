@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums; SIMD lanes: one evaluation in each; The implicit step, by
  *   Gauss collocation; The solver; Members of an ensemble; Ensembles
- * body-sha256: f2cd2c91ac1d1306f390c18bcdee7b3848d3a03dbe985f6cbaf88cb381b4215d
+ * body-sha256: 194f5f9f1491a9ebc16a4c0586d1cefc528fafaf7c00435580c4e6051be6f531
  */
 #include "kowalevski_gauss.h"
 #include <float.h>
@@ -35,7 +35,7 @@ static void kowalevski_gauss_prepare(const kowalevski_gauss_params *params, doub
     (void)params, (void)h, (void)coef;
 }
 
-/* The change of the coordinates from x, by the unknowns. */
+/* The increment of the coordinates from x, as a function of the unknowns. */
 static void kowalevski_gauss_stage_change(const double coef[1], const double x[6], const double z[8],
     double change[restrict 6])
 {
@@ -81,7 +81,7 @@ void kowalevski_gauss_vector_field(const kowalevski_gauss_params *params, const 
     out[5] = 0.5 * (G1 * P2) - 0.5 * (G2 * P1);
 }
 
-#define kowalevski_gauss_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define kowalevski_gauss_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* ---- Compensated sums ---- */
 static int kowalevski_gauss_finite(const double *values, int count)
@@ -524,18 +524,18 @@ static void kowalevski_gauss_remember(kowalevski_gauss_solver *s, double point[k
 }
 
 enum {
-    /* changes that may grow after transients before the step fails as too large */
+    /* a step fails after this number of growing changes in a row, plus one for each stage */
     kowalevski_gauss_MOST_RISING = 3,
     /* steps between comparisons of the predictors; a comparison costs as much as two sweeps */
     kowalevski_gauss_TRIALS = 32,
 };
-/* largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs */
+/* sweeps end at an expected next change below this; with 2e-17 energy and Casimirs drifted */
 #define kowalevski_gauss_SOLVED 2e-18
 /* ratio of successive changes from which on sweeps do not help; with 0.4 Casimirs drifted */
 #define kowalevski_gauss_STALLED 0.8
-/* sweeps end at a change below this with at least the ratio STALLED */
+/* sweeps end at a change below this if its ratio to the change before is at least STALLED */
 #define kowalevski_gauss_ROUNDING 4e-16
-/* sweeps end at the second change below this that is no smaller than the last */
+/* sweeps end at the second change below this that is no smaller than the change before */
 #define kowalevski_gauss_NEARLY_ROUNDING 2e-14
 
 /* The last change; consecutive sweeps whose change grew; sweeps whose change grew near rounding level. */

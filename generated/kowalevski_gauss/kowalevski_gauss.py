@@ -6,7 +6,7 @@
 #   one evaluation at a stage: 41 additions, 57 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build kowalevski_gauss
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 72677f2471e716f8b9ada996be71effb7d66b75e7f7017181ad47078c514012a
+# body-sha256: f2f70911ea082b22acf30ba2816408be165517ba927380ddd5239163c0ff08f3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -78,7 +78,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # a step size for which coefficients are finite
+PROBE_STEP = 1e-100  # step size of the evaluation that checks the parameters
 
 
 def _numbers(values):
@@ -119,8 +119,7 @@ def _prepare(parameters, h):
 
 
 def _stage_field(coef, x, z, w):
-    """W times the derivatives of the unknowns of a stage, which are offsets from x, the start of the
-    step."""
+    """Derivatives of the unknowns (offsets from the start x) at a stage, times its weight w."""
     P1 = x[..., 0]
     P2 = x[..., 1]
     P3 = x[..., 2]
@@ -148,7 +147,7 @@ def _stage_field(coef, x, z, w):
 
 
 def _stage_change(coef, x, z):
-    """The change of the coordinates from x, by the unknowns."""
+    """The increment of the coordinates from x, as a function of the unknowns."""
     P1 = x[..., 0]
     P2 = x[..., 1]
     P3 = x[..., 2]
@@ -177,7 +176,7 @@ def _stage_change(coef, x, z):
 
 
 def _next_frame(coef, x, z, k):
-    """Derivatives k of the unknowns in the frame of the end z of a step from x, where the next one
+    """Derivatives k of the unknowns, in the frame at the end z of a step, where the next step
     starts."""
     P1 = x[..., 0]
     P2 = x[..., 1]
@@ -201,11 +200,11 @@ def _next_frame(coef, x, z, k):
         ])
 
 
-MOST_RISING = 3  # changes that may grow after transients before the step fails as too large
-SOLVED = 2e-18  # largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs
+MOST_RISING = 3  # a step fails after this number of growing changes in a row, plus one for each stage
+SOLVED = 2e-18  # sweeps end at an expected next change below this; with 2e-17 energy and Casimirs drifted
 STALLED = 0.8  # ratio of successive changes from which on sweeps do not help; with 0.4 Casimirs drifted
-ROUNDING = 4e-16  # sweeps end at a change below this with at least the ratio STALLED
-NEARLY_ROUNDING = 2e-14  # sweeps end at the second change below this that is no smaller than the last
+ROUNDING = 4e-16  # sweeps end at a change below this if its ratio to the change before is at least STALLED
+NEARLY_ROUNDING = 2e-14  # sweeps end at the second change below this that is no smaller than the change before
 TRIALS = 32  # steps between comparisons of the predictors; a comparison costs as much as two sweeps
 
 # Gauss collocation with nodes c, weights b and matrix A: NODES is c, WEIGHTS is b, MIXING is mu = A diag(1/b). All

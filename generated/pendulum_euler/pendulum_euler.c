@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2c3606081ac28a48814844b27cfff45ded4affa22ac50340645173394ccf1c2e
+ * body-sha256: 40a805b503b8777ef43b9a171cf2fca785e38d9199302c2c1282c9832717a5c4
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -56,7 +56,7 @@ void pendulum_euler_vector_field(const pendulum_euler_params *params, const doub
     out[1] = -(g * sin(q));
 }
 
-#define pendulum_euler_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define pendulum_euler_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* ---- The solver ---- */
 static int pendulum_euler_finite(const double *values, int count)

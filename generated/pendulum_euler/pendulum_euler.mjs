@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e4960d3ba835c3756bc5fe93a153e8d3f59b17e62a7c40242689a0638eba75da
+ * body-sha256: abe76087481ce7c78bf2c3c5b149e54202bb3adba7219fb53ed383f44dbe8cfa
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -77,7 +77,7 @@ function vectorField(params, x, out) {
   out[1] = -(params.g * Math.sin(q));
 }
 
-/** A step size for which coefficients are finite. */
+/** Step size of the evaluation that checks the parameters. */
 const PROBE_STEP = 1e-100;
 
 // ---- Errors ----

@@ -5,7 +5,7 @@
 #   step: explicit; one step: 1 addition, 2 multiplications, 1 function
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build pendulum_euler
 # SPDX-License-Identifier: 0BSD
-# body-sha256: f5d5d13e44764defeda7216d007eafdc21dba81f5374d09fc9f132b8b94b450a
+# body-sha256: 7860b428f10b0a0db82edce20647c01abba99daf47b993e56ed0072d067e676c
 import numpy as np
 
 VERSION = "0.1.0"
@@ -78,7 +78,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # a step size for which coefficients are finite
+PROBE_STEP = 1e-100  # step size of the evaluation that checks the parameters
 
 
 def _numbers(values):

@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method, for stages that fixed-point sweeps do not solve; Observables
- * body-sha256: 706e2065f8dd96520d28ef677de9a8822981ce17fc6bc3bdc2192adf2784b10a
+ * body-sha256: c91b7fdc99ff82ffd3f9882e5703fa30b18de5e2d3fa1faec804e818684d5010
  */
 #include "point_vortices.h"
 #include <math.h>
@@ -273,7 +273,7 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 }
 
 /* ---- The lattice ---- */
-#define point_vortices_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define point_vortices_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* Stands before loops over row segments: threads share the iterations. */
 #ifdef _OPENMP
@@ -416,15 +416,15 @@ static void point_vortices_copy(double *const *to, double *const *from, const po
 
 /* ---- The stages ---- */
 enum {
-    point_vortices_PATIENCE = 10, /* sweeps after which slow convergence is left to Newton's method */
+    point_vortices_PATIENCE = 10, /* sweeps before Newton's method may replace slow sweeps */
 };
-/* smaller fields are measured relative to this fraction of the largest */
+/* fields count as at least this fraction of the largest field */
 #define point_vortices_LEAST_SIZE 0.001
-#define point_vortices_SETTLED 0x1p-55  /* largest expected change by further sweeps, relative to y */
+#define point_vortices_SETTLED 0x1p-55  /* expected relative change of y below which sweeps end */
 #define point_vortices_ROUNDING 0x1p-40 /* changes below this may be rounding */
-/* a change above this fraction of the one before is left to Newton's method */
+/* convergence is slow if a change exceeds this fraction of the change before */
 #define point_vortices_SLOW 0.6
-#define point_vortices_NEARLY_SETTLED 0x1p-30 /* changes below this are not left to Newton's method */
+#define point_vortices_NEARLY_SETTLED 0x1p-30 /* Newton's method does not take over at changes below this */
 
 /* number of partial results in reductions over sites, so that these loops vectorise */
 enum { point_vortices_WIDTH = 32 };
@@ -548,7 +548,7 @@ static void point_vortices_forget(point_vortices_solver *s)
 /* ---- Krylov spaces ---- */
 #define point_vortices_SOLVED 1e-6 /* relative residual at which the iteration for a correction ends */
 #define point_vortices_USEFUL 0.9  /* largest relative residual of an accepted correction */
-/* solutions farther from x than this, relative to x and its motion, are rejected */
+/* solutions farther from x than this, relative to x and its first change, are rejected */
 #define point_vortices_PLAUSIBLE 1.5
 
 /* Scalar product of x and y, each field divided by its usual size. Sums of row segments are added in order,

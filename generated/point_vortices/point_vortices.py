@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 6 multiplications
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 72edf14d744c95317fe203f02aa247e1f00c760f7654a2dbbc9442da28c65a49
+# body-sha256: b57821173e375d4d1ead2c84c97db411ce56dff1dd69d0e3855aa4ea509c29c2
 import numpy as np
 
 VERSION = "0.1.0"
@@ -123,12 +123,12 @@ class _Sites:
 # Largest numbers of sweeps of a stage, and of Newton corrections.
 MOST_SWEEPS = 200
 DIFFERENCES = 4  # number of differences in the predictor of a stage
-PATIENCE = 10  # sweeps after which slow convergence is left to Newton's method
-LEAST_SIZE = 0.001  # smaller fields are measured relative to this fraction of the largest
-SETTLED = 2.0**-55  # largest expected change by further sweeps, relative to y
+PATIENCE = 10  # sweeps before Newton's method may replace slow sweeps
+LEAST_SIZE = 0.001  # fields count as at least this fraction of the largest field
+SETTLED = 2.0**-55  # expected relative change of y below which sweeps end
 ROUNDING = 2.0**-40  # changes below this may be rounding
-SLOW = 0.6  # a change above this fraction of the one before is left to Newton's method
-NEARLY_SETTLED = 2.0**-30  # changes below this are not left to Newton's method
+SLOW = 0.6  # convergence is slow if a change exceeds this fraction of the change before
+NEARLY_SETTLED = 2.0**-30  # Newton's method does not take over at changes below this
 
 
 def _usual(y):
@@ -198,7 +198,7 @@ def _advance(sites, rows, x, past):
 DIRECTIONS = 24  # dimension of the Krylov space of a correction
 SOLVED = 1e-6  # relative residual at which the iteration for a correction ends
 USEFUL = 0.9  # largest relative residual of an accepted correction
-PLAUSIBLE = 1.5  # solutions farther from x than this, relative to x and its motion, are rejected
+PLAUSIBLE = 1.5  # solutions farther from x than this, relative to x and its first change, are rejected
 
 
 def _middle(coef, x, prediction, sites, past):

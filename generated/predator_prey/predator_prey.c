@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, by Newton's
  *   method; The solver
- * body-sha256: 2c5574f1e56e56eb58386789b9d190ed9d0fe0a817ecdc33fe5b5cf13dff72d6
+ * body-sha256: 89b0d26b040d6eb6b86ae0d3b34ce56805ebd2d3e223d23b3ee7b72b5a6e3ddf
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -20,7 +20,7 @@
 const predator_prey_params predator_prey_default_params = { 1.0, 0.1, 0.05, 0.5 };
 
 enum { predator_prey_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
-#define predator_prey_TOLERANCE 1e-20       /* largest accepted error of a solution, relative to it */
+#define predator_prey_TOLERANCE 1e-20       /* iteration ends at an estimated relative error below this */
 
 static int predator_prey_allowed(const predator_prey_params *params)
 {
@@ -108,7 +108,7 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
     out[1] = -(t1 * (death / prey - gain));
 }
 
-#define predator_prey_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define predator_prey_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int predator_prey_finite(const double *values, int count)
@@ -168,7 +168,7 @@ static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_D
 }
 
 /* ---- Predictors ---- */
-#define predator_prey_REACH 4.0 /* largest distance from the last value, relative to it */
+#define predator_prey_REACH 4.0 /* largest relative distance of a prediction from the last value */
 
 /* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
    there the equation of a step has solutions unrelated to the motion. */
@@ -206,8 +206,8 @@ static void predator_prey_remember(predator_prey_history *history, const double 
     if (history->count < predator_prey_DIFFERENCES) ++history->count;
 }
 
-#define predator_prey_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
-#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
+#define predator_prey_PLAUSIBLE 1.5         /* relative length of steps above which the energy is checked */
+#define predator_prey_MAX_ENERGY_CHANGE 0.5 /* accepted relative change of energy if it is checked */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -232,7 +232,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define predator_prey_FLOOR 0.0 /* least size of a component of y, as a fraction of the largest */
+#define predator_prey_FLOOR 0.0 /* components of y count as at least this share of the largest */
 
 #define predator_prey_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */

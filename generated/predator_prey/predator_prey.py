@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 72 multiplications, 4 divisions, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build predator_prey
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d13b7542a5c87c55b35b8631fc9697b9f9998a2e2933e376748b25cac9772500
+# body-sha256: 8d17efec46f95a3d0ed81ce720d72fa86598c5256f1c0a8c7eee516992b208d6
 import numpy as np
 
 VERSION = "0.1.0"
@@ -82,7 +82,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # a step size for which coefficients are finite
+PROBE_STEP = 1e-100  # step size of the evaluation that checks the parameters
 
 
 def _numbers(values):
@@ -206,8 +206,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
+PLAUSIBLE = 1.5  # relative length of steps above which the energy is checked
+MAX_ENERGY_CHANGE = 0.5  # accepted relative change of energy if it is checked
 
 
 def _plausible(stage, x, end):
@@ -233,7 +233,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 0.0  # least size of a component of y, as a fraction of the largest
+FLOOR = 0.0  # components of y count as at least this share of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
 SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 

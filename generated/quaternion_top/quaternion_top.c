@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Predictors; The implicit step, along paths
  *   dm/dt = pi(m) p; The solver
- * body-sha256: b20c6a633201bbad63022c3c76ccc28aabf2d8348f157b2838a2a28ae1db4b7e
+ * body-sha256: 273644e5a5e583e33a15cac957961fad833898c4afe50c9e14990d70d336a926
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -281,7 +281,7 @@ void quaternion_top_vector_field(const quaternion_top_params *params, const doub
     out[6] = 0.5 * (w * t3) + (0.5 * (x_ * t4) - 0.5 * (y * t7));
 }
 
-#define quaternion_top_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define quaternion_top_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int quaternion_top_finite(const double *values, int count)
@@ -341,7 +341,7 @@ static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_to
 }
 
 /* ---- Predictors ---- */
-#define quaternion_top_REACH 4.0 /* largest distance from the last value, relative to it */
+#define quaternion_top_REACH 4.0 /* largest relative distance of a prediction from the last value */
 
 /* Predict the next solution by the sum of differences. Returns 0 if there is none, or if it is far away:
    there the equation of a step has solutions unrelated to the motion. */
@@ -379,8 +379,8 @@ static void quaternion_top_remember(quaternion_top_history *history, const doubl
     if (history->count < quaternion_top_DIFFERENCES) ++history->count;
 }
 
-#define quaternion_top_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
-#define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
+#define quaternion_top_PLAUSIBLE 1.5         /* relative length of steps above which the energy is checked */
+#define quaternion_top_MAX_ENERGY_CHANGE 0.5 /* accepted relative change of energy if it is checked */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -676,25 +676,24 @@ static void quaternion_top_path_field(const double *coef, const double p[7], con
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
     quaternion_top_LONGEST_PATH = 128, /* largest number of pieces of a path, a power of 2 */
-    /* largest number of pieces of all paths of a solve; steps that need more have errors of the size of the
-       state */
+    /* largest number of pieces of all paths in the solution for p; with more, errors are as large as x */
     quaternion_top_MOST_PIECES = 512,
-    /* iterations with the approximate Jacobian before its contraction is checked */
+    /* iterations before it is checked whether the approximate Jacobian is good enough */
     quaternion_top_PATIENCE = 3,
 };
 /* terms of a series below this, relative to the path, are rounding */
 #define quaternion_top_NEGLIGIBLE 1e-17
-/* smaller coordinates are measured relative to this fraction of their sum */
+/* coordinates count as at least this fraction of the sum of all coordinates */
 #define quaternion_top_LEAST_SHARE 1e-5
-/* rounding of the slope of a path, relative to the path and its slope */
+/* accepted error of the slope of a path, relative to the path and its slope */
 #define quaternion_top_ROUNDED_SLOPE 2e-15
-/* difference of arguments in a difference quotient, relative to p: the root of rounding */
+/* increment of p in a difference quotient, relative to p: about the square root of a rounding error */
 #define quaternion_top_DIFFERENCE 1e-7
 #define quaternion_top_SOLVED 4e-16        /* a residual below this, relative to p, is rounding */
 #define quaternion_top_NEARLY_SOLVED 1e-12 /* a residual below this may be rounding: see SHRINKING */
 /* ratio of successive residuals below NEARLY_SOLVED that shows rounding */
 #define quaternion_top_SHRINKING 0.25
-/* largest reduction factor of the residual by an iteration with a useful Jacobian */
+/* largest ratio of successive residuals with which the approximate Jacobian is good enough */
 #define quaternion_top_CONTRACTING 0.05
 
 /* Whether the slope of the Taylor series of a path at a point m is pi(m) p. If not, the series only seems to

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 307fee03a8dc1c23ae89fd3fd8cef3a1fc1f1eb584b2373dde85b0dfe5377c02
+ * body-sha256: 3de06114280f22a5abdd75a7e75d938bb988f77e903a9264d113c6817f7c0f66
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -32,7 +32,7 @@ const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.66666666666666
 enum { rigid_body_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
 enum { rigid_body_CHECKS = 8 }; /* past solutions that the recurrence is tested on, not fitted to */
 enum { rigid_body_PASSES = 2 }; /* iterations of a block that cost as much per step as one evaluation */
-#define rigid_body_TOLERANCE 1e-20 /* largest accepted error of a solution, relative to it */
+#define rigid_body_TOLERANCE 1e-20 /* iteration ends at an estimated relative error below this */
 
 static int rigid_body_allowed(const rigid_body_params *params)
 {
@@ -348,7 +348,7 @@ void rigid_body_vector_field(const rigid_body_params *params, const double x[3],
     out[2] = x1 * t2 - x2 * t3;
 }
 
-#define rigid_body_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define rigid_body_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int rigid_body_finite(const double *values, int count)
@@ -522,7 +522,7 @@ static int rigid_body_train(rigid_body_history *history, int component)
 }
 
 /* ---- Predictors ---- */
-#define rigid_body_REACH 4.0 /* largest distance from the last value, relative to it */
+#define rigid_body_REACH 4.0 /* largest relative distance of a prediction from the last value */
 
 /* Whether a prediction is near `last`. Far away the equation of a step has solutions unrelated to the
    motion. */
@@ -635,8 +635,8 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
         rigid_body_fit(history);
 }
 
-#define rigid_body_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
-#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
+#define rigid_body_PLAUSIBLE 1.5         /* relative length of steps above which the energy is checked */
+#define rigid_body_MAX_ENERGY_CHANGE 0.5 /* accepted relative change of energy if it is checked */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -661,7 +661,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define rigid_body_FLOOR 1e-6 /* least size of a component of y, as a fraction of the largest */
+#define rigid_body_FLOOR 1e-6 /* components of y count as at least this share of the largest */
 
 #define rigid_body_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */
@@ -720,15 +720,15 @@ enum {
     rigid_body_SAMPLES = 32, /* number of states along a short piece of the trajectory */
     /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
     rigid_body_DEGREE = 6,
-    rigid_body_SWEEPS = 4, /* most rounds over all multiples */
-    /* number of grids on a line, each finer than the one before by the factor mesh */
+    rigid_body_SWEEPS = 4, /* largest number of rounds over all multiples */
+    /* number of grids on a line, each finer than the grid before by the factor MESH */
     rigid_body_GRIDS = 3,
-    rigid_body_FIRST_REACH = 24,  /* points of the first grid on either side */
-    rigid_body_REACH_OF_GRID = 8, /* points of the other grids on either side */
+    rigid_body_FIRST_REACH = 24,  /* number of points of the first grid on each side of its centre */
+    rigid_body_REACH_OF_GRID = 8, /* number of points of each finer grid on each side of its centre */
 };
 #define rigid_body_MESH 0.125         /* mesh of the first grid, in units of the width of the search */
-#define rigid_body_SAMPLE_LENGTH 0.25 /* distance between successive states, relative to the first */
-/* errors that differ less than this, relative to all on a line, are equal: rounding must not decide */
+#define rigid_body_SAMPLE_LENGTH 0.25 /* distance of successive states, relative to the first state */
+/* errors with a smaller difference, relative to the sum of all errors on a line, count as equal */
 #define rigid_body_CLOSE_CALL 1e-12
 
 /* Compute the direction of the vector field at a point, a unit vector; 0 at equilibria. */

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7d8ac519447a31422ad74126536019fb4c868a833169157c150e0b3f1b11d39b
+ * body-sha256: f274ce701981d35e1aa52252a8795dc2ae5ab75e00c8d84b288cbd3970e40036
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -55,7 +55,7 @@ const COEFFICIENTS = 35;
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** Largest accepted error of the solution y of a stage, relative to y. */
+/** The iteration ends when the error of y, relative to y, is estimated to be below this. */
 const TOLERANCE = 1e-20;
 
 /** Value at s of the polynomial with these coefficients, the constant first. */
@@ -452,10 +452,10 @@ function vectorField(params, x, out) {
   out[2] = x1 * t2 - x2 * t3;
 }
 
-/** A step size for which coefficients are finite. */
+/** Step size of the evaluation that checks the parameters. */
 const PROBE_STEP = 1e-100;
 
-/** Least size of a component of y, as a fraction of the largest. */
+/** Components of y count as at least this share of the largest. */
 const FLOOR = 1e-6;
 
 /** A correction below this may be rounding. */
@@ -463,33 +463,33 @@ const NEARLY_SOLVED = 1e-8;
 /** Ratio of successive corrections below NEARLY_SOLVED that shows rounding. */
 const SHRINKING = 0.25;
 
-/** Accepted length of steps, relative to state and motion. */
+/** Relative length of steps above which the energy is checked. */
 const PLAUSIBLE = 1.5;
-/** Largest relative change of energy in longer steps. */
+/** Accepted relative change of energy if it is checked. */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** Largest distance from the last value, relative to it. */
+/** Largest relative distance of a prediction from the last value. */
 const REACH = 4.0;
-/** Number of stored differences; higher ones would amplify rounding errors. */
+/** Number of stored differences; differences of higher order would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 /** Number of states along a short piece of the trajectory. */
 const SAMPLES = 32;
 /** S_3 is cubic in H, so the square of the error is of degree six in each multiple. */
 const DEGREE = 6;
-/** Most rounds over all multiples. */
+/** Largest number of rounds over all multiples. */
 const SWEEPS = 4;
-/** Number of grids on a line, each finer than the one before by the factor mesh. */
+/** Number of grids on a line, each finer than the grid before by the factor MESH. */
 const GRIDS = 3;
-/** Points of the first grid on either side. */
+/** Number of points of the first grid on each side of its centre. */
 const FIRST_REACH = 24;
-/** Points of the other grids on either side. */
+/** Number of points of each finer grid on each side of its centre. */
 const REACH_OF_GRID = 8;
 /** Mesh of the first grid, in units of the width of the search. */
 const MESH = 0.125;
-/** Distance between successive states, relative to the first. */
+/** Distance of successive states, relative to the first state. */
 const SAMPLE_LENGTH = 0.25;
-/** Errors that differ less than this, relative to all on a line, are equal: rounding must not decide. */
+/** Errors with a smaller difference, relative to the sum of all errors on a line, count as equal. */
 const CLOSE_CALL = 1e-12;
 
 // ---- Errors ----

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: bb9da3698df9ac73811c5a119b64974db39d5c6e308a1c26fd6db7210378afd2
+# body-sha256: 0140ef54ac9addb6f7136a24e2103a5dd084b28d255b01838c06b4e2806dc7a9
 import numpy as np
 
 VERSION = "0.1.0"
@@ -82,7 +82,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # a step size for which coefficients are finite
+PROBE_STEP = 1e-100  # step size of the evaluation that checks the parameters
 
 
 def _numbers(values):
@@ -458,8 +458,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
+PLAUSIBLE = 1.5  # relative length of steps above which the energy is checked
+MAX_ENERGY_CHANGE = 0.5  # accepted relative change of energy if it is checked
 
 
 def _plausible(stage, x, end):
@@ -485,7 +485,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # least size of a component of y, as a fraction of the largest
+FLOOR = 1e-6  # components of y count as at least this share of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
 SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 
@@ -552,13 +552,13 @@ def _advance(stage, x, carry, memory):
 
 SAMPLES = 32  # number of states along a short piece of the trajectory
 DEGREE = 6  # S_3 is cubic in H, so the square of the error is of degree six in each multiple
-SWEEPS = 4  # most rounds over all multiples
-GRIDS = 3  # number of grids on a line, each finer than the one before by the factor mesh
-FIRST_REACH = 24  # points of the first grid on either side
-REACH_OF_GRID = 8  # points of the other grids on either side
+SWEEPS = 4  # largest number of rounds over all multiples
+GRIDS = 3  # number of grids on a line, each finer than the grid before by the factor MESH
+FIRST_REACH = 24  # number of points of the first grid on each side of its centre
+REACH_OF_GRID = 8  # number of points of each finer grid on each side of its centre
 MESH = 0.125  # mesh of the first grid, in units of the width of the search
-SAMPLE_LENGTH = 0.25  # distance between successive states, relative to the first
-CLOSE_CALL = 1e-12  # errors that differ less than this, relative to all on a line, are equal: rounding must not decide
+SAMPLE_LENGTH = 0.25  # distance of successive states, relative to the first state
+CLOSE_CALL = 1e-12  # errors with a smaller difference, relative to the sum of all errors on a line, count as equal
 
 
 def _line(error_of, gauge, c, width):

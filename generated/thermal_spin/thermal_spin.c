@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 7d73fbb7d3b6c48498b7bd33ca2ca1e62cff91e801c8460180e6d62f08a60a6d
+ * body-sha256: 97116e9dfcdd21678345ef433f5ff95d9557dde9e5e1c6c51f2d797a8a5c01cc
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -29,7 +29,7 @@ const thermal_spin_params thermal_spin_default_params = { 1.0, 0.5, 0.1 };
 
 enum { thermal_spin_PREPARED = 7 };        /* first coefficients, which depend on params and h only */
 enum { thermal_spin_MAX_ITERATIONS = 20 }; /* largest number of iterations for an implicit step */
-#define thermal_spin_TOLERANCE 1e-20       /* largest accepted error of a solution, relative to it */
+#define thermal_spin_TOLERANCE 1e-20       /* iteration ends at an estimated relative error below this */
 
 #define thermal_spin_BOUND 6.0 /* truncation of normal variates: rare large ones make steps fail */
 
@@ -203,7 +203,7 @@ void thermal_spin_noise_fields(const thermal_spin_params *params, const double x
     out[8] = 0.0;
 }
 
-#define thermal_spin_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define thermal_spin_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 /* ---- Compensated sums, linear equations ---- */
 static int thermal_spin_finite(const double *values, int count)
@@ -260,8 +260,8 @@ static int thermal_spin_solve(double matrix[thermal_spin_DIM * thermal_spin_DIM]
     return 1;
 }
 
-#define thermal_spin_PLAUSIBLE 1.5         /* accepted length of steps, relative to state and motion */
-#define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* largest relative change of energy in longer steps */
+#define thermal_spin_PLAUSIBLE 1.5         /* relative length of steps above which the energy is checked */
+#define thermal_spin_MAX_ENERGY_CHANGE 0.5 /* accepted relative change of energy if it is checked */
 
 /* Whether an increment is plausible: it is short, or changes the energy little. The equation of a step that
    is too large may have solutions far away, at another energy, unrelated to the motion. */
@@ -290,7 +290,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y); the unknown is the point y between them. */
 
-#define thermal_spin_FLOOR 1e-6 /* least size of a component of y, as a fraction of the largest */
+#define thermal_spin_FLOOR 1e-6 /* components of y count as at least this share of the largest */
 
 #define thermal_spin_NEARLY_SOLVED 1e-8 /* a correction below this may be rounding */
 /* ratio of successive corrections below NEARLY_SOLVED that shows rounding */

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6e2dfc946eb2642541fab33cf922c75b04bb06af4d16fdec66bf1cc9e38edcaa
+ * body-sha256: a3230e10d0105d9b220e01d079f56678b6b9414997ce1b448f416d4f91e8e652
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -75,7 +75,7 @@ const COEFFICIENTS = 13;
 /** Largest number of iterations of an implicit step. */
 const MAX_ITERATIONS = 20;
 
-/** Largest accepted error of the solution y of a stage, relative to y. */
+/** The iteration ends when the error of y, relative to y, is estimated to be below this. */
 const TOLERANCE = 1e-20;
 
 /** Value at s of the polynomial with these coefficients, the constant first. */
@@ -223,7 +223,7 @@ function linearise(coef, y, displacement, increment, jacobian, incrementJacobian
   incrementJacobian[8] = 0;
 }
 
-/** Sigma pi(x) grad g(x) of each source of noise. */
+/** The vector field sigma pi(x) grad g(x) of each source of noise. */
 function noiseFields(params, x, out) {
   const x_ = x[0];
   const y = x[1];
@@ -271,10 +271,10 @@ function vectorField(params, x, out) {
   out[2] = y * t4 + x_ * t3;
 }
 
-/** A step size for which coefficients are finite. */
+/** Step size of the evaluation that checks the parameters. */
 const PROBE_STEP = 1e-100;
 
-/** Least size of a component of y, as a fraction of the largest. */
+/** Components of y count as at least this share of the largest. */
 const FLOOR = 1e-6;
 
 /** A correction below this may be rounding. */
@@ -282,14 +282,14 @@ const NEARLY_SOLVED = 1e-8;
 /** Ratio of successive corrections below NEARLY_SOLVED that shows rounding. */
 const SHRINKING = 0.25;
 
-/** Accepted length of steps, relative to state and motion. */
+/** Relative length of steps above which the energy is checked. */
 const PLAUSIBLE = 1.5;
-/** Largest relative change of energy in longer steps. */
+/** Accepted relative change of energy if it is checked. */
 const MAX_ENERGY_CHANGE = 0.5;
 
-/** Largest distance from the last value, relative to it. */
+/** Largest relative distance of a prediction from the last value. */
 const REACH = 4.0;
-/** Number of stored differences; higher ones would amplify rounding errors. */
+/** Number of stored differences; differences of higher order would amplify rounding errors. */
 const DIFFERENCES = 9;
 
 // ---- Errors ----

@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0509956538586c9a0c5bca9306a5b2211f12821b6dc29886132087a3bee69362
+# body-sha256: 996ac7bc54af413ea5ad2faed3d64fe94db632611b2c6564f9c67560957aa1d8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -87,7 +87,7 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
-PROBE_STEP = 1e-100  # a step size for which coefficients are finite
+PROBE_STEP = 1e-100  # step size of the evaluation that checks the parameters
 
 
 def _numbers(values):
@@ -300,8 +300,8 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
-PLAUSIBLE = 1.5  # accepted length of steps, relative to state and motion
-MAX_ENERGY_CHANGE = 0.5  # largest relative change of energy in longer steps
+PLAUSIBLE = 1.5  # relative length of steps above which the energy is checked
+MAX_ENERGY_CHANGE = 0.5  # accepted relative change of energy if it is checked
 
 
 def _plausible(stage, x, end):
@@ -329,7 +329,7 @@ def _solved(stage, x, carry, prediction):
     return following, rest, value, status
 
 
-FLOOR = 1e-6  # least size of a component of y, as a fraction of the largest
+FLOOR = 1e-6  # components of y count as at least this share of the largest
 NEARLY_SOLVED = 1e-8  # a correction below this may be rounding
 SHRINKING = 0.25  # ratio of successive corrections below NEARLY_SOLVED that shows rounding
 
@@ -579,7 +579,7 @@ def _vector_field(parameters, x):
 
 
 def _noise_fields(parameters, x):
-    """Sigma pi(x) grad g(x) of each source of noise."""
+    """The vector field sigma pi(x) grad g(x) of each source of noise."""
     T = parameters["T"]
     damping_rate = parameters["damping_rate"]
     x_ = x[..., 0]

@@ -8,7 +8,7 @@
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Observables
- * body-sha256: e8b2a3b145b32963fff673694ca389715daf9ecafe79f72a239a3171b1b10ae1
+ * body-sha256: 05609fe994c5c1f2e02336449c3a35c06ac101c321767c6b3193b712e5a58133
  */
 #include "toda.h"
 #include <math.h>
@@ -236,7 +236,7 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 }
 
 /* ---- The lattice ---- */
-#define toda_PROBE_STEP 1e-100 /* a step size for which coefficients are finite */
+#define toda_PROBE_STEP 1e-100 /* step size of the evaluation that checks the parameters */
 
 enum { toda_BUFFER = 256 }; /* number of densities that are stored before they are summed */
 

@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 46f4b211d6aaa9f04f5898499f7ff7a1d3002536635af7665a1cd1449095c9a2
+ * body-sha256: f4151230e02c02cfacaf170c82d11bc52421a9e1cc7df6e11299ca998abeb336
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -140,7 +140,7 @@ function vectorField(params, x, sites, out) {
   }
 }
 
-/** A step size for which coefficients are finite. */
+/** Step size of the evaluation that checks the parameters. */
 const PROBE_STEP = 1e-100;
 
 // ---- Errors ----

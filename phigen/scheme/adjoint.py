@@ -78,7 +78,8 @@ def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression])
 
 
 def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
-    """Return the kernel of the cotangents of the coefficients of a Newton step, at its point y.
+    """Return the kernel of the cotangents of the coefficients of a Newton step, at the solution y of its
+    equation.
 
     Its inputs are λ, the cotangent of the new state x' (``increment_bar``), and −μ with μ = J⁻ᵀ Mᵀ λ
     (``displacement_bar``). J is the Newton matrix, and M the derivative of the increment x' − x with respect to y.
@@ -132,7 +133,7 @@ def gauss_adjoint(
         for name, inputs, description in at_stages
     ]
     purpose = (
-        "cotangents of the start, of the sum of the stage increments and of the coefficients, from that of the change"
+        "cotangents of the start, of the sum of stage increments and of the coefficients, from that of the increment"
     )
     inputs = {"x": tuple(coordinates), "z": change.inputs["z"], TABLE: coefficients.table}
     seeds = {"change_bar": change.outputs[0].values}
@@ -146,10 +147,12 @@ def completed(
     refresh: Kernel | None,
     path: PathAdjoint | None = None,
 ) -> Adjoint:
-    """Return the transpose of a step from the transposed kernels ``steps`` of the step itself.
+    """Return the transpose of a whole step; ``steps`` are the transposed kernels of the step without its
+    coefficients.
 
-    The transposes of ``prepare``, which computes the coefficients before the steps, and of ``refresh``, which computes
-    those that are new in each step, are added. Both kernels must be built before, with the full table of coefficients.
+    This function adds the transposes of ``prepare``, which computes coefficients before the steps, and of ``refresh``,
+    which computes the coefficients that change from step to step. Both kernels must be built before, with the full
+    table of coefficients.
     """
     differentiated = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):
@@ -169,8 +172,8 @@ def completed(
 def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]]) -> Kernel:
     """Return the transpose of ``prepare``, the kernel that computes the coefficients from the parameters.
 
-    If the coefficients contain matrix exponentials, the cotangents of the matrices that are exponentiated are a further
-    input.
+    If some coefficients are entries of matrix exponentials exp(tA), the transpose also reads the cotangents of the
+    matrices tA.
     """
     table_values = list(prepare.outputs[0].values)
     exponents = [e for start, n in prepare.exponentials for e in table_values[start : start + n * n]]
@@ -216,20 +219,20 @@ def level_adjoint(system: System) -> Kernel:
     n = system.dimension
     return Kernel(
         "level_adjoint",
-        "the gradient of the Hamiltonian along the state, and along the parameters",
+        "the gradient of the Hamiltonian with respect to the state and to the parameters",
         {"params": system.parameter_names, "x": system.coordinates},
         (Output("x_bar", tuple(slopes[:n])), Output("params_bar", tuple(slopes[n:]))),
     )
 
 
 def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, slopes: PathSlopes) -> PathAdjoint:
-    """Return the transpose of a step along a path ṁ = π(m)p: the recurrences of the path with its cotangents, run
-    backwards, and the transpose of ∇S_h with respect to the coefficients.
+    """Return the transpose of a step along a path ṁ = π(m)p.
 
-    Let λ be the cotangent of the new state x' = m(1), and ν the cotangent of the mean y = ∫ m dt. In reversed time
-    along the path, ȧ = ∂(π(m)p)/∂mᵀ a + ν, with the initial value a = λ. The cotangent of x is the final value of a;
-    that of p is ∫ π(m)ᵀ a dt; that of a coefficient c is ∫ ∂(a·π(m)p)/∂c dt. Since p = ∇S_h(y), ν = Hess S_hᵀ ω, where
-    ω is the cotangent of p. This results in a linear equation for ω.
+    It consists of recurrences, which follow the path backwards together with its cotangents, and of the transpose of
+    ∇S_h with respect to the coefficients. Let λ be the cotangent of the new state x' = m(1), and ν the cotangent of the
+    mean y = ∫ m dt. In reversed time along the path, ȧ = ∂(π(m)p)/∂mᵀ a + ν, with the initial value a = λ. The
+    cotangent of x is the final value of a; that of p is ∫ π(m)ᵀ a dt; that of a coefficient c is ∫ ∂(a·π(m)p)/∂c dt.
+    Since p = ∇S_h(y), ν = Hess S_hᵀ ω, where ω is the cotangent of p. This results in a linear equation for ω.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]

@@ -18,8 +18,9 @@ from fractions import Fraction
 from phigen.scheme.composition import COMPOSITIONS, Composition
 
 # Coefficients of the methods S_6 of order 4 and S_10 of order 6, by S. Blanes, P. C. Moan, Practical symplectic
-# partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142 (2002): the first half of a_1, …
-# and that of b_1, … The middle values follow from Σa = Σb = 1.
+# partitioned Runge–Kutta and Runge–Kutta–Nyström methods, J. Comput. Appl. Math. 142 (2002). For each method, these are
+# the first half of a_1, a_2, … and the first half of b_1, b_2, … The middle values are left out; they follow from Σa =
+# Σb = 1.
 _S6 = ("0.0792036964311957 0.353172906049774 -0.0420650803577195", "0.209515106613362 -0.143851773179818")
 _S10 = (
     "0.0502627644003922 0.413514300428344 0.0450798897943977 -0.188054853819569 0.541960678450780",
@@ -37,8 +38,7 @@ class Alternation:
 
     @property
     def stages(self) -> int:
-        """The number of stages of a step; each stage consists of one composition of the flows of all parts in reverse
-        order, and one in order."""
+        """The number of stages of a step. Each stage applies the flows of all parts twice, in opposite orders."""
         return len(self.fractions) // 2
 
 
@@ -132,10 +132,10 @@ class Schedule:
 def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
     """Return the schedule for an H that depends on the time, with the time at which each flow evaluates H.
 
-    The times are fractions of the step. The time advances with one flow, the part with the number ``carrier``: the
-    first or the last of the ``parts`` flows. The conjugate e of the time, in H + e, belongs to this part. If
-    ``carrier`` equals ``parts``, the time advances in a flow of e alone, which has no row in the result. During all
-    other flows the time is fixed.
+    The times are fractions of the step. The time advances during the flows of one part, and is fixed during all other
+    flows. This part has the number ``carrier``, and is the first or the last part. The Hamiltonian is H + e, where e is
+    the conjugate of the time, and e belongs to this part. If ``carrier`` equals ``parts``, the number of parts of H,
+    the time advances in a flow of e alone, which is left out of the result.
     """
     clock, moments = Fraction(0), dict[int, Fraction]()
     for part, row in schedule.flows:
@@ -149,8 +149,9 @@ def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
 
 
 def schedule(method: Alternation, parts: int) -> Schedule:
-    """Return the flows of a step of a method, for a number of ``parts`` of H. A single part has one flow, which is
-    exact."""
+    """Return the flows of a step of a method, for a number of ``parts`` of H. If there is only one part, a step is its
+    exact flow.
+    """
     if parts == 1:
         return Schedule((1.0,), 0, ())
     alpha = [*method.fractions, Fraction(0)]

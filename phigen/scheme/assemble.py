@@ -73,7 +73,7 @@ def build_program(
         attitude = stage_attitude(system, group, realisation, scheme.generating, gauge)
     lanes = solver.lanes and extras.offers("lanes", spec.profile)
     elapsed = elapsed_kernel(system, scheme.generating)
-    gauged_system = replace(system, forces=gauged.system.forces)  # with a monitor g, the forces are those times g
+    gauged_system = replace(system, forces=gauged.system.forces)  # a monitor g multiplies the forces
     step = _step(gauged_system, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
     attitude = scheme.generating.coefficients.settled(attitude)
     level = level_adjoint(system) if gauge.monitor and extras.adjoint else None

@@ -26,8 +26,8 @@ from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import Expression, gradient, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: Text for generated code: the last entry of an output with the components of P, a bound for the squared size of the
-#: matrix P.
+#: Text for generated code. It describes the last entry of an output whose other entries are the components p_i of a
+#: matrix P = Σ p_i E_i: this last entry is a bound for the square of the size of P.
 SIZE_OF_COVECTOR = "a bound for the square of its size"
 
 #: Kinds of bi-realisations whose steps are the action of a known group element: exp(p) or the Cayley transform of p.
@@ -120,7 +120,7 @@ def _exponential(group: Group) -> Kernel:
     values = exponential(group, [symbol(n) for n in names])
     return Kernel(
         "exponential",
-        "exp(P) - 1 for a small matrix P with components p",
+        "the matrix exp(P) - 1 for a small matrix P with components p",
         {"p": names},
         (Output("element", tuple(values)),),
     )
@@ -176,10 +176,10 @@ def _element_after_flow(system: System, group: Group, turning: Turning, time: Ex
 
 
 def uniform(system: System) -> bool:
-    """Whether Casimirs in H rotate the body at a constant angular velocity, seen in the frame in which the momentum is
-    constant.
+    """Whether Casimirs in H rotate the body at a constant angular velocity.
 
-    This is so unless there are forces, a monitor, or an H that depends on the time.
+    The angular velocity is meant in the frame in which the momentum is constant. It is constant unless there are
+    forces, a monitor, or an H that depends on the time.
     """
     monitored = system.spec is not None and system.spec.monitor is not None
     return not (system.forces or system.time or monitored)

@@ -62,7 +62,7 @@ class ScheduledMethod:
 
 
 class Host(Protocol):
-    """Protocol of the object whose Hamiltonian is split, a spec or a system: errors name places in its spec."""
+    """Protocol of specs and systems whose Hamiltonian is split; errors name places in the spec."""
 
     @property
     def locations(self) -> Mapping[tuple[Any, ...], Location]:
@@ -97,7 +97,7 @@ def _unsuited(system: System, splitting: SplitHamiltonian, small: int) -> bool:
 
 
 def _kicks_in_time(system: System, splitting: SplitHamiltonian) -> list[Kick]:
-    """Return the parts of an H = T + V that depends on the time, each of which can be the V of a Nyström method.
+    """Return all parts that can be the V of a Nyström method, for an H = T + V that depends on the time.
 
     With the conjugate e of the time, T + e takes the place of T. So T must not depend on the time, and V must commute
     with ∂V/∂t.

@@ -63,8 +63,9 @@ _SOFRONIOU_SPALETTA_10 = (
 
 @dataclass(frozen=True)
 class Composition:
-    """A symmetric composition with its name and order; ``fractions`` are the γ_1 … γ_s, the parts of the step for its
-    stages."""
+    """A symmetric composition with its name and order; stage i is a step of the size γ_i h, where ``fractions`` are γ_1
+    … γ_s.
+    """
 
     name: str
     order: int

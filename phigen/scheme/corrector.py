@@ -28,17 +28,18 @@ from phigen.scheme.alternation import Schedule
 #: Numbers of the parts of H = A + εB in the schedule of a step, which applies the flow of B first.
 B, A = 0, 1
 
-#: √(7/40): the times c_i of a corrector are multiples of this number. Other programs use it too, so results can be
-#: compared.
+#: √(7/40): the times c_i of a corrector are multiples of this number. Other programs use the same number, so their
+#: results can be compared with those of phigen.
 SPACING = Fraction("0.418330013267037773994000")
 
 
 def corrector(order: int, *, balanced: bool = False) -> tuple[Fraction, ...]:
-    """Return the durations, in steps, of the flows of A and B by turns at the end of a run, for H = A + εB.
+    """Return the durations of the flows at the end of a run for H = A + εB, in units of a step.
 
-    They are the flows of the corrector C after minus half a flow of A. A run starts with the same flows in reverse
-    order and with the opposite sign. At order 1 there is no C. A ``balanced`` C has twice as many flows, and causes no
-    error ε²h³.
+    These are flows of A and B by turns, beginning with A: a flow of A over minus half a step, then the flows of the
+    corrector C. Since C begins with a flow of A too, the first two flows are merged into one. A run starts with the
+    inverses of these flows, in reverse order. At order 1 there is no C. A ``balanced`` C has twice as many flows, and
+    causes no error ε²h³.
     """
     times, pairs = [-Fraction(1, 2)], _pairs((order - 1) // 2)
     if balanced:
@@ -60,7 +61,9 @@ def schedule(end: Sequence[Fraction]) -> Schedule:
 
 
 def _pairs(count: int) -> tuple[tuple[Fraction, Fraction], ...]:
-    """Return the pairs (c_i, b_i) with which z g(z) = f(z) − 1 holds up to z^{2·count}, as in the module's formulas."""
+    """Return the pairs (c_i, b_i) for which z g(z) = f(z) − 1 holds up to z^{2·count}, with f and g as defined in this
+    module.
+    """
     c = [i * SPACING for i in range(count, 0, -1)]
     f = _kernel_series(count + 1)
     rows = [[2 * x ** (2 * k + 1) / factorial(2 * k + 1) for x in c] for k in range(count)]

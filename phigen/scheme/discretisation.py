@@ -1,5 +1,6 @@
-"""Discretisation of a system: by the generating function of the requested order, or by a composition of steps of order
-2."""
+"""Discretisation of a system: by the generating function of the requested order for the whole step (the direct series),
+or by a composition of steps of order 2.
+"""
 
 from __future__ import annotations
 
@@ -168,11 +169,11 @@ def discretise(
 
 
 def expect_noise(system: System, realisation: BiRealisation, order: Order, composition: str) -> None:
-    """Raise `SpecError` for noise with a composition, with an order above 2 and forces, or without a symmetric
-    bi-realisation.
+    """Raise `SpecError` if the method of a spec with noise does not allow noise.
 
-    The noise of a step cannot be divided among the stages of a composition, some of which go back in time. Without
-    symmetry its integral would not be that of Stratonovich.
+    The bi-realisation must be symmetric, since otherwise the integral of the noise would not be that of Stratonovich. A
+    step must not be a composition: some stages go back in time, so the noise of a step cannot be divided among the
+    stages. If there are forces too, the order must be at most 2.
     """
     reason, hint = "", ""
     if not realisation.symmetric:

@@ -42,8 +42,9 @@ LANES = 8
 #: Nanoseconds of a step along paths in addition to its operations, and nanoseconds of each operation.
 PATH_STEP, PATH_OPERATION = 200.0, 0.3
 
-#: Step size of the series, of splittings and of splittings of Nyström type for equal accuracy, by order, as a multiple
-#: of the step size of Gauss collocation. Splittings of Nyström type have smaller errors than other splittings.
+#: Step sizes with which methods have equal accuracy, by order, in units of the step size of Gauss collocation. The
+#: tables are those of the series, of splittings, and of splittings of Nyström type. Splittings of Nyström type have
+#: smaller errors than other splittings.
 SERIES_STEPS: Mapping[int, float] = {2: 1.3, 4: 0.63, 6: 0.55, 8: 0.5, 10: 0.43, 12: 0.37, 14: 0.33, 16: 0.3}
 SPLITTING_STEPS: Mapping[int, float] = {2: 1.3, 4: 2.5, 6: 1.3, 8: 0.9, 10: 0.7}
 NYSTROM_STEPS: Mapping[int, float] = {2: 1.3, 4: 4.0, 6: 2.6, 8: 1.6, 10: 1.3}

@@ -1,8 +1,8 @@
 """Gaussian elimination without pivoting, as straight-line code, for matrices with a known pattern of zeros.
 
 The Newton matrix is I + O(h), so its pivots are near 1. The step checks them, and falls back to elimination with
-pivoting. The pivots are taken from the diagonal in the order of least degree (Markowitz), so that few zeros are lost;
-this matters for lattices and trees.
+pivoting. The pivots are taken from the diagonal in the order of least degree (Markowitz), so that few zeros of the
+matrix become nonzero during elimination; this matters for lattices and trees.
 """
 
 from __future__ import annotations

@@ -16,7 +16,8 @@ from phigen.scheme.lowering import cost
 from phigen.symbolic.expression import ZERO, Expression, fold, sparse_derivatives, substitute
 from phigen.symbolic.symbols import momentum
 
-#: Number of rows of a matrix that are counted first: a few rows are enough to recognise a matrix far beyond the limit.
+#: Number of rows of a matrix in the first batch of a count. A few rows are enough to recognise a matrix with far more
+#: operations than the limit.
 FIRST_ROWS = 8
 
 #: The nonzero entries of a matrix row, by the index of the column.
@@ -79,7 +80,8 @@ class TooManyError(Exception):
 
 
 class OperationCount:
-    """Counter of the operations in products of matrices; sums are added in pairs, as `total_at` does.
+    """Counter of the operations in products of matrices; sums of several terms are added in pairs, as
+    `total_at` does.
 
     Sub-expressions that contain only symbols for which ``is_fixed`` is true are not counted, since they are computed
     once before the steps. Raises `TooManyError` as soon as the number of operations exceeds the limit.

@@ -98,8 +98,12 @@ def realise_gauss(spec: Spec, system: System) -> Realisation:
 
 
 def _other_coordinates(system: System) -> str:
-    """Return the beginning of a hint: linear combinations of the coordinates may have an exact Poisson map. Returns ""
-    if this is unlikely by the form of π."""
+    """Return the beginning of a hint that suggests other coordinates, for which an exact Poisson map may be
+    known.
+
+    For a linear or affine π it suggests a basis with fewer structure constants, for a quadratic π linear combinations
+    of the coordinates. It is "" for any other π.
+    """
     if isinstance(system.shape, LiePoisson | Affine):
         return (
             "in a basis with fewer structure constants, such as those of lie_algebra: NAME, such a map may be known; "
@@ -119,8 +123,9 @@ def _is_pushed(system: System, i: int) -> bool:
 def build_gauss(
     system: System, gauge: Gauge, realisation: Realisation, order: Order, spec: Spec, group: Group | None = None
 ) -> Program:
-    """Return the program of a Gauss method for H without the Casimirs of the ``gauge``. Raises `LimitError` if it is
-    too large."""
+    """Return the program of a Gauss method; the Casimirs of the ``gauge`` are subtracted from H. Raises `LimitError` if
+    the program is too large.
+    """
     discretised = gauge.applied(system)
     points = stage_map(discretised, realisation, gauge.pace(system))
     coefficients = Coefficients((*system.parameter_names, *gauge.symbols))
@@ -247,7 +252,7 @@ def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
         columns = [derivatives(values, s) for s in names]
         flat = coefficients.hoist([c[i] for i in range(len(values)) for c in columns])
         inputs = {"coef": coefficients.slots, "x": points.start, "z": points.unknowns}
-        purpose = f"the Jacobian of {subject} by x, and by the unknowns"
+        purpose = f"the Jacobian of {subject} with respect to x and to the unknowns"
         kernels.append(Kernel(f"stage_{name}_jacobian", purpose, inputs, (Output("slopes", tuple(flat)),)))
     return GaussTangent(*(_full(k, coefficients) for k in kernels))
 

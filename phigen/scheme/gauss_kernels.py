@@ -25,7 +25,7 @@ def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
     values = min(forms, key=lambda form: operation_counts(form)["multiplications"])
     return Kernel(
         "stage_field",
-        "w times the derivatives of the unknowns of a stage, which are offsets from x, the start of the step",
+        "derivatives of the unknowns (offsets from the start x) at a stage, times its weight w",
         {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
         (Output("move", tuple(values)),),
     )
@@ -80,7 +80,7 @@ def elapsed_kernel(points: StageMap, monitor: Expression, coefficients: Coeffici
     (rate,) = coefficients.hoist(substitute([monitor], at_unknowns(points)))
     return Kernel(
         "elapsed",
-        "w times dt/dtau at a stage",
+        "the rate dt/dtau at a stage, times the weight w of the stage",
         {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
         (Output("elapsed", (symbol(WEIGHT) * rate,)),),
     )
@@ -90,7 +90,7 @@ def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
     """Return the kernel of the increment of the coordinates in a step, from the unknowns at its end."""
     return Kernel(
         "stage_change",
-        "the change of the coordinates from x, by the unknowns",
+        "the increment of the coordinates from x, as a function of the unknowns",
         {"coef": coefficients.slots, "x": points.start, "z": points.unknowns},
         (Output("change", tuple(coefficients.hoist(points.change))),),
     )
@@ -104,7 +104,7 @@ def lift_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
     """
     return Kernel(
         "functionals",
-        "y = F* k F for the frame F of each group element at the start of a step",
+        "the vectors y = F* k F for the frame F of each group element at the start of a step",
         {"coef": coefficients.slots, "x": points.system.coordinates},
         (Output("values", tuple(coefficients.hoist(lifted_functionals(points)))),),
     )
@@ -123,7 +123,7 @@ def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
     values = derivatives_in_next_frame(points, [symbol(s) for s in slopes])
     return Kernel(
         "next_frame",
-        "derivatives k of the unknowns in the frame of the end z of a step from x, where the next one starts",
+        "derivatives k of the unknowns, in the frame at the end z of a step, where the next step starts",
         {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "k": slopes},
         (Output("seen", tuple(coefficients.hoist(values))),),
     )

@@ -60,13 +60,13 @@ def reduced_sweeps(points: StageMap, coefficients: Coefficients) -> ReducedSweep
     inputs = {"coef": coefficients.slots, "x": points.start, "u": tuple(symbols)}
     slope = Kernel(
         "reduced_field",
-        "w times the derivatives of the iterated unknowns of a stage, by integrals u of increments",
+        "the derivatives of the iterated unknowns of a stage, times its weight w, from integrals u of increments",
         {**inputs, "w": (WEIGHT,), "time": (TIME, LENGTH)},
         (Output("move", tuple(coefficients.hoist(values))),),
     )
     follow = Kernel(
         "followers",
-        "the unknowns of a stage that follow from others, by integrals u of their increments",
+        "unknowns of a stage that follow from integrals u of the increments of other unknowns",
         {**inputs, "time": (TIME, LENGTH)},
         (Output("offsets", tuple(coefficients.hoist(offsets))),),
     )
@@ -86,8 +86,8 @@ def _are_conjugate(points: StageMap, iterated: Sequence[int], followers: Sequenc
 
 
 def _required_unknowns(reads: Sequence[set[int]]) -> list[int]:
-    """Return the unknowns that must be known in the sweeps: those that lie on a cycle of dependences, or on which these
-    depend.
+    """Return the unknowns that must be known in the sweeps: unknowns that depend on themselves, directly or through
+    others, and all unknowns on which these unknowns depend.
 
     ``reads[k]`` has the unknowns on which the derivative of unknown k depends.
     """
@@ -100,7 +100,8 @@ def _required_unknowns(reads: Sequence[set[int]]) -> list[int]:
 
 
 def _followers(linear: Sequence[int], reads: Sequence[set[int]]) -> list[int]:
-    """Return unknowns from ``linear`` none of whose derivatives depends on an unknown that is itself returned.
+    """Return some of the unknowns in ``linear``, chosen such that the derivative of a chosen unknown depends on no
+    chosen unknown.
 
     ``reads[k]`` has the unknowns on which the derivative of unknown k depends.
     """

@@ -89,7 +89,7 @@ def collected_form(
     h = tower.variable(STEP)
     s = tower.combine(term * h ** (i + 1) for i, term in enumerate(series.terms))
     worth = max(worth, 200)
-    if len(s) > 10 * worth:  # several terms may have one monomial in the coordinates, but rarely ten
+    if len(s) > 10 * worth:  # terms may share a monomial in the coordinates, but rarely ten of them
         return []
     slopes = tower.gradient(s, coordinates)
     if cells(tower, [s, *slopes]) > limits.CELLS or exceeds(tower, slopes, coordinates, min(worth, MOST_SLOPES)):

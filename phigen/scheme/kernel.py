@@ -100,10 +100,10 @@ class Kernel:
     ``inputs`` maps the name of an argument to the symbols of its entries. ``named`` has sub-expressions that get a name
     in the generated code, such as momenta and second derivatives. ``purpose`` is the comment in generated code.
 
-    The first output may contain matrices A, whose places ``exponentials`` lists by the first index and the number of
-    rows; the generated function returns exp(A) − 1 in their place. The transpose of such a kernel has ``exponents``, a
-    kernel that computes all these A. Its input `EXPONENTS` has the cotangents of the A, which the generated code
-    computes from those of exp(A) − 1 in the input ``coef_bar``.
+    The first output may contain matrices A, in whose place the generated function returns exp(A) − 1. ``exponentials``
+    lists the positions of these matrices: the index of the first entry, and the number of rows. The transpose of such a
+    kernel has ``exponents``, a kernel that computes all these A. The input `EXPONENTS` of the transpose has the
+    cotangents of the A, which the generated code computes from those of exp(A) − 1 in the input ``coef_bar``.
     """
 
     name: str

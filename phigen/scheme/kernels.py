@@ -186,7 +186,7 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
         ),
         Kernel(
             "substitute",
-            "the solution for a right-hand side, from the factors, and the slope times it",
+            "the solution for a right-hand side, from the factors, and the product of the slope and the solution",
             {"factor": tuple(e.value for e in factor_symbols.values), "slope": _entries("K", n), "side": side},
             (Output("solution", tuple(solution)), Output("product", tuple(product))),
         ),
@@ -268,7 +268,7 @@ def noise_fields(system: System) -> Kernel:
     """Return the kernel of the vector fields σ π∇g of all sources of noise, one after the other."""
     fields = [hamiltonian_vector_field(system.poisson, s.impulse(system.coordinates)) for s in system.noise]
     values = tuple(e for field in fields for e in field)
-    purpose = "sigma pi(x) grad g(x) of each source of noise"
+    purpose = "the vector field sigma pi(x) grad g(x) of each source of noise"
     return Kernel("noise_fields", purpose, system_inputs(system), (Output("out", values),))
 
 

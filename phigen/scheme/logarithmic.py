@@ -48,8 +48,9 @@ class Logarithmic:
         return (*increments, ZERO if self._is_negative(flow) else time, power(argument, Fraction(1, 2)))
 
     def time(self, flow: Flow) -> Expression:
-        """Return the time over which the flow of A or B equals a flow of K = log(A + e) − log(−B) over τ: τ/(A + e) or
-        τ/(−B)."""
+        """Return the duration of the flow of A or of B in a step over τ with K = log(A + e) − log(−B): τ/(A + e) for A,
+        τ/(−B) for B.
+        """
         return symbol(TIME) * power(self._argument(flow), -1)
 
     def _argument(self, flow: Flow) -> Expression:

@@ -1,5 +1,6 @@
-"""The modified Hamiltonian H̃ of a step, whose exact flow the step is up to a power of h: as a kernel and as a
-formula."""
+"""The modified Hamiltonian H̃ of a step, as a kernel and as a formula: up to a power of h, the step is the exact flow
+of H̃.
+"""
 
 from __future__ import annotations
 
@@ -35,8 +36,8 @@ def corrections(
     gauge: Gauge | None = None,
     values: Mapping[str, Fraction] | None = None,
 ) -> ModifiedSeries:
-    """Return the terms H_0, H_1, … of the modified Hamiltonian, the coefficients of powers of h, up to ``count``
-    corrections.
+    """Return the terms H_0, H_1, … of the modified Hamiltonian Σ h^k H_k, as far as needed for ``count`` corrections of
+    H_0.
 
     The Casimirs of the ``gauge`` are subtracted from H before. The ring of the terms also contains the step size.
     Numbers in ``values`` replace parameters, which shortens formulas. Raises `LimitError` if a correction is too large.
@@ -92,14 +93,15 @@ def expect_modified(system: System, realisation: BiRealisation, stages: int) -> 
 def modified_of(
     system: System, realisation: BiRealisation, order: Order, gauge: Gauge, count: int, stages: int
 ) -> Modified:
-    """Return the modified Hamiltonian as a kernel, with the power of h that it omits. Raises the errors of
-    `expect_modified`."""
+    """Return the modified Hamiltonian as a kernel, with the lowest power of h that it omits. Raises the errors of
+    `expect_modified`.
+    """
     expect_modified(system, realisation, stages)
     value = modified_hamiltonian(system, realisation, order, count, gauge)
     time = {"t": system.times} if system.time else {}
     kernel = Kernel(
         "modified",
-        f"the Hamiltonian whose flow the step is, with {count} correction{'s' * (count != 1)}",
+        f"the modified Hamiltonian with {count} correction{'s' * (count != 1)}: up to a power of h, a step is its flow",
         {"params": system.parameter_names, **gauge.inputs, "h": (STEP,), **time, "x": system.coordinates},
         (Output("energy", (value,)),),
     )

@@ -37,7 +37,7 @@ def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | N
     (value,) = generating.coefficients.hoist([generating.elapsed])
     return Kernel(
         "elapsed",
-        "the time that a step takes, by its point y: the derivative of S_h by e",
+        "the physical time of a step, from the solution y: the derivative of S_h with respect to e",
         {"coef": generating.coefficients.slots, "y": system.coordinates},
         (Output("elapsed", (value,)),),
     )
@@ -48,7 +48,7 @@ def rate_kernel(system: System, monitor: Expression) -> Kernel:
     expression."""
     return Kernel(
         "monitor",
-        "dt/dtau, which has to be positive",
+        "the rate dt/dtau, which has to be positive",
         {"params": system.parameter_names, "x": system.coordinates},
         (Output("rate", (monitor,)),),
     )

@@ -84,10 +84,11 @@ _SRKN14A = """
     0.207305069056895744169370738047259668
 """
 
-#: Times and multiples of methods that were computed for phigen: Newton's method solved the order conditions from many
-#: random starts. Free parameters were determined by least squares of the leading error, then by a random search for the
-#: least energy errors of four systems (Kowalevski top, Hénon–Heiles, Kepler, two coupled pendulums). All digits are
-#: from a last Newton iteration. The tests verify the order conditions.
+#: Coefficients of methods that were found for phigen: the times of the flows, and the multiples of modified potentials.
+#: Newton's method solved the order conditions from many random starts. Free parameters were determined by least squares
+#: of the leading error, then by a random search for the least energy errors of four systems (Kowalevski top,
+#: Hénon–Heiles, Kepler, two coupled pendulums). All digits are from a last Newton iteration. The tests verify the order
+#: conditions.
 _GRADIENT_3 = """
     0.080025653215254155070797714594342583 0.272898300356015957781728984549341217
     0.419974346784745844929202285405657417 0.454203399287968084436542030901317567

@@ -19,7 +19,8 @@ class Order:
 
 
 def plan_order(order: int | None, terms: int | None, *, symmetric: bool) -> Order:
-    """Return the order and the number of terms of a method, from one of the two; the other argument is None.
+    """Return the order and the number of terms of a method. Exactly one of the arguments ``order`` and ``terms`` is
+    None.
 
     In a symmetric bi-realisation the terms S_i with even i vanish, and the method is symmetric, so its order is even:
     the terms S_1 … S_k with odd k give order k + 1. In any other bi-realisation S_1 … S_k give order k.

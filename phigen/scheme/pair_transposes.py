@@ -22,7 +22,7 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 _OTHER = {"a": "b", "b": "a"}
 
 
-#: The end of a bond, and the site that must have the colour of the sweep, as seen from the site at the other end.
+#: Values of `Ends.end` and of `Ends.chosen` after an exchange of the two sites of a bond.
 _OPPOSITE = {"": "", "a": "b", "b": "a"}
 _CHOSEN = {"": "", "here": "there", "there": "here"}
 

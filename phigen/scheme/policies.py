@@ -44,17 +44,17 @@ def count(value: int, description: str) -> int:
 class StartPolicy(Policy):
     """The first evaluation of the coefficients, which checks the values of parameters before a step size is known."""
 
-    probe_step: float = number(1e-100, "a step size for which coefficients are finite")
+    probe_step: float = number(1e-100, "step size of the evaluation that checks the parameters")
 
 
 @dataclass(frozen=True)
 class MeasurePolicy(Policy):
     """The size of a correction of y, the solution of the implicit equation, relative to the components of y.
 
-    For coordinates that keep their sign and may differ much in size, the floor is 0.
+    ``floor`` is 0 if the coordinates keep their signs, since these coordinates may differ much in size.
     """
 
-    floor: float = number(1e-6, "least size of a component of y, as a fraction of the largest")
+    floor: float = number(1e-6, "components of y count as at least this share of the largest")
 
 
 @dataclass(frozen=True)
@@ -69,26 +69,28 @@ class NewtonPolicy(Policy):
 class PathPolicy(Policy):
     """The solution of the equation for p in a step along paths dm/dt = π(m)p, and the Taylor series of a path.
 
-    ``longest_path`` and ``most_pieces`` were measured on the corpus: steps that need more pieces of Taylor series
-    usually have errors as large as the state.
+    A long path is divided into pieces, each of which has a Taylor series. ``longest_path`` and ``most_pieces`` were
+    measured on the corpus: steps that need more pieces usually have errors as large as the state.
     """
 
     longest_path: int = count(128, "largest number of pieces of a path, a power of 2")
     most_pieces: int = count(
         512,
-        "largest number of pieces of all paths of a solve; steps that need more have errors of the size of the state",
+        "largest number of pieces of all paths in the solution for p; with more, errors are as large as x",
     )
-    patience: int = count(3, "iterations with the approximate Jacobian before its contraction is checked")
+    patience: int = count(3, "iterations before it is checked whether the approximate Jacobian is good enough")
     negligible: float = number(1e-17, "terms of a series below this, relative to the path, are rounding")
-    least_share: float = number(1e-5, "smaller coordinates are measured relative to this fraction of their sum")
-    rounded_slope: float = number(2e-15, "rounding of the slope of a path, relative to the path and its slope")
+    least_share: float = number(1e-5, "coordinates count as at least this fraction of the sum of all coordinates")
+    rounded_slope: float = number(2e-15, "accepted error of the slope of a path, relative to the path and its slope")
     difference: float = number(
-        1e-7, "difference of arguments in a difference quotient, relative to p: the root of rounding"
+        1e-7, "increment of p in a difference quotient, relative to p: about the square root of a rounding error"
     )
     solved: float = number(4e-16, "a residual below this, relative to p, is rounding")
     nearly_solved: float = number(1e-12, "a residual below this may be rounding: see SHRINKING")
     shrinking: float = number(0.25, "ratio of successive residuals below NEARLY_SOLVED that shows rounding")
-    contracting: float = number(0.05, "largest reduction factor of the residual by an iteration with a useful Jacobian")
+    contracting: float = number(
+        0.05, "largest ratio of successive residuals with which the approximate Jacobian is good enough"
+    )
 
 
 @dataclass(frozen=True)
@@ -96,16 +98,18 @@ class GaussPolicy(Policy):
     """Fixed-point sweeps over the stages of a Gauss method: when they end, when a step fails, how predictors are
     compared."""
 
-    most_rising: int = count(3, "changes that may grow after transients before the step fails as too large")
+    most_rising: int = count(3, "a step fails after this number of growing changes in a row, plus one for each stage")
     solved: float = number(
-        2e-18, "largest expected change by a further sweep; 2e-17 leaves a linear drift of energy and Casimirs"
+        2e-18, "sweeps end at an expected next change below this; with 2e-17 energy and Casimirs drifted"
     )
     stalled: float = number(
         0.8, "ratio of successive changes from which on sweeps do not help; with 0.4 Casimirs drifted"
     )
-    rounding: float = number(4e-16, "sweeps end at a change below this with at least the ratio STALLED")
+    rounding: float = number(
+        4e-16, "sweeps end at a change below this if its ratio to the change before is at least STALLED"
+    )
     nearly_rounding: float = number(
-        2e-14, "sweeps end at the second change below this that is no smaller than the last"
+        2e-14, "sweeps end at the second change below this that is no smaller than the change before"
     )
     trials: int = count(32, "steps between comparisons of the predictors; a comparison costs as much as two sweeps")
 
@@ -115,16 +119,20 @@ class PredictorPolicy(Policy):
     """Starting values for the iteration of an implicit step, extrapolated from earlier steps by backward
     differences."""
 
-    reach: float = number(4.0, "largest distance from the last value, relative to it")
-    differences: int = count(9, "number of stored differences; higher ones would amplify rounding errors")
+    reach: float = number(4.0, "largest relative distance of a prediction from the last value")
+    differences: int = count(
+        9, "number of stored differences; differences of higher order would amplify rounding errors"
+    )
 
 
 @dataclass(frozen=True)
 class PlausibilityPolicy(Policy):
-    """Criteria that reject a spurious solution of an implicit step: one far from the state, with another energy."""
+    """Criteria that reject spurious solutions of an implicit step: solutions far from the state, with another
+    energy.
+    """
 
-    plausible: float = number(1.5, "accepted length of steps, relative to state and motion")
-    max_energy_change: float = number(0.5, "largest relative change of energy in longer steps")
+    plausible: float = number(1.5, "relative length of steps above which the energy is checked")
+    max_energy_change: float = number(0.5, "accepted relative change of energy if it is checked")
 
 
 @dataclass(frozen=True)
@@ -133,14 +141,14 @@ class GaugeSearch(Policy):
 
     samples: int = count(32, "number of states along a short piece of the trajectory")
     degree: int = count(6, "S_3 is cubic in H, so the square of the error is of degree six in each multiple")
-    sweeps: int = count(4, "most rounds over all multiples")
-    grids: int = count(3, "number of grids on a line, each finer than the one before by the factor mesh")
-    first_reach: int = count(24, "points of the first grid on either side")
-    reach_of_grid: int = count(8, "points of the other grids on either side")
+    sweeps: int = count(4, "largest number of rounds over all multiples")
+    grids: int = count(3, "number of grids on a line, each finer than the grid before by the factor MESH")
+    first_reach: int = count(24, "number of points of the first grid on each side of its centre")
+    reach_of_grid: int = count(8, "number of points of each finer grid on each side of its centre")
     mesh: float = number(0.125, "mesh of the first grid, in units of the width of the search")
-    sample_length: float = number(0.25, "distance between successive states, relative to the first")
+    sample_length: float = number(0.25, "distance of successive states, relative to the first state")
     close_call: float = number(
-        1e-12, "errors that differ less than this, relative to all on a line, are equal: rounding must not decide"
+        1e-12, "errors with a smaller difference, relative to the sum of all errors on a line, count as equal"
     )
 
 
@@ -169,10 +177,12 @@ class GaussTangentPolicy(Policy):
 class GaussAdjointPolicy(Policy):
     """Sweeps that solve the transposed linear equations of the stages of a Gauss step, for gradients."""
 
-    adjoint_solved: float = number(1e-17, "largest expected change by a further sweep, relative to the cotangents")
+    adjoint_solved: float = number(
+        1e-17, "sweeps end at an expected next change below this, relative to the cotangents"
+    )
     adjoint_stalled: float = number(0.8, "ratio of successive changes from which on sweeps do not help")
     adjoint_rounding: float = number(
-        1e-12, "sweeps end at the second change below this with at least the ratio ADJOINT_STALLED"
+        1e-12, "sweeps end at the second change below this with a ratio above ADJOINT_STALLED"
     )
 
 
@@ -181,7 +191,9 @@ class PathTangentPolicy(Policy):
     """The Taylor series of a path together with its variation, for the derivatives of a step."""
 
     tangent_negligible: float = number(1e-18, "terms below this fraction of start and sum are rounding")
-    tangent_rounded_slope: float = number(1e-13, "rounding of slopes with variations, relative to path and slope")
+    tangent_rounded_slope: float = number(
+        1e-13, "accepted error of the slopes of a path and its variation, relative to path and slope"
+    )
 
 
 @dataclass(frozen=True)
@@ -189,12 +201,12 @@ class LatticeSweepPolicy(Policy):
     """Sweeps over a lattice that solve the implicit equation of a stage, for steps with a generating function."""
 
     differences: int = count(4, "number of differences in the predictor of a stage")
-    patience: int = count(10, "sweeps after which slow convergence is left to Newton's method")
-    least_size: float = number(1e-3, "smaller fields are measured relative to this fraction of the largest")
-    settled: float = number(2.0**-55, "largest expected change by further sweeps, relative to y")
+    patience: int = count(10, "sweeps before Newton's method may replace slow sweeps")
+    least_size: float = number(1e-3, "fields count as at least this fraction of the largest field")
+    settled: float = number(2.0**-55, "expected relative change of y below which sweeps end")
     rounding: float = number(2.0**-40, "changes below this may be rounding")
-    slow: float = number(0.6, "a change above this fraction of the one before is left to Newton's method")
-    nearly_settled: float = number(2.0**-30, "changes below this are not left to Newton's method")
+    slow: float = number(0.6, "convergence is slow if a change exceeds this fraction of the change before")
+    nearly_settled: float = number(2.0**-30, "Newton's method does not take over at changes below this")
 
 
 @dataclass(frozen=True)
@@ -205,7 +217,9 @@ class LatticeNewtonPolicy(Policy):
     directions: int = count(24, "dimension of the Krylov space of a correction")
     solved: float = number(1e-6, "relative residual at which the iteration for a correction ends")
     useful: float = number(0.9, "largest relative residual of an accepted correction")
-    plausible: float = number(1.5, "solutions farther from x than this, relative to x and its motion, are rejected")
+    plausible: float = number(
+        1.5, "solutions farther from x than this, relative to x and its first change, are rejected"
+    )
 
 
 @dataclass(frozen=True)

@@ -30,10 +30,10 @@ def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
 
 
 def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str]) -> dict[str, str]:
-    """Return the renaming of the symbols of noise increments that belongs to an exchange of the ``fields`` by
-    ``order``.
+    """Return the renaming of the symbols of noise increments that accompanies a permutation of the fields.
 
-    The renaming is empty unless each field has exactly one source of noise.
+    The symbol for ``fields[k]`` becomes the symbol for the field ``order[k]``. The renaming is empty unless each field
+    has exactly one source of noise.
     """
     if len(sites.increments) != len(order):
         return {}

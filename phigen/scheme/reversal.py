@@ -22,8 +22,8 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import Symbol, coefficient
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Output of a transposed flow: the state before the flow. Also the name of the input with those fields after the flow
-#: that are needed for it alone.
+#: Name of an output of a transposed flow: the state before the flow. An input has the same name: fields after the flow
+#: that no other part of the transposed flow reads.
 STATE_BEFORE = "state_before"
 
 ODD, NEITHER, EVEN = -1, 0, 1
@@ -50,9 +50,9 @@ def over_negative_time(values: Sequence[Expression], parities: Mapping[str, int]
 def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> list[Expression]:
     """Return values at the state before a flow, as expressions in the state after it.
 
-    ``changes`` are the increments of the inverse flow. Sub-expressions that the flow does not change are not computed
-    again. These are sums, such as the sum of two spins that rotate about it, and arguments of functions, such as |ψ|²
-    in a flow that changes phases only. That the flow does not change them is proved.
+    ``changes`` are the increments of the inverse flow. Sub-expressions are not computed again if it is proved that the
+    flow does not change them. Two kinds of sub-expressions are tried: sums, such as the sum of two spins that rotate
+    about it, and arguments of functions, such as |ψ|² in a flow that changes phases only.
     """
     previous = {s: symbol(s) + change for s, change in changes.items()}
 

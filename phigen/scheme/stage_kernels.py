@@ -13,7 +13,8 @@ from phigen.symbolic.expression import ZERO, gradient
 #: Name of the kernel of the derivatives of the right-hand side of y = … at a site with respect to y at the same site.
 _BLOCK = "own_slope"
 
-#: Selections of cotangents for a transposed kernel: (those of fields, all others).
+#: Selections of cotangents for a transposed kernel, as pairs: whether it computes the cotangents of fields, and whether
+#: it computes all other cotangents.
 _ALL, _FIELDS, _OTHERS = (True, True), (True, False), (False, True)
 
 #: Transposed kernels of a stage in the order of the reverse pass, with the kernels that they transpose. The first one
@@ -57,7 +58,7 @@ def site_block(step: Sweeps, fields: Sequence[str], relax: Kernel) -> Kernel:
     return replace(
         relax,
         name=_BLOCK,
-        purpose="derivative of y at a site by y at the same site",
+        purpose="derivative of the right-hand side at a site with respect to y at the same site",
         outputs=(Output(_BLOCK, tuple(slopes)),),
         role=Role.OWN_SLOPE,
     )

@@ -20,7 +20,7 @@ from phigen.symbolic.symbols import COEFFICIENT, RENEWED, Symbol, coefficient, k
 
 T = TypeVar("T")
 
-#: The inputs of a step that are new in every step, with their description in generated code.
+#: The inputs of a step that change from step to step, with their description in generated code.
 INPUTS = {"t": "the time", "dw": "the increments of the noise"}
 
 #: Name of the table of coefficients as an argument of kernels, and name of the output of ``refresh``, which is the end

@@ -25,12 +25,13 @@ BACK = "_back"
 
 @dataclass(frozen=True)
 class PathAdjoint:
-    """The kernels and recurrences that transpose a step along a path; the formulas are in `phigen.scheme.adjoint`.
+    """The kernels and recurrences that transpose a step along a path; the formulas are in
+    `phigen.scheme.adjoint`.
 
-    ``recurrences`` follow the path backwards together with its cotangents; the last of these belong to the coefficients
-    with the indices ``used``. ``curvature`` computes ∇S_h and its Hessian at the mean of the path. ``slope`` is the
-    transpose of ∇S_h with respect to the coefficients. ``slopes`` are the recurrences for the derivatives of a path, by
-    which many paths are transposed at once.
+    ``recurrences`` follow the path backwards together with its cotangents. The last cotangents are those of the
+    coefficients with the indices ``used``. ``curvature`` computes ∇S_h and its Hessian at the mean of the path.
+    ``slope`` is the transpose of ∇S_h with respect to the coefficients. ``slopes`` are the recurrences for the
+    derivatives of a path, by which many paths are transposed at once.
     """
 
     recurrences: Recurrences
@@ -554,7 +555,7 @@ class Sites:
     at_bonds: tuple[str, ...] = ()  # names of the parameters with a value at each bond
     increments: tuple[str, ...] = ()  # symbols of the noise increments of a site in one part of a step
     derived: tuple[Symbol, ...] = ()  # symbols of values at sites, computed from parameters
-    seams: tuple[Seam, ...] = ()  # boundary seams along the axes, by which the colouring fits every size
+    seams: tuple[Seam, ...] = ()  # boundary seams along axes whose size may not fit the colouring
 
 
 @dataclass(frozen=True)

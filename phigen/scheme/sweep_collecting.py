@@ -1,10 +1,10 @@
 """Transposed sweeps of lattices in collecting form: each site computes the contributions of its neighbours to its
 cotangents.
 
-In the other form a neighbour computes the contribution and stores it for the site. Collecting is faster if
+In the storing form, a neighbour computes the contribution and stores it for the site. Collecting is faster if
 contributions are cheap, such as those of springs: the site reads the fields of its neighbours anyway, and only their
-cotangents are read in addition. Expensive contributions, such as sines of sums over neighbours, are computed once, by
-the neighbour.
+cotangents are read in addition. Storing is faster for expensive contributions, such as sines of sums over neighbours,
+since the neighbour computes them only once.
 """
 
 from __future__ import annotations

@@ -74,8 +74,11 @@ def site_blocks(program: Program, step: Sweeps) -> bool:
 
 
 def waves(program: Program, step: Sweeps) -> bool:
-    """Whether wavefront blocking applies: for splittings on grids, whose flows read only neighbours, in the profile
-    ``fast``."""
+    """Whether wavefront blocking applies: to splittings on grids with several flows in a step, in the profile
+    ``fast``.
+
+    Flows on grids read only neighbours. There must be neither noise nor boundary seams.
+    """
     is_splitting = step.equation is None and step.partners is None and not step.sites.seams
     return is_splitting and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
 
@@ -120,9 +123,9 @@ def handed_apart(program: Program, step: Sweeps) -> list[bool]:
 
 
 def ways(step: Sweeps) -> list[tuple[int, int]]:
-    """Return pairs of parts: for each flow of a step its part and the part of the next flow.
+    """Return a pair of parts for each flow of a step: the part of this flow, and the part of the next flow.
 
-    A last pair is for the first flow, merged with the last flow of the step before.
+    The last flow of a step is merged with the first flow of the next step. A last pair is for this merged flow.
     """
     parts = [part for part, _ in step.schedule.flows]
     next_parts = [*parts[1:], parts[1 % len(parts)]]
@@ -139,7 +142,7 @@ def shares(step: Sweeps) -> bool:
 
 
 def givers(step: Sweeps) -> bool:
-    """Whether open ends can make the rows from which a row receives cotangents differ from the rows that it reads."""
+    """Whether a row can receive cotangents from other rows than those that it reads, because of open ends."""
     return any(step.sites.open[:-1])
 
 

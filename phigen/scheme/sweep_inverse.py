@@ -74,11 +74,12 @@ def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
 
 
 def unweighted(sites: Sites, transpose: Kernel) -> Kernel:
-    """Return a transposed kernel without those factors that are 0 if a term of H extends beyond an open end, else 1.
+    """Return a transposed kernel without those factors that are 0 if a term of H extends beyond an open end,
+    else 1.
 
-    They are omitted in values that are stored for neighbours, which are then often the same for many neighbours. A
-    factor can be omitted if it is 1 at every site whose neighbour reads the value; it stays if the term extends beyond
-    this neighbour.
+    Factors are omitted in values that a site stores for a neighbour; the values for many neighbours are then often the
+    same. A factor can be omitted if it is 1 at every site that has this neighbour. It cannot be omitted if the term
+    extends beyond the neighbour.
     """
 
     def without_weights(name: str, value: Expression) -> Expression:
