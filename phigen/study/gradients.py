@@ -167,7 +167,7 @@ def difference_error(run: GradedRun) -> float:
     least = _LEAST * float(np.sum(np.abs(run.bars * run.rows(run.x, run.parameters))))
     worst = 0.0
     for exact, difference in _derivatives(run, x_bar, parameters_bar):
-        apart = [abs(exact - d) / max(abs(exact), abs(d), least) for d in _differences(run, difference)]
+        apart = [abs(exact - d) / (max(abs(exact), abs(d), least) or 1.0) for d in _differences(run, difference)]
         worst = max(worst, min(apart, default=math.inf))
     return worst
 

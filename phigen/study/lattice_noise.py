@@ -16,7 +16,8 @@ from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeSolver
 from phigen.scheme.program import MAX_NORMAL_VARIATE
 from phigen.spec.model import Spec, SpecForces
-from phigen.study.stochastic import BEYOND, LEVELS, SEED, SIGNS
+from phigen.study.methods import size_of
+from phigen.study.stochastic import BEYOND, LEVELS, SEED, SIGNS, observed_power
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import ZERO
 
@@ -45,12 +46,13 @@ def strong_order(
     kinds, parts = len(noise.sources), noise.parts
     fields = [_field(compilation.spec, name) for name in noise.sources]
     finest = STEPS << (LEVELS + BEYOND)
-    random, errors = np.random.default_rng(SEED), np.zeros(LEVELS)
+    random, errors, size = np.random.default_rng(SEED), np.zeros(LEVELS), 0.0
     for _ in range(paths):
         # The path is given by its increments over equal times: one for each part of each step of the finest size.
-        size = np.sqrt(abs(h) * STEPS / finest / parts)
-        path = random.normal(size=(finest * parts, kinds, *x0.shape[1:])) * size
+        deviation = np.sqrt(abs(h) * STEPS / finest / parts)
+        path = random.normal(size=(finest * parts, kinds, *x0.shape[1:])) * deviation
         end = _along_lines(solver, fields, x0, parameters, t0, h * STEPS / finest, path, parts)
+        size = max(size, size_of(end))
         for level in range(LEVELS):
             step_count = STEPS << level
             coarse = path.reshape(step_count, parts, -1, *path.shape[1:]).sum(axis=2)
@@ -60,7 +62,7 @@ def strong_order(
             except BackendError:
                 return np.nan
             errors[level] += np.sum((session.state() - end) ** 2)
-    return float(-np.polyfit(np.arange(LEVELS), np.log2(errors) / 2, 1)[0]) if errors.all() else np.inf
+    return observed_power(np.sqrt(errors / (paths * x0.size)), size)
 
 
 def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any], t0: float | None, h: float) -> int:

@@ -171,7 +171,7 @@ def _order(subject: _Subject, *, quiet: bool = False) -> Check:
     if step and len(step.parts) == 1 and not step.by_colour:
         return Check(name, math.inf)
     order, x, size = subject.compilation.order.order, subject.start.state, _size(subject.start.state)
-    span, slopes, largest = 4 * abs(subject.h), dict[float, float](), 0.0
+    span, slopes, measured_errors = 4 * abs(subject.h), dict[float, float](), list[float]()
     for _ in range(5):
         try:
             reference = subject.stepped(x, span / 256, 256)
@@ -179,8 +179,10 @@ def _order(subject: _Subject, *, quiet: bool = False) -> Check:
         except StepError:
             break
         slopes |= {b: math.log2(a / b) for a, b in pairwise(errors) if MAX_ROUNDING < b < a < 0.1}
-        span, largest = 2 * span, max(largest, *errors)
-    if 0 < largest <= MAX_ROUNDING:  # results with steps of all sizes agree, so each step is exact
+        span, measured_errors = 2 * span, measured_errors + errors
+    if (
+        measured_errors and max(measured_errors) <= MAX_ROUNDING
+    ):  # results with steps of all sizes agree, so each step is exact
         return Check(f"{name} (errors at round-off)", math.inf, order_limit(order))
     measured = slopes[min(slopes)] if slopes else math.nan
     is_passed = measured >= order - ORDER_SLACK

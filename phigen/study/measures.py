@@ -10,7 +10,7 @@ import numpy as np
 
 from phigen.errors import StepError
 from phigen.geometry.system import System
-from phigen.study.methods import Method, by_differences
+from phigen.study.methods import Method, by_differences, size_of
 from phigen.symbolic.arrays import Floats, evaluate
 
 #: Relative rounding error of a few operations. Errors up to a few times this are not errors of the method.
@@ -51,7 +51,7 @@ def observed_order(method: Method, reference: Callable[[float], tuple[Floats, fl
     ``reference(t)`` returns the solution at the time t, and its relative error.
     """
     solution, uncertainty = reference(t)
-    size = float(np.max(np.abs(solution)))
+    size = size_of(solution)
     floor = max(uncertainty, 4 * ROUNDING)
     errors: dict[int, float] = {}
     for n in _REFINEMENTS:
@@ -113,8 +113,8 @@ def tangent_error(method: Method, x: Floats, h: float) -> float:
 
 
 def reversal(method: Method, x: Floats, h: float) -> float:
-    """Return |Φ_{−h}(Φ_h(x)) − x|, relative to the largest coordinate."""
-    return float(np.max(np.abs(method.after(h).step(method.step(x, h), -h) - x))) / float(np.max(np.abs(x)))
+    """Return |Φ_{−h}(Φ_h(x)) − x|, relative to the largest coordinate, or absolute if x = 0."""
+    return float(np.max(np.abs(method.after(h).step(method.step(x, h), -h) - x))) / size_of(x)
 
 
 def largest_step(method: Method, states: Sequence[Floats], h: float, max_factor: float = 256.0) -> float:

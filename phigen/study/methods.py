@@ -121,13 +121,18 @@ def of_classical(
     return Method(name, step, rows, later=later)
 
 
+def size_of(x: Floats) -> float:
+    """Return the largest absolute value of the entries of ``x``, to which errors are relative; 1 if all are 0."""
+    return float(np.max(np.abs(x))) or 1.0
+
+
 def by_differences(method: Method, x: Floats, h: float, finer: float = 1.0, *, by_coordinate: bool = False) -> Floats:
     """Return the derivative (DIM, DIM) of a step by central differences of order 6.
 
     A coordinate is displaced in proportion to its size, but at least to a tenth of the largest coordinate; with
     ``by_coordinate`` this bound is dropped, for example for momenta of small masses. ``finer`` divides displacements.
     """
-    size = float(np.max(np.abs(x))) or 1.0
+    size = size_of(x)
     widths = _WIDTH / finer * np.where(x == 0, 0.1 * size, np.maximum(np.abs(x), 0.0 if by_coordinate else 0.1 * size))
     moves = [k * width * row for row, width in zip(np.eye(len(x)), widths, strict=True) for k, _ in _WEIGHTS]
     ahead, behind = (method.steps(x + sign * np.array(moves), h) for sign in (1, -1))

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from phigen.study import classical
+from phigen.study.methods import size_of
 from phigen.study.race import OWN, Race, Runner
 from phigen.symbolic.arrays import Floats
 
@@ -124,8 +125,7 @@ def study(
 
 def error_of(state: Floats, target: Floats) -> float:
     """Return the largest error of a coordinate, relative to the largest coordinate."""
-    size = float(np.max(np.abs(target))) or 1.0
-    return max(float(np.max(np.abs(state - target))) / size, ROUNDING)
+    return max(float(np.max(np.abs(state - target))) / size_of(target), ROUNDING)
 
 
 def slope(errors: Mapping[int, float], floor: float) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from phigen.geometry.conservation import largest_terms, rounding
 from phigen.geometry.system import System
-from phigen.study.methods import Method
+from phigen.study.methods import Method, size_of
 from phigen.study.summary import summarise
 from phigen.symbolic.arrays import Floats
 
@@ -61,5 +61,5 @@ def farthest(single: Step, double: Step, states: Sequence[Floats], h: float) -> 
     for x in states:
         rounded = x.astype(np.float32).astype(np.float64)
         image = double(rounded, h)
-        worst = max(worst, float(np.max(np.abs(single(rounded, h) - image)) / np.max(np.abs(image))))
+        worst = max(worst, float(np.max(np.abs(single(rounded, h) - image))) / size_of(image))
     return worst

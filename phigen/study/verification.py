@@ -21,7 +21,7 @@ from phigen.geometry.checks import commuting
 from phigen.geometry.conservation import Unit, largest_terms, rounding, units_of
 from phigen.runtime.solver import Solver
 from phigen.study import backward, gradients, measures, single_precision
-from phigen.study.methods import Method, field_of, of_classical, of_solver, without_noise
+from phigen.study.methods import Method, field_of, of_classical, of_solver, size_of, without_noise
 from phigen.study.monitored import field_in_tau, with_time
 from phigen.study.stochastic import failures, strong_order
 from phigen.study.summary import Drift, Summary, summarise
@@ -304,7 +304,7 @@ def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
                     last = None
                     continue
                 if last is not None:
-                    error = float(np.max(np.abs(state - last)) / np.max(np.abs(state)))
+                    error = float(np.max(np.abs(state - last))) / size_of(state)
                     if best is None or error < best[1]:
                         best = (state, error)
                     if error <= 4 * measures.ROUNDING:
@@ -482,7 +482,7 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
         return Check(f"agreement: only one target, {subject.main.name}", math.nan)
     for x in states:
         images = [m.step(x, subject.h) for m in subject.own.values()]
-        size = float(np.max(np.abs(images[0])))
+        size = size_of(images[0])
         difference = max(difference, *(float(np.max(np.abs(i - images[0]))) / size for i in images[1:]))
     is_passed = difference <= ONE_STEP
     return Check(

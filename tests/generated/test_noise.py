@@ -284,6 +284,20 @@ def test_the_strong_order_is_reached(kind):
     assert observed_order == pytest.approx(stated, abs=0.2)
 
 
+KICKS = """coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: q**4/4
+noise: {w: {hamiltonian: q, amplitude: 1/4}}
+scheme: splitting
+"""
+
+
+def test_steps_that_follow_paths_exactly_have_no_finite_strong_order():
+    """The errors are those of rounding, whose slope means nothing."""
+    exact = solver(compile_text(KICKS), "c")
+    assert strong_order(exact, np.array([0.3, 0.1]), {}, 0.0, 0.1, 8) == np.inf
+
+
 def wrong(kind, *, drift=0.0, spread=1.0):
     """Return a solver whose reference has another drift (in units of the state) or another amplitude of the noise."""
     right = solver(made(kind), "c")

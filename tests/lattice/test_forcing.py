@@ -76,7 +76,12 @@ HOT = (
     f"lattice: {{axes: [i, j], boundary: [periodic, open]}}\nscheme: splitting\n{HEAT}{BATH}{SPINS}"
     'hamiltonian: "-(x*x[i+1] + y*y[i+1] + z*z[i+1] + x*x[j+1] + y*y[j+1] + z*z[j+1])"'
 )
-TEXTS = {**FORCED, **NOISY, "langevin": LANGEVIN, "hot": HOT}
+#: Noise and a potential, both functions of q: steps follow paths of the noise exactly.
+KICKED = (
+    f"lattice: {{axes: [i]}}\nnoise: {{w: {{hamiltonian: q, amplitude: 1/4}}}}\n{CANONICAL}"
+    'hamiltonian: "q**4/4 + q*q[i+1]"'
+)
+TEXTS = {**FORCED, **NOISY, "langevin": LANGEVIN, "hot": HOT, "kicked": KICKED}
 BONDS = np.array([[0, 1], [1, 2], [2, 0], [2, 3], [4, 3], [3, 4]])
 SIZES = {"web": (5,), "warm": (5,), "bath": (3, 2), "hot": (3, 2), "cool": (4, 2)}
 pytestmark = pytest.mark.few("damped", "stretched", "web", "bath", "cool", "free", "langevin", of=TEXTS)
@@ -250,8 +255,8 @@ def test_friction_and_noise_have_the_gibbs_measure() -> None:
 
 
 #: One source of noise with several parts of H; three sources that do not commute, before and after the parts of a
-#: splitting.
-STRONG = {"langevin": (1.0, 60), "hot": (0.5, (6, 6))}
+#: splitting; steps whose errors are rounding errors.
+STRONG = {"langevin": (1.0, 60), "hot": (0.5, (6, 6)), "kicked": (np.inf, 60)}
 
 
 def strongly(name: str, paths: int = 2) -> float:

@@ -218,3 +218,21 @@ def test_verification_tells_poisson_maps_to_roundoff(kind: type[LatticeSolver], 
     failed = {c.name for c in verification.checks if not c.passed}
     assert [s for s in ("Poisson identity", "tangent map") if any(name.startswith(s) for name in failed)] == short
     assert any(c.name.startswith("Poisson identity on 3 sites") for c in verification.checks)
+
+
+def test_lattices_at_rest_have_errors_at_round_off() -> None:
+    """The state is an equilibrium, where steps of all sizes change nothing."""
+    text = """phigen: 1
+name: rest
+lattice: {axes: [i], boundary: periodic}
+coordinates: [a, b]
+poisson: {brackets: {a: {b: a/2, "b[i+1]": -a/2}}}
+hamiltonian: a**2/2 + b**2/2
+order: 4
+"""
+    compilation = compile_spec(specs.loads(text), tangent=True)
+    begin = Start((8,), np.full((2, 8), 1.3), {}, np.empty((0, 2), dtype=np.int64))
+    solvers = {"numpy": lattice_solver_of(compilation, "numpy")}
+    (order, *_) = verify_lattice(compilation, solvers, "run", begin, 0.1, 20).checks
+    assert order.passed
+    assert (order.name, order.value) == ("observed order (errors at round-off)", np.inf)

@@ -103,6 +103,30 @@ def test_a_good_solver_passes_and_rk4_stands_beside_it():
     assert checks["largest step that converges, in steps of the run"].value > 1
 
 
+PENDULUM = """phigen: 1
+name: t
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - cos(q)
+order: 4
+"""
+
+
+@pytest.mark.parametrize(
+    "text", [TEXT, PENDULUM, f"{PENDULUM}scheme: splitting\n"], ids=["body", "series", "splitting"]
+)
+def test_states_at_rest_in_the_origin_are_verified(text):
+    """All errors are 0, and so are the states by which they would be divided."""
+    compilation = compile_spec(spec.loads(text), tangent=True, adjoint=True)
+    solvers = {target: solver_of(compilation, target) for target in ("c", "numpy")}
+    start = [0.0] * len(compilation.system.coordinates)
+    measured = verification.verify(compilation, solvers, "rest", start, {}, 0.1, 20, quick=True)
+    assert measured.failures == []
+    values = {check.name: check.value for check in measured.checks}
+    assert values["observed order (errors at round-off)"] == np.inf
+    assert values["agreement of c and numpy"] == values["reversibility: a step there and back"] == 0
+
+
 def test_rk4_posing_as_the_step_is_found_out():
     compilation = compilation_of()
 
