@@ -156,7 +156,7 @@ def compiled_solvers(tmp_path_factory):
 
 @pytest.fixture
 def as_users_compile(request, compiled_solvers, monkeypatch):
-    """With --all, compile C with -O3, as users do, if the test names no system of the corpus except those in
+    """With --all, compile C with -O3, as users do. Tests that name systems of the corpus do so only for systems in
     `QUICK`.
     """
     values = request.node.callspec.params.values() if hasattr(request.node, "callspec") else ()
@@ -170,7 +170,7 @@ def _optimised(how):
 
 @pytest.fixture
 def without_compiler(monkeypatch, tmp_path_factory):
-    """Hide all C compilers: PATH, CC and the compilers in Python packages."""
+    """Hide all C compilers: those in PATH, the variable CC, and the compilers in Python packages."""
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path_factory.mktemp("empty")))
     monkeypatch.setattr(toolchain, "find_spec", lambda name: None)

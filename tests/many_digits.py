@@ -121,14 +121,14 @@ def _anomaly(t: Any, r: Any, eta: Any, beta: Any, mu: Any, _spin: Any) -> Any:
 
 
 def _amplitude(t: Any, p: Any, r: Any) -> Any:
-    """Return tan(φ/4)/√P with φ the Jacobi amplitude of √P t for the parameter 1 − R/P."""
+    """Return tan(φ/4)/√p, where φ is the Jacobi amplitude am(√p t) for the parameter 1 − r/p."""
     sn, cn = (mpmath.ellipfun(name, mpmath.sqrt(p) * t, m=1 - r / p) for name in ("sn", "cn"))
     return mpmath.tan(mpmath.atan2(sn, cn) / 4) / mpmath.sqrt(p)
 
 
 def _amplitude_integral(kind: str, t: Any, p: Any, r: Any) -> Any:
-    """Return the integral of sn²/P from 0 to t with ``kind`` sn, or that of sd²/P with ``kind`` sd; the argument of sn
-    and sd is √P u, the parameter 1 − R/P.
+    """Return the integral over u from 0 to t of sn(√p u)²/p if ``kind`` is sn, or of sd(√p u)²/p if it is sd. Jacobi's
+    functions have the parameter 1 − r/p.
     """
 
     def integrand(u: Any) -> Any:
@@ -138,7 +138,7 @@ def _amplitude_integral(kind: str, t: Any, p: Any, r: Any) -> Any:
 
 
 def _third(t: Any, p: Any, r: Any, n: Any) -> Any:
-    """Return the integral of S²/(1 − n S²) from 0 to t, where S(u) = sn(√P u)/√P with the parameter 1 − R/P."""
+    """Return the integral of S²/(1 − n S²) over u from 0 to t, where S = sn(√p u)/√p with the parameter 1 − r/p."""
 
     def integrand(u: Any) -> Any:
         square = mpmath.ellipfun("sn", mpmath.sqrt(p) * u, m=1 - r / p) ** 2 / p

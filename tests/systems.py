@@ -196,7 +196,7 @@ def _fractions(coordinates: Sequence[str], at: Setting) -> dict[str, Fraction]:
 
 
 def series_of(system, realisation, terms, static=()):
-    """Return S_1 … S_terms of the Hamilton–Jacobi series as elements of the differential ring of a tower."""
+    """Return the terms S_1 … S_terms of the Hamilton–Jacobi series of a system, as elements of a differential ring."""
     return hamilton_jacobi(system, realisation, terms, static).polynomial(terms)
 
 

@@ -1,5 +1,5 @@
-"""The golden files are current: whole solvers in generated/, and in tests/golden the paragraphs of other solvers that
-no whole solver has; see tests/golden.py.
+"""The golden files are up to date: whole solvers in generated/ and, in tests/golden, paragraphs of the other solvers.
+tests/golden.py describes these files.
 """
 
 import os

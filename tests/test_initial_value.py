@@ -69,7 +69,8 @@ def test_an_event_ends_the_integration_where_it_is_met():
 
 
 def test_status_says_that_the_end_was_not_reached():
-    lotka = phigen.solve_ivp(solver_of("lotka_volterra"), (0, 1), [-3, 5, 0.001], h=0.01)  # infinite at t = 0.2554
+    # This solution becomes infinite at t = 0.2554.
+    lotka = phigen.solve_ivp(solver_of("lotka_volterra"), (0, 1), [-3, 5, 0.001], h=0.01)
     assert lotka.status == -1
     assert not lotka.success
     assert 0 < lotka.t[-1] < 0.26

@@ -207,7 +207,7 @@ def rows(matrix: Matrix) -> list[list[str]]:
 
 
 def written(source: random.Random, x: Sequence[Symbol], pi: Matrix) -> dict[str, Any]:
-    """Return a structure in the form for a spec: as a matrix, or as brackets with a random order in each pair."""
+    """Return a structure in the form for a spec: as a matrix, or as brackets {a, b}, some of them written as {b, a}."""
     if source.random() < 0.2:
         return {"matrix": rows(pi)}
     brackets: dict[str, dict[str, str]] = {}

@@ -169,7 +169,9 @@ def starts(trial: Trial) -> None:
 
 
 def _expect_drawn(system: Lattice, value: Floats, said: Any, what: str) -> None:
-    """Check that an array equals the number, formula or list in the spec, or its mean plus random numbers."""
+    """Check that an array has the values that the spec gives: a number, a formula, a list, or random numbers about a
+    mean.
+    """
     if not isinstance(said, dict):
         return expect_close(value, _spelt(system, said, value.shape), 1e-14, what, 1.0)
     spread = value - np.broadcast_to(_spelt(system, said.get("mean", 0), value.shape), value.shape)

@@ -221,7 +221,7 @@ class Ordinary:
         return replace(self, parameters=rest, **new)
 
 
-# --- drawing
+# --- random draws
 
 
 def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:

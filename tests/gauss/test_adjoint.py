@@ -173,9 +173,8 @@ def test_transpose_of_a_step_that_fails_leaves_the_state():
 
 @pytest.mark.parametrize("name", ["so4_manakov", "henon_heiles"])
 def test_reverse_sweeps_start_from_those_of_the_step_after(name, monkeypatch):
-    """The reverse pass solves for the cotangents of the stages by fixed-point sweeps that start from those of the
-    following step, transformed to another frame if there is one. This saves a fifth of the sweeps and changes only
-    rounding.
+    """The reverse pass solves for the cotangents of the stages by fixed-point sweeps, which start from the cotangents
+    of the following step. This saves a fifth of the sweeps and changes only rounding.
     """
     compilation = compile_spec(spec_of(name).overridden(order=16, scheme="gauss", adjoint=True))
     x0, h, steps = np.array([float(v) for v in first_run(compilation).initial]), 2.0 if "so4" in name else 0.5, 10

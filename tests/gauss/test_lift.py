@@ -1,5 +1,6 @@
-"""Gauss steps on Lie–Poisson spaces with a frame: a quaternion F, updated in each step, for which the momentum is F* k
-F. The step is the same as without frames, but with fewer products. In C the stages are in SIMD lanes.
+"""Gauss steps on Lie–Poisson spaces with a frame: a quaternion F, updated in each step, such that the momentum is F* k
+F with the quaternion unit k. The step is the same as without frames, but with fewer products. In C the stages are in
+SIMD lanes.
 """
 
 import ctypes
@@ -155,7 +156,7 @@ def test_kicks_do_not_cost_sweeps():
 @pytest.mark.parametrize("name", ["so4_manakov", "spin_chain5"])
 def test_casimirs_do_not_drift(name):
     """Over many steps the errors of Casimirs grow like the square root of the number of steps, as rounding errors do,
-    although frame and state are updated separately.
+    although the quaternion frame and the state are updated separately.
     """
     make, h = CASES[name]
     steps = 40_000

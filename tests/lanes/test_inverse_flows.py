@@ -1,5 +1,5 @@
-"""The reverse pass of an ensemble recomputes states by inverse flows, with the functions that the transposes of the
-flows call anyway.
+"""The reverse pass of an ensemble recomputes states by inverse flows. These call no further elementary functions than
+the flows and their transposes.
 """
 
 from collections import Counter

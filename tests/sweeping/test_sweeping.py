@@ -620,7 +620,7 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
 @pytest.mark.parametrize("noise", ["", "noise: {kick: {hamiltonian: x, amplitude: 0.3}}\n"], ids=["quiet", "noisy"])
 def test_exponents_of_lattices_are_the_growth_of_a_vector(noise):
     """The Lyapunov exponent of a member is the growth rate of a tangent vector, although the vector is rescaled during
-    the run; with noise, along the path with that noise.
+    the run. With noise, the vector follows the same noisy path.
     """
     from phigen.runtime.interface import FIRST_DRAWS, Draws
     from phigen.sweeping.lattice_members import exponent
@@ -663,7 +663,9 @@ def drawn(store, monkeypatch, shown=None):
 
 
 def test_interfaces_come_back_from_a_store():
-    """An interface is equal after storing and loading, also its nested record of launches of device kernels."""
+    """The description of a solver's interface, with its nested record about device kernels, is unchanged by storing and
+    loading.
+    """
     for source in (BODY, SPRINGS):
         about = interface_of(compilation_of(specs.loads(source)).program)
         stored = store.solver_data(about, {}, "", "")["interface"]

@@ -1,4 +1,6 @@
-"""Lattices in `phigen tune`: the searches are the same as for other systems, on states as vectors."""
+"""Lattices in `phigen tune`: the search is the same as for other systems; the fields of all sites form one state
+vector.
+"""
 
 import time
 from dataclasses import replace
