@@ -74,8 +74,8 @@ def test_a_product_is_stated_by_its_blocks():
 
 
 def test_the_form_of_a_block_keeps_its_matrices():
-    # The 3×3 matrices of gl(3) make the Cayley transform possible. The structure constants alone do not give these
-    # matrices.
+    # The algebra gl(3) comes with 3×3 matrices, for which the Cayley transform applies. Structure constants alone
+    # contain no matrices.
     names = ", ".join(f"x{i}" for i in range(9))
     s = system(
         names.replace(",", "") + " q p",

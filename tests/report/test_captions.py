@@ -69,7 +69,7 @@ export const raced = (h, parts, steps) => {
 @pytest.fixture(scope="module")
 def raced(tmp_path_factory):
     """Return a function that makes the steps of phigen and of RK4 in the panel of a run. It returns the errors of each
-    step with the captions, and the text under the panel.
+    step with the captions, and the text above the panel.
     """
     folder = tmp_path_factory.mktemp("captions")
 
@@ -101,7 +101,7 @@ def halves(errors, k):
 
 
 def expect_true(race_result, say):
-    """Assert that the captions and the text ``say`` under the panel agree with the errors."""
+    """Assert that the captions and the text ``say`` above the panel agree with the errors."""
     sentences = race_result["said"].rstrip(".").split("; ") if race_result["said"] else []
     for k, name in enumerate(race_result["names"]):
         (begin, ours), (rk4_begin, theirs) = halves(race_result["ours"], k), halves(race_result["theirs"], k)

@@ -71,8 +71,8 @@ def test_a_kick_gives_a_monitor_the_new_energy_level(target):
 
 @pytest.mark.parametrize("target", TARGETS)
 def test_the_momentum_in_space_is_constant_after_an_impulse_too(target):
-    """A gauge adds multiples of Casimirs to H. These rotate the body at a rate that depends on the leaf, so after an
-    impulse the attitude must use the rate of the new leaf.
+    """A gauge subtracts multiples of Casimirs from H. These rotate the body at a rate that depends on the leaf, so
+    after an impulse the attitude must use the rate of the new leaf.
     """
     session, at = session_of("dzhanibekov", target)
     session.step(at.h, 40)
