@@ -11,7 +11,7 @@ import numpy as np
 from phigen.errors import StepError
 from phigen.geometry.conservation import SITES, Unit, unit_of
 from phigen.lattice.cell import Cell
-from phigen.lattice.energy_balance import Power, inside_ends, integral, shifted
+from phigen.lattice.energy_balance import FINE_NODES, Power, inside_ends, integral, shifted
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeTrajectory
@@ -65,17 +65,22 @@ def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 def works(cell: Cell, run: LatticeTrajectory) -> tuple[Floats, float]:
     """Return the work done up to each stored state (frames,), and an estimate of its error.
 
-    The run is repeated step by step, and the power is evaluated after every step. Raises `StepError` if a step fails.
+    The run is repeated step by step, and the power is evaluated after every step. Further steps after the end of the
+    run give short runs as many values as the polynomials need, and a value after a last row inside a step. Raises
+    `StepError` if a step fails before there are enough values.
     """
     power, solver, start_time = Power(cell), run.solver, float(run.t[0])
     session, powers = solver.started(Beginning(run.x[0], run.h, run.parameters, start_time)), []
-    for step in range(run.steps + 1):
+    count = max(run.steps + 2, FINE_NODES)
+    for step in range(count):
         times = dict.fromkeys(cell.times, start_time + step * run.h)
         powers.append(power(session.state(), session.vector_field(), {**run.parameters, **times}))
-        if step < run.steps:
+        if step + 1 < count:
             try:
                 session.advance(run.h, 1)
             except BackendError as error:
+                if len(powers) > max(run.steps, FINE_NODES - 1):
+                    break
                 raise StepError(str(error), step=step, status=error.status) from error
     return integral(np.array(powers), run.h, (run.t - start_time) / run.h)
 

@@ -167,7 +167,7 @@ def test_states_at_times_go_back_too_and_with_noise_are_frames() -> None:
     text = f'phigen: 1\nname: bath\nlattice: {{axes: [i]}}\n{SPINS}hamiltonian: "x*x[i+1]"\n{noise}\n'
     noisy = lattice_solver_of(compile_spec(specs.loads(text)), "numpy").integrate(x, 0.1, 4, 2, seed=1)
     np.testing.assert_array_equal(noisy.at([0.2, 0.0]), noisy.x[[1, 0]])
-    with pytest.raises(ValueError, match="with noise only states that are stored"):
+    with pytest.raises(ValueError, match="with noise only stored states can be returned"):
         noisy.at(0.1)
 
 
@@ -194,6 +194,16 @@ def test_the_energy_is_in_balance_with_the_work_of_the_time() -> None:
     ]
     assert np.log2(errors[0] / errors[1]) > 3.5
     assert errors[1] < 1e-6
+
+
+@pytest.mark.parametrize("steps", [0.5, 1.5, 4])
+def test_the_work_of_a_short_run_is_as_exact_as_that_of_a_long_one(steps: float) -> None:
+    """Polynomials through the values of the run alone would have degree 1 to 4."""
+    x, values = given("driven")
+    cell = compiled("driven").cell
+    assert cell is not None
+    run = solver("driven", 4).integrate(x, 0.05, until=T0 + 0.05 * steps, t0=T0, parameters=values)
+    assert errors_of(cell, run)[BALANCE].max() < 2e-8
 
 
 def test_integrals_along_steps_are_those_of_polynomials() -> None:
