@@ -57,13 +57,14 @@ SINGLE = Precision(Fraction(1, 2**23), Fraction(1, 10**5), Fraction(1, 10**5))
 
 @dataclass(frozen=True)
 class Tableau:
-    """Coefficients of a Gauss method, rounded: ``nodes`` c_i, ``weights`` b_i, and the matrix ``mixing`` μ, μ_ij =
+    """Coefficients of a Gauss method, rounded: ``nodes`` c_i, ``weights`` b_i, and the matrix ``mixing``, μ_ij =
     a_ij/b_j.
 
-    A step from z solves Z_i = z + Σ_j μ_ij L_j with L_j = h b_j f(Z_j). μ_ij + μ_ji = 1 holds exactly. ``prediction``
-    extrapolates by one step: with the L_j of the last step, Σ_j prediction[i][j]·L_j approximates the offset Z_i − z of
-    the next step. ``doubled`` is ν = μ diag(b) μ: h Σ_j ν_ij L_j is the integral of the offsets from the start of the
-    step to stage i. ``times`` are rounded nodes τ such that ν_ij − ν_ji = τ_i − τ_j holds exactly.
+    A step of ż = f(z) with the size h from z solves Z_i = z + Σ_j μ_ij L_j with L_j = h b_j f(Z_j). μ_ij + μ_ji = 1
+    holds exactly. ``prediction`` extrapolates by one step: with the L_j of the last step, Σ_j prediction[i][j]·L_j
+    approximates the offset Z_i − z of the next step. ``doubled`` is ν = μ diag(b) μ: h Σ_j ν_ij L_j is the integral of
+    the offsets from the start of the step to stage i. ``times`` are rounded nodes τ such that ν_ij − ν_ji = τ_i − τ_j
+    holds exactly.
     """
 
     nodes: tuple[float, ...]

@@ -659,7 +659,7 @@ def vectors(kind: Vector, *names: Name, value: Value | None = None, note: str = 
 
 
 def entry(array: Value, number: int | str) -> Entry:
-    """Return the element of an array by its number or by the name of a variable."""
+    """Return an element of an array. Its index is a number, or the name of a variable."""
     return Entry(array, Constant(number))
 
 

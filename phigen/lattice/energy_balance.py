@@ -28,8 +28,8 @@ FINE_NODES, COARSE_NODES = 8, 6
 class Power:
     """The power P = dH/dt of states of a lattice: ``power(x, rate, parameters)``.
 
-    ``x`` and its time derivative ``rate`` have the shape (fields, *sizes). ``parameters`` are the parameters of a
-    solver, with the bonds of a graph, and the time under its name.
+    ``x`` and its time derivative ``rate`` have the shape (fields, *sizes). ``parameters`` has the parameters of a
+    solver, the bonds of a graph, and the time, by name.
     """
 
     def __init__(self, cell: Cell) -> None:

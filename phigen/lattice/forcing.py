@@ -62,8 +62,9 @@ def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow,
 def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
     """Return the flows of πζ, with the covector force ζ, which includes damping.
 
-    There is a single flow if πζ has an elementary flow, else one flow for each component of ζ. If a component has none,
-    damping gets flows of its own (`phigen.lattice.damping`), and the remaining components of ζ are treated again.
+    If πζ has an elementary flow, there is this single flow. Otherwise there is one flow for each component of ζ. If a
+    component has no elementary flow, damping gets flows of its own (`phigen.lattice.damping`), and the other forces in
+    ζ are divided into flows in the same way.
     """
     site_fields = SiteFields(cell, sums_by_field(cell))
     tangent = {f: site_fields.tangent(f, site_fields.push) for f in cell.fields}

@@ -65,10 +65,11 @@ def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def _density(cell: Cell, name: str, *, single: bool) -> Expression:
-    """Return the density of the observable ``name`` at a site, with symbols for sums and extremes over bonds and pairs.
+    """Return the density of the observable ``name`` at a site, with symbols for sums and extremes over bonds
+    and pairs.
 
-    Where the density reaches beyond an open end, a maximum or minimum must not select its value. There, the value is
-    minus or plus the largest number.
+    At a site where the density reaches beyond an open end, its value must not become the maximum or minimum over the
+    sites. There it is replaced by minus or plus the largest number.
     """
     reduction = cell.reductions[name]
     if reduction.over != "sites":

@@ -186,7 +186,8 @@ def _jacobi(cell: Cell) -> Iterator[Labelled]:
 
 
 def _canonical(triple: tuple[Point, Point, Point]) -> tuple[tuple[Point, ...], int, Offset]:
-    """Return a triple of coordinates in a standard form, with which triples that differ by a translation are equal.
+    """Return a triple of coordinates in a standard form. Triples that differ only by a translation have the
+    same form.
 
     The result is the sorted triple with its first coordinate at the origin, the sign of the permutation, and the
     translation.

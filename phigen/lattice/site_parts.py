@@ -140,10 +140,10 @@ class BondSum:
 class SiteMotion:
     """The motion of the sites of one colour, or of all sites if ``colour`` is None.
 
-    ``increments`` of the fields depend on the site, on neighbours that stand still, and on the sums over bonds or pairs
-    ``gathered``, as symbols `GATHERED`. ``solution`` has the increments with a symbol `FORCE` for each component of the
-    gradient of the part; it solves ẋ = ``rates``. For damping, whose force is not the gradient of a part,
-    ``components`` has the values of these symbols. ``manner`` describes the motion in words.
+    ``increments`` of the fields depend on the site, on neighbours that stand still, and on sums over bonds or pairs.
+    These sums are ``gathered``, and symbols `GATHERED` stand for them. ``solution`` has the increments with a symbol
+    `FORCE` for each component of the gradient of the part; it solves ẋ = ``rates``. For damping, whose force is not the
+    gradient of a part, ``components`` has the values of these symbols. ``manner`` describes the motion in words.
     """
 
     colour: int | None
@@ -434,8 +434,8 @@ class PartSearch:
     def _motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int | None
     ) -> SiteMotion:
-        """Return the motion of the sites of a colour under the terms of a part of H; of sites near seams if ``colour``
-        is None.
+        """Return the motion of the sites of a colour under the terms of a part of H. If ``colour`` is None, it is the
+        motion of sites near seams.
 
         ``more`` has the terms that a modified potential adds to the part; they are multiplied by the symbol `KICK`.
         """

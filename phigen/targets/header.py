@@ -18,8 +18,8 @@ WIDTH = 104
 
 
 def plain(text: str) -> str:
-    """Return a text of the user that is safe in comments of every language: printable, without comment marks and
-    trigraphs.
+    """Return a text of the user in a form that is safe in comments of every language: printable, without comment marks
+    and trigraphs.
     """
     printable = "".join(c if c == "\n" or unicodedata.category(c)[0] not in "CZ" else " " for c in text)
     printable = printable.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").replace("\\", "/")
@@ -73,8 +73,9 @@ def facts(
 ) -> dict[str, object]:
     """Return the constants that describe a system in a module, as template values.
 
-    ``listed`` prints a sequence, and ``key`` the name of a parameter. ``nothing`` is printed for defaults that are
-    arrays, since the module is valid for lattices of all sizes.
+    ``listed`` prints a sequence, and ``key`` the name of a parameter. Some parameters of lattices have an array as the
+    default. The array belongs to one size of the lattice, but the module serves all sizes. So ``nothing`` is printed in
+    place of such an array.
     """
     noise, nonnegative = program.noise, [p.name for p in program.parameters if p.nonnegative]
     return {

@@ -31,7 +31,7 @@ MOST_HALVINGS = 14
 MOST_MEANS = 16
 
 _MEANING = (
-    "(1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it.",
+    "(1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it.",
     "The derivative of (1 - w cot w)/s, w = sqrt(s)/2.",
     "The second derivative of (1 - w cot w)/s, w = sqrt(s)/2.",
 )

@@ -15,7 +15,8 @@ from phigen.targets.features import holds
 
 @dataclass(frozen=True)
 class StateBlock:
-    """Members of the struct of a solver that belong together; ``when`` is a condition on switches, "" for all solvers.
+    """Members of the struct of a solver that belong together. Solvers have them if the condition ``when`` holds for
+    their switches; "" holds for all solvers.
 
     ``members`` are declarations in C, with comments for users. ``saved`` has the members that are restored if a step
     fails, each with its length, which is "" for numbers. ``reset`` are statements for a new step size. ``copied`` are

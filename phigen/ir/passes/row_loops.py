@@ -130,7 +130,8 @@ def _storing(
 
 @dataclass(frozen=True)
 class BondLoop:
-    """A function that sums over the bonds or pairs of a site, and ``arguments`` of its version by rows.
+    """A function that sums over the bonds or pairs of a site, and the additional ``arguments`` of its version
+    by rows.
 
     ``oriented`` are the parameters at bonds that change sign for the site at the end b. The arguments follow ``coef``
     and ``row``. They may be ``at_bonds`` (the arrays of parameters at bonds), ``sign`` (1 or −1, the direction in which

@@ -1,6 +1,4 @@
-"""Sites in loops: names of the variables for numbers of sites, indices in arrays of all sites, and the loop over
-pairs.
-"""
+"""Sites in loops: the variables that hold indices of sites, indices in arrays of all sites, and the loop over pairs."""
 
 from __future__ import annotations
 

@@ -163,7 +163,9 @@ class WholeArrays:
                 yield ir.Assign(BAR, ir.Called(called, (source, X, ir.Listed(tuple(listed)), *rest)))
 
     def _added_cotangents(self, loop: ir.Loop) -> Iterator[ir.Statement]:
-        """Yield the statements that add the contribution to each cotangent at the site of the value that was read."""
+        """Yield the statements that add contributions to cotangents. Each is added at the site of the value that was
+        read.
+        """
         for s in loop.body:
             match s:
                 case ir.Reduce(source, number, name, value):

@@ -189,7 +189,7 @@ def declared_values(program: Program, lanes: Lanes | None, has: Mapping[str, boo
             (
                 "DIFFERENCES",
                 predictor.differences,
-                "past differences that the predictor reads; more would amplify rounding errors",
+                "past differences in the predictor; more would amplify rounding",
             )
         )
     sizes += text_of(program).declared(step, lanes)

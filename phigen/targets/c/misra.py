@@ -108,7 +108,9 @@ class _Text:
         return place
 
     def parenthesised(self) -> str:
-        """Return the code with parentheses around operands whose operator has another precedence."""
+        """Return the code with parentheses around each operand that is itself an expression with an operator of another
+        precedence.
+        """
         self._within(0, len(self.significant))
         return self.text()
 

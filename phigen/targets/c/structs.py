@@ -23,8 +23,8 @@ TABLE = (
     ),
 )
 
-#: Members of the struct for one stage of all steps of a block, in SIMD lanes, and for its corrections by Newton's
-#: method.
+#: Members of the struct for one stage of a block of steps, with one step in each SIMD lane: the solution of the stage,
+#: and its corrections by Newton's method.
 MODEL = (
     StateBlock(
         "y",

@@ -79,7 +79,7 @@ def _explicit_kernels(program: Program, step: Explicit) -> Sequence[Kernel | Non
 
 
 def _collocation(program: Program, step: Gauss) -> list[str]:
-    """Return the text of the coefficients of a Gauss method, as lines."""
+    """Return lines of code that declare the coefficients of a Gauss method."""
     table = step.tableau
     values = {
         "unknowns": step.unknowns,
@@ -94,7 +94,7 @@ def _collocation(program: Program, step: Gauss) -> list[str]:
 
 
 def _schedule(step: Splitting, attitude: Attitude | None) -> list[str]:
-    """Return the text of the order of the flows in a step, and of their durations, as lines."""
+    """Return lines of code that declare the order and the durations of the flows in a step."""
     schedule = step.schedule
     values = {
         "times": json.dumps(schedule.times),

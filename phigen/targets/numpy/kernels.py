@@ -1,4 +1,4 @@
-"""Kernels as functions of NumPy."""
+"""Kernels as Python functions that use NumPy."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def _merged_purposes(purposes: Iterable[str]) -> Iterator[str]:
 
 
 def code(loop: ir.Function) -> tuple[tuple[str, ...], ir.Block]:
-    """Return the parameters and statements of a loop. If these are equal, two loops do the same."""
+    """Return the parameters and statements of a loop. Two loops do the same if these are equal."""
     return loop.parameters, loop.body
 
 
