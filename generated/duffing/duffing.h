@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bc9a5b566f4a125579ebb99272ccb2d9ba9159374a88ac451996d0c653ee6174
+ * body-sha256: a04cd27bf4493d46fd8bdaaae14a703cad923c5212b8b0f843556d46c19c48bc
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -15,8 +15,7 @@ extern "C" {
 #define duffing_PHIGEN_VERSION "0.1.0"
 #define duffing_SPEC_SHA256 "ede43f8e6b701b5554dc52316d7c870d0e7f0b2ee5862a7290406e095a945c72"
 enum { duffing_COEFFICIENTS = 33 }; /* numbers that are functions of params and h, and of the time */
-/* past differences that the predictor reads; more would amplify rounding errors */
-enum { duffing_DIFFERENCES = 9 };
+enum { duffing_DIFFERENCES = 9 };   /* past differences in the predictor; more would amplify rounding */
 
 typedef struct {
     double A;     /* amplitude of the drive */

@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 501577d4b2c9bfc14f7145f865ba371eccb712e4d9365017a5ccd8fb65eb4fc8
+ * body-sha256: a8429b9e7ee97dccd1e4ec7f2995790ece1e73de94b9d72c3b7902ea24a58a16
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -16,8 +16,7 @@ extern "C" {
 #define guiding_centre_SPEC_SHA256 "82d5ea90095e73077a2671c7c2e7b96d51802a2b6398fe46f5396c4225a32104"
 enum { guiding_centre_STAGES = 5 };       /* stages of a step */
 enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that are functions of params and h */
-/* past differences that the predictor reads; more would amplify rounding errors */
-enum { guiding_centre_DIFFERENCES = 9 };
+enum { guiding_centre_DIFFERENCES = 9 };  /* past differences in the predictor; more would amplify rounding */
 
 typedef struct {
     double kappa; /* twist of the field lines per unit of length */

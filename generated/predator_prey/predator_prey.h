@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c86d36902391946488f35cc9982484317e91d3f9fba7bac213679739e356f2dd
+ * body-sha256: cc42dd73886548e4b776bc3c4e733cf8d4fa290d66aea89cf0f019158f191b8c
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -15,8 +15,7 @@ extern "C" {
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "68567398b4ba43e83320ab7370f0cc0065b496e42c92688e630cf74def14bede"
 enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that are functions of params and h */
-/* past differences that the predictor reads; more would amplify rounding errors */
-enum { predator_prey_DIFFERENCES = 9 };
+enum { predator_prey_DIFFERENCES = 9 };   /* past differences in the predictor; more would amplify rounding */
 
 typedef struct {
     double growth; /* growth rate of the prey without predators */

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: phigen detects changes by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 034f9efe2a2f62864f0e759efc164d34f736dcacc4dcf0723426ddd36f8cd3be
+ * body-sha256: 680c083f4df33e733e56fb37b221237a796b328ef6af19288cf1a6431aea1d6e
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -16,8 +16,7 @@ extern "C" {
 #define quaternion_top_SPEC_SHA256 "15e273e5e6e2ad67f8522565f70ccb8e26f7dc2ded5b16312a1dfab90fe3af39"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that are functions of params and h */
 enum { quaternion_top_GAUGES = 1 }; /* number of Casimirs, multiples of which are subtracted from H: length */
-/* past differences that the predictor reads; more would amplify rounding errors */
-enum { quaternion_top_DIFFERENCES = 9 };
+enum { quaternion_top_DIFFERENCES = 9 }; /* past differences in the predictor; more would amplify rounding */
 
 typedef struct {
     double I1;     /* least moment of inertia */

@@ -13,7 +13,7 @@
  *   whose multiples are subtracted from H; The solver; SIMD lanes: one evaluation in each; Newton's
  *   method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble; SIMD batches
  *   of members: implicit steps; Ensembles
- * body-sha256: 3de06114280f22a5abdd75a7e75d938bb988f77e903a9264d113c6817f7c0f66
+ * body-sha256: 6953d5fd9728ac6da2ead5f4c16bd06d4df90878320f93182cd9541291fb61d0
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -48,8 +48,7 @@ static inline double rigid_body_polynomial(const double *coefficients, int count
     return value;
 }
 
-/* (1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs
-   it. */
+/* (1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it. */
 static double rigid_body_phi0(double s)
 {
     static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f274ce701981d35e1aa52252a8795dc2ae5ab75e00c8d84b288cbd3970e40036
+ * body-sha256: 8701822ef073793bfc8739e02d221ba4ee0c53df8e0cb6d341af7d113b122ce5
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -63,7 +63,7 @@ function polynomial(coefficients, s) {
   return coefficients.reduceRight((value, c) => value * s + c, 0);
 }
 
-/** (1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it. */
+/** (1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it. */
 function phi0(s) {
   if (Math.abs(s) < 0.25) {
     return polynomial([

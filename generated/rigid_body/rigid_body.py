@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 0140ef54ac9addb6f7136a24e2103a5dd084b28d255b01838c06b4e2806dc7a9
+# body-sha256: 7559c5215f07ced91660b3341b26b0deed0ed10b53fa9914a2d49fd8590cc44d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -118,7 +118,7 @@ def _admissible(values):
 
 
 def _phi0(s):
-    """(1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it."""
+    """(1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it."""
     s = np.asarray(s, dtype=float)
     small = np.where(np.abs(s) < 16.0, s, 0.0)
     near = np.full_like(small, 8.586062056277845e-15)

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 97116e9dfcdd21678345ef433f5ff95d9557dde9e5e1c6c51f2d797a8a5c01cc
+ * body-sha256: 33cde02cfc1a4ea2dc239031e1f12885c2b4c7419e3d1a31e8dd407944e551ec
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -47,8 +47,7 @@ static inline double thermal_spin_polynomial(const double *coefficients, int cou
     return value;
 }
 
-/* (1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs
-   it. */
+/* (1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it. */
 static double thermal_spin_phi0(double s)
 {
     static const double near[9] = { 0.08333333333333333, 0.001388888888888889, 3.306878306878307e-05,

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a3230e10d0105d9b220e01d079f56678b6b9414997ce1b448f416d4f91e8e652
+ * body-sha256: afaf638ead6631ad740538decd3d460d8d0645afa1baf0bc9d239c814a2e3811
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -83,7 +83,7 @@ function polynomial(coefficients, s) {
   return coefficients.reduceRight((value, c) => value * s + c, 0);
 }
 
-/** (1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it. */
+/** (1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it. */
 function phi0(s) {
   if (Math.abs(s) < 0.25) {
     return polynomial([

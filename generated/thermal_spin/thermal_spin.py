@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: phigen detects changes by the checksum below; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 996ac7bc54af413ea5ad2faed3d64fe94db632611b2c6564f9c67560957aa1d8
+# body-sha256: becc521fe4e84fa8eb272e25b50da3994475ff8d4e5f53eff62ddac86a665eea
 import numpy as np
 
 VERSION = "0.1.0"
@@ -123,7 +123,7 @@ def _admissible(values):
 
 
 def _phi0(s):
-    """(1 - w cot w)/s with w = sqrt(s)/2, and coth instead of cot for s < 0. The exponential bi-realisation needs it."""
+    """(1 - w cot w)/s with w = sqrt(s)/2; for s < 0 with coth. The exponential bi-realisation needs it."""
     s = np.asarray(s, dtype=float)
     small = np.where(np.abs(s) < 16.0, s, 0.0)
     near = np.full_like(small, 8.586062056277845e-15)
