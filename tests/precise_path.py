@@ -169,7 +169,7 @@ class PrecisePathStep(PreciseSystem):
         self.parameters[STAGE] = mpmath.mpf(0)
         s = total(_power(i + 1) * term for i, term in enumerate(series))
         slope = gradient(s, self.coordinates)
-        hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # symmetric: by rows or by columns
+        hessian = [d for c in self.coordinates for d in derivatives(slope, c)]  # symmetric: rows = columns
         self._momenta = [*slope, *hessian]
         # The solver multiplies h by the fraction of the stage in double precision, but this step in many digits.
         self.steps = [mpmath.mpf(h) * mpmath.mpf(f) for f in fractions]

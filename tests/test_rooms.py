@@ -95,8 +95,9 @@ REGULAR_EXPRESSIONS = {
 #: module of this name.
 LARGEST_NAMESAKES = 3
 
-#: Number of tests on the kind of a step or of a compilation: ``isinstance``, class patterns, comparisons of kinds or of
-#: their names. Code should read the record of the kind, an entry in a table, or a method instead.
+#: Largest number of places where code asks for the kind of a step or of a compilation: ``isinstance``, class patterns,
+#: comparisons of kinds or of their names. Code should read the record of the kind, an entry in a table, or a method
+#: instead.
 KIND_TESTS = 0
 
 #: Classes of steps and compilations, by the modules that define them; tests on these classes are counted.

@@ -13,5 +13,6 @@ def c_without_contraction(compiled_solvers):
     """Compile C without fused multiply-add, so that each product and sum is rounded as on devices."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(toolchain, "TUNING_FLAGS", ("-ffp-contract=off",))
-        patch.setenv("CC", "gcc -g0")  # another name than gcc: accepted flags are cached by command
+        # phigen remembers which flags a compiler command accepts; a command other than `gcc` has its own entry.
+        patch.setenv("CC", "gcc -g0")
         yield
