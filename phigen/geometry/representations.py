@@ -29,7 +29,7 @@ def known_representation(algebra: LieAlgebra) -> Representation | None:
     """Return the matrices that the spec gives for an algebra, or those of a named family with the same structure
     constants.
 
-    Returns None if there are none.
+    The structure constants of the family may also be the negated ones. Returns None if there are no such matrices.
     """
     return algebra.representation or next(_matching_families(algebra), None)
 

@@ -1,8 +1,8 @@
-"""The even part of b(M_p)x, with b(z) = z/(1 − e^{−z}), in closed form: Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x with Bernoulli
-numbers B.
+"""The even part of b(M_p)x − x, with b(z) = z/(1 − e^{−z}), in closed form: Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x with
+Bernoulli numbers B.
 
 M = M_p is the matrix with M_p x = π(x)p on the dual of a Lie algebra. Let N = M², and let φ be the function of
-`phigen.symbolic.special`. Then Σ B_{2k}/(2k)! M^{2k} = Nφ(−N), and the even part of b(M_p)x has these closed forms:
+`phigen.symbolic.special`. Then Σ B_{2k}/(2k)! M^{2k} = Nφ(−N), and the even part has these closed forms:
 
     N^k x = 0 for some k     a finite sum
     N(N + s) = 0             N x φ(s)
@@ -40,7 +40,7 @@ Vector = list[Expression]
 
 @dataclass(frozen=True)
 class EvenPart:
-    """The even part of b(M_p)x, with b(z) = z/(1 − e^{−z}) and M_p x = π(x)p, in closed form.
+    """The even part of b(M_p)x − x, with b(z) = z/(1 − e^{−z}) and M_p x = π(x)p, in closed form.
 
     ``values`` are the components of Σ_{k≥1} B_{2k}/(2k)! M_p^{2k} x, with Bernoulli numbers B. ``forms`` describes, for
     the user, the closed form in each ideal of the algebra.
@@ -51,7 +51,7 @@ class EvenPart:
 
 
 def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expression]) -> EvenPart | None:
-    """Return the even part of b(M_p)x with b(z) = z/(1 − e^{−z}) in closed form; None if no formula of this module
+    """Return the even part of b(M_p)x − x with b(z) = z/(1 − e^{−z}) in closed form; None if no formula of this module
     applies.
 
     x is in the dual of the algebra, p in the algebra, and M_p x = π(x)p. Both x and p may have any expressions as

@@ -32,7 +32,7 @@ def build(system: System, choice: BirealisationChoice, build_inner: Builder) -> 
     spec.
 
     ``build_inner`` makes the bi-realisation in the coordinates y. Raises `SpecError` unless the spec states π as a
-    pull-back, and if the solver would have to follow paths in the coordinates y.
+    pull-back, and if the bi-realisation in the coordinates y is truncated or follows paths.
     """
     form = system.form
     if not isinstance(form, PullbackForm):

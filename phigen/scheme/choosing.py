@@ -281,7 +281,9 @@ def _no_order(system: Host, composition: str, offered_orders: Sequence[int], ord
 def _not_applicable(
     system: Host, splitting: SplitHamiltonian, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> SpecError:
-    """Return the error for a Nyström method if H has no two parts T and V with {V, {V, {V, T}}} = 0."""
+    """Return the error for a Nyström method that does not apply to the parts of H; its message says what the parts
+    lack.
+    """
     count = len(splitting.flows)
     if count != 2:
         reason = f"H = T + V, of two parts; this H has {count} part{'s' * (count > 1)}"

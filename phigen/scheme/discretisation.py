@@ -199,8 +199,11 @@ def _forced(
     composition: str,
     monitor: Expression | None,
 ) -> Discretisation:
-    """Return the discretisation with forces, p = h(∇H + ζ). It has order 2 by symmetry, and higher orders by
-    compositions."""
+    """Return the discretisation with forces, p = h(∇H + ζ).
+
+    In a symmetric bi-realisation it has order 2, and higher orders by compositions. In any other bi-realisation it has
+    order 1.
+    """
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
         reason = f"forces: a vector force needs a bi-realisation in closed form, but {realisation.kind} follows paths"
         place = system.locations.get(("forces", "vector"))

@@ -27,11 +27,12 @@ SparseRow = Mapping[int, Expression]
 def newton_operations(
     realisation: BiRealisation, absent: Collection[str], hessian: Sequence[SparseRow], limit: int
 ) -> int:
-    """Return the number of operations of the matrices in a Newton step; ``limit`` + 1 if there are more than ``limit``.
+    """Return the number of operations of the matrices in a Newton step; ``limit`` + 1 if there are more than
+    ``limit``.
 
     ``hessian`` is Hess S_h by rows. ``absent`` are the coordinates that S_h does not depend on; their momenta ∂S_h/∂x_i
     are 0. The count is a lower bound: it omits the computation of the Hessian, which is small if H is a polynomial of
-    low degree. For small systems, whose matrices never exceed the limit, the result is 0.
+    low degree. The result is 0 for steps along paths, and for small systems, whose matrices never exceed the limit.
     """
     names, momenta = realisation.coordinates, realisation.covector
     if realisation.path or not may_have(len(names), limit):

@@ -140,7 +140,8 @@ def choose(
 
     With ``auto`` the multiple λ of a Casimir is free if three conditions hold. S_3 depends on λ; for log-canonical π it
     never does. S_3 has hardly more terms with λ than without; for tops it has many more. π∇S_3 is cheap enough for a
-    search. No λ is free if H depends on the time, or if there are forces, noise or a monitor.
+    search. No λ is free if H depends on the time, or if there are forces, noise or a monitor. The bi-realisation must
+    be exact and symmetric.
     """
     if not isinstance(setting, str):
         return _gauged(system, realisation, replace(fixed_gauge(system, setting), monitor=monitor))

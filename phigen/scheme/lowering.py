@@ -109,10 +109,11 @@ def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
 
 
 def _numbers_regrouped(roots: Sequence[Expression]) -> list[Expression]:
-    """Return the roots with each number times a product, such as ½(ab), written with the number at one factor, as
+    """Return the roots with a number times a product, such as ½(ab), written with the number at one factor, as
     (½a)b.
 
-    The chosen factor is the one that occurs in the most products with the same number.
+    The chosen factor is the one that occurs in the most products with the same number. A product remains unchanged if
+    its factors occur in no other such product.
     """
     scaled = [e for e in topological(roots) if e.op == "mul" and e.args[0].is_number and e.args[1].op == "mul"]
     counts = Counter((e.args[0], factor) for e in scaled for factor in e.args[1].args)

@@ -43,10 +43,10 @@ class NodeSeries:
     """The Taylor series of a node: its value ``first`` at order 0, and the rule for its coefficients of the orders k ≥
     1.
 
-    The coefficient is a sum of two kinds of terms. ``linear`` lists pairs of a series a and a factor, each of which
-    contributes factor · a_k. ``terms`` are sums of products of coefficients; for powers they are divided by the value
-    at order 0 of the series with the number ``divisor``. In expressions, the symbol ``s:i`` is the value of series i at
-    order 0.
+    The coefficient of order k is a sum of two kinds of terms. ``linear`` lists pairs of a series a and a factor, each
+    of which contributes factor · a_k. ``terms`` are sums of products of coefficients; for powers they are divided by
+    the value at order 0 of the series with the number ``divisor``. In expressions, the symbol ``s:i`` is the value of
+    series i at order 0.
     """
 
     first: Expression
@@ -71,7 +71,7 @@ class Recurrences:
 
 @dataclass(frozen=True)
 class SeriesEntry:
-    """An entry of a matrix that is not 0 everywhere: its row, its column, and the number of its Taylor series."""
+    """A matrix entry that is not identically 0: its row, its column, and the number of its Taylor series."""
 
     row: int
     column: int

@@ -162,7 +162,7 @@ class Attitude:
     def lengthened(self) -> bool:
         """Whether the quaternion of a step must be normalised.
 
-        The elements of flows may have any length, so this is so in splittings.
+        It must be in splittings, where the elements of flows may have any length.
         """
         return bool(self.turns) and self.quaternion
 

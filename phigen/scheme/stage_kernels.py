@@ -10,7 +10,8 @@ from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.steps import Sites, Sweeps
 from phigen.symbolic.expression import ZERO, gradient
 
-#: Name of the kernel of the derivatives of the right-hand side of y = … at a site with respect to y at the same site.
+#: Name of the kernel that differentiates the right-hand side of the equation y = … at a site with respect to y at this
+#: site.
 _BLOCK = "own_slope"
 
 #: Selections of cotangents for a transposed kernel, as pairs: whether it computes the cotangents of fields, and whether

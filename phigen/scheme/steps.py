@@ -601,11 +601,11 @@ class Gather:
 class Partners:
     """Sums over the bonds or pairs of a site that are not part of a sweep, as functions of the parameters.
 
-    ``energy`` is half of the energies, so that each is counted once over both sites. ``field`` has the forces or rates
-    of the vector field. ``varied`` has the forces and their derivatives in the direction of a variation of the fields,
-    for steps that solve an `Equation`. ``observed`` has the densities of observables. ``of_parts`` has the energies of
-    parts of H and their derivatives, by the name of the kernel that reads them (`PartRates`). ``graph`` says that the
-    bonds are those of a graph.
+    ``energy`` is half of the energies, since each energy is summed at both of its sites. ``field`` has the forces or
+    rates of the vector field. ``varied`` has the forces and their derivatives in the direction of a variation of the
+    fields, for steps that solve an `Equation`. ``observed`` has the densities of observables. ``of_parts`` has the
+    energies of parts of H and their derivatives, by the name of the kernel that reads them (`PartRates`). ``graph``
+    says that the bonds are those of a graph.
     """
 
     energy: Gather

@@ -133,8 +133,9 @@ def ways(step: Sweeps) -> list[tuple[int, int]]:
 
 
 def shares(step: Sweeps) -> bool:
-    """Whether the transposed sweeps contribute at each site to sums over all sites, the cotangents of coefficients or
-    of parameters."""
+    """Whether the transposed sweeps add contributions of each site to sums over all sites: to the cotangents of
+    coefficients or of parameters.
+    """
     kernels = step.adjoint.steps if step.adjoint else ()
     kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
     summed = [kernel.along(array) for kernel in kernels for array in (TABLE, "params") if array in kernel.inputs]

@@ -70,9 +70,11 @@ class _Distance:
 
 
 def _bodies(ring: Ring, terms: Sequence[Term]) -> tuple[AttractingBodies, list[Term]]:
-    """Return the attracting bodies in H, and the terms that are neither kinetic energies nor attractions of pairs.
+    """Return the attracting bodies in H, and the terms that are neither kinetic energies nor attractions of
+    pairs.
 
-    Raises `_NoBodiesError` if H contains no attracting bodies, or if one of them lacks a momentum or a kinetic energy.
+    Raises `_NoBodiesError` if H contains no attracting bodies, or if one of them has no momentum, no kinetic energy, or
+    no attraction by a body before it.
     """
     distances = [d for g in ring.tower.generators if is_inverse_distance(g) for d in [_distance(ring, g)] if d]
     if not distances:

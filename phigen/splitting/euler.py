@@ -1,5 +1,5 @@
-"""The flow of a free rigid body by elliptic functions: ẋ_i = α_i x_j x_k for cyclic indices i, j, k, with α of both
-signs.
+"""The flow of a free rigid body by elliptic functions: ẋ_i = α_i x_j x_k for cyclic indices i, j, k, where some α_i are
+positive and some negative.
 
 The differences of the E_i = α_j α_k x_i² are constant. Let max and min be the largest and the smallest E_i, P = max −
 min, and R the third E_i minus min. S, C and κ are the functions of `phigen.symbolic.elliptic`, evaluated at the time of

@@ -303,8 +303,8 @@ def _with_integrals(ring: Ring, field: Sequence[Poly]) -> Solved | None:
 def _with_common_factor(ring: Ring, field: Sequence[Poly]) -> Solved | None:
     """Return the increments if all rates have a common factor that is constant along the flow, else None.
 
-    This is so for functions of a first integral. For instance, (q² + p²)² rotates q and p, as q² + p² does, but with a
-    speed proportional to q² + p².
+    The equations without this factor must have a solution. Functions of a first integral have such a factor. For
+    instance, (q² + p²)² rotates q and p, as q² + p² does, but with a speed proportional to q² + p².
     """
     moving = [f for f in field if f != 0]
     factor = reduce(lambda a, b: a.gcd(b), moving) if moving else ring.tower.constant(1)

@@ -1,13 +1,14 @@
 """The flows of forces, which are parts of a splitting in addition to those of H: the flow of ẋ = πζ + f, or of summands
 of this field.
 
-Three divisions are tried, and the first one in which every summand has a flow is used: the whole field; πζ and f; πζ_i
-dx_i for each component of ζ, and each component of f. π times ζ_i dx_i is the Hamiltonian field of x_i times a factor.
-It is tangent to the symplectic leaves, so each summand of πζ preserves the Casimirs.
+The whole field is one part if phigen knows its flow, in closed form or by a matrix exponential. Otherwise πζ and f are
+separate parts. If phigen does not know the flow of one of the two, its summands are parts: πζ_i dx_i for each component
+of ζ, or the components of f. π times ζ_i dx_i is the Hamiltonian field of x_i times a factor. It is tangent to the
+symplectic leaves, so each summand of πζ preserves the Casimirs.
 
-Damping is ζ = λπb with b = ∇H. It is divided for each block of π: into the terms of b that do not depend on the
-coordinates of the block, and the components of the remaining terms. Two flows become one part if neither changes a
-coordinate that the other reads.
+Damping is ζ = λπb with b = ∇H. If its flow is not known, b is divided for each block of π: into the terms that do not
+depend on the coordinates of the block, and the components of the remaining terms. Two flows become one part if neither
+changes a coordinate that the other reads.
 """
 
 from __future__ import annotations
@@ -53,7 +54,9 @@ def force_flows(system: System) -> tuple[Flow, ...]:
 
 
 def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
-    """Return the flows of the forces in closed form: of the whole field or, if it has none, of summands."""
+    """Return the flows of the forces in closed form: of the whole field or, if it has none, of πζ and f or their
+    summands.
+    """
     tangent = hamiltonian_vector_field(system.poisson, forces.covector)
     common_flow = _flow(system, tuple(a + b for a, b in zip(tangent, forces.vector, strict=True)))
     if isinstance(common_flow, Flow):

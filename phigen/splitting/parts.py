@@ -191,7 +191,11 @@ def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
 
 
 def _exact_linear_flow(ring: Ring, flows: list[Flow]) -> list[Flow]:
-    """Return the exact flow of H as the only part, if its equations of motion are linear; else the given flows."""
+    """Return the exact flow of H as the only part, if its equations of motion are linear and phigen can solve
+    them.
+
+    Otherwise the given flows are returned.
+    """
     if len(flows) == 1:
         return flows
     terms = [Term(f.hamiltonian, ring.tower.convert(f.hamiltonian)) for f in flows]

@@ -31,8 +31,8 @@ MOST_COORDINATES = 8
 def with_companions(system: System, conflicts: Conflicts, terms: Sequence[Term]) -> Iterator[list[Term]]:
     """Yield lists of terms in which a multiple λC is subtracted from terms, and added again as a separate term.
 
-    C is each of the companions, functions that do not affect the other terms. λ takes each value that cancels a
-    monomial of H.
+    C runs through the companions, which `_companions` finds. λ runs through the values for which λC cancels a monomial
+    of H.
     """
     ring = conflicts.ring
     for companion in _companions(system, conflicts, terms):
