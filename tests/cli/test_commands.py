@@ -61,7 +61,7 @@ def test_one_wrong_bracket_is_one_error_and_not_those_that_follow_from_it(phigen
     assert "Casimirs, invariants" in phigen("build", path).stderr
 
 
-def test_a_casimir_for_another_order_of_the_basis_is_told_of_it(phigen, write):
+def test_a_casimir_for_another_order_of_the_basis_gets_a_hint(phigen, write):
     algebra = "coordinates: [p1, p2, p3, m1, m2, m3]\npoisson: {lie_algebra: {name: se(3)}}\nhamiltonian: m1**2\n"
     result = phigen("check", write("a.yaml", f"phigen: 1\nname: a\n{algebra}casimirs: {{C: p1**2 + p2**2 + p3**2}}\n"))
     assert result.exit_code == 5

@@ -217,7 +217,7 @@ def test_exponents_do_not_depend_on_which_rows_are_stored(phigen, swing):
     "rows", [("--until", 2.03), ("--until", 2.03, "--every", 0.5), ("--until", 0.05), ("--steps", 7)]
 )
 @pytest.mark.parametrize("text", [SWING, BODY], ids=["time", "monitor"])
-def test_methods_beside_it_have_the_same_times(phigen, write, text, rows):
+def test_compared_methods_have_the_same_times(phigen, write, text, rows):
     spec = write("spec.yaml", text.replace("stride: 5}", "stride: 5, compare: [dop853]}").replace(
         "steps: 60}", "steps: 60, stride: 3, compare: [dop853]}"))  # fmt: skip
     record, other = json.loads(ran(phigen, spec, *rows, "--json").stdout)["methods"]
@@ -446,7 +446,7 @@ def test_a_run_in_tau_that_fails_stores_the_times_before(phigen, write):
     assert np.diff(times[:-1]) == pytest.approx(0.1, abs=1e-9)
 
 
-def test_what_does_not_fit_is_told(phigen, write):
+def test_options_and_files_that_do_not_fit_are_refused(phigen, write):
     swing = write("swing.yaml", SWING)
     ran(phigen, swing, "-o", "a.csv")
     Path("words.csv").write_text("some,words\n1,2\n")

@@ -192,7 +192,7 @@ def test_file_of_the_name_of_a_bundled_spec_wins(phigen, write):
     assert json.loads(phigen("show", "cyclotron", "--json").stdout)["name"] == "mine"
 
 
-def test_bundled_spec_is_found_beside_its_output_and_what_is_there_already_is_current(phigen, in_tmp):
+def test_output_of_a_bundled_spec_is_current_next_to_other_output(phigen, in_tmp):
     for name in ("cyclotron", "pendulum"):
         assert phigen("build", name, "-o", ".").exit_code == 0
     assert phigen("build", "cyclotron", "-o", ".", "--check").exit_code == 0

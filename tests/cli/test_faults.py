@@ -82,7 +82,7 @@ def test_a_run_that_fills_the_disk_goes_on_where_there_is_room(phigen, write, fi
     ]
 
 
-def test_a_folder_that_takes_no_files_is_told_before_the_work(phigen, write, monkeypatch):
+def test_a_folder_that_takes_no_files_is_reported_before_the_work(phigen, write, monkeypatch):
     write("a.yaml")
     Path("folder.csv").mkdir()
     for command in (["run", "a.yaml", "-o", "folder.csv"], ["report", "a.yaml", "-o", "folder.csv"]):

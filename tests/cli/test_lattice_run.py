@@ -129,7 +129,7 @@ def test_a_page_shows_the_cell_and_a_run_over_space_and_time(phigen, chain, tmp_
         pytest.param(lambda x, h: x + 1e-12, "reversibility", marks=pytest.mark.slow),
     ],
 )
-def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, said):
+def test_verify_reports_lattices_with_wrong_steps(phigen, chain, monkeypatch, wrong, said):
     from phigen.runtime.numpy_lattice import NumpyLatticeSession
 
     chain.write_text(CHAIN.replace("runs:", "targets: [numpy]\nruns:"), encoding="utf-8")
@@ -319,7 +319,7 @@ def test_a_lattice_without_noise_has_no_seed(phigen, chain):
     assert "chain has no noise" in phigen("run", chain, "--seed", 7).stderr
 
 
-def test_an_energy_that_is_no_number_is_told(phigen, tmp_path):
+def test_an_energy_that_is_no_number_is_reported(phigen, tmp_path):
     path = tmp_path / "eaters.yaml"
     path.write_text(
         "phigen: 1\nname: eaters\nlattice: {pairs: all}\ncoordinates: [x, y]\npoisson: {brackets: {x: {y: x*y}}}\n"

@@ -210,7 +210,7 @@ def test_memory_does_not_grow_with_the_length_of_a_run(phigen, in_tmp, monkeypat
 
 
 @pytest.mark.slow
-def test_section_and_exponents_are_told(phigen, in_tmp):
+def test_section_and_exponents_are_reported(phigen, in_tmp):
     result = phigen("run", *EVERYTHING, "--steps", 3000, "--section", "s.npz", "--json")
     document = json.loads(result.stdout)
     with np.load("s.npz") as stored:
@@ -239,7 +239,7 @@ def test_files_of_other_kinds_are_refused_before_the_work(phigen, in_tmp, option
 
 
 @pytest.mark.parametrize("command", [("run", "-o", "a.csv"), ("run", "--plot", "a.svg"), ("tune", "--plot", "a.svg")])
-def test_folders_that_are_not_there_are_told_before_the_work(phigen, in_tmp, command):
+def test_missing_folders_are_reported_before_the_work(phigen, in_tmp, command):
     name, option, file = command
     result = phigen(name, "nowhere.yaml", option, f"lost/{file}")
     assert result.exit_code == 2
@@ -279,7 +279,7 @@ def test_with_noise_states_are_stored_after_whole_steps_only(phigen, tmp_path):
 
 
 @pytest.mark.slow
-def test_states_too_far_apart_for_the_balance_of_energy_are_told(phigen, in_tmp):
+def test_states_too_far_apart_for_the_energy_balance_are_reported(phigen, in_tmp):
     duffing = ("run", str(resources.bundled()["duffing"]), "--target", "numpy")
     assert "too far apart" not in phigen(*duffing).stdout
     assert "too far apart for an accurate integral" in phigen(*duffing, "--every", 2).stdout

@@ -180,7 +180,7 @@ def test_another_version_makes_files_stale(phigen, write, monkeypatch):
     assert phigen("vendor", "--check", EXT).exit_code == 0
 
 
-def test_without_its_spec_a_solver_is_checked_against_the_copy_and_that_is_said(phigen, vendored):
+def test_without_its_spec_a_solver_is_checked_against_the_copy_with_a_message(phigen, vendored):
     Path("models").rename("moved")
     result = vendored()
     assert result.exit_code == 0

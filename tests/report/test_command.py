@@ -27,7 +27,7 @@ def write(text=GOOD):
 
 
 @pytest.mark.slow
-def test_page_is_written_beside_and_messages_go_to_stderr(phigen):
+def test_page_is_written_next_to_the_spec_and_messages_go_to_stderr(phigen):
     result = phigen(write(), "--quick")
     assert result.exit_code == 0
     assert result.stdout == ""
@@ -118,7 +118,7 @@ def test_panel_alone_is_a_page_for_a_frame(phigen):
     assert phigen("a.yaml", "--panel", "-o", "-").stdout == text
 
 
-def test_system_with_noise_has_no_panel_and_the_reason_is_said(phigen):
+def test_system_with_noise_has_no_panel_and_the_page_gives_the_reason(phigen):
     result = phigen("thermal_spin", "--panel")
     assert result.exit_code == 5
     assert "no live panel: it would compare the solver with RK4, which does not apply" in result.stderr

@@ -149,7 +149,7 @@ def test_link_of_the_panel_holds_its_settings(browser, page_path):
     assert told(browser, "settings") == chosen
 
 
-def test_what_is_not_used_of_a_link_is_told_as_text(browser, page_path):
+def test_parts_of_a_link_that_are_not_used_are_shown_as_text(browser, page_path):
     wrong = ("order=3", "h=", "p.I1=-1", "speed=fast", "x.y=1", "%3Cimg src=x onerror=broken=1%3E=1", "rk4=0")
     settled(browser, page_path, "#live&x.x1=0.25&" + "&".join(wrong))
     unused = browser.value("document.getElementById('live-unused').textContent")
@@ -161,7 +161,7 @@ def test_what_is_not_used_of_a_link_is_told_as_text(browser, page_path):
     assert browser.value("document.getElementById('live-unused').hidden")
 
 
-def test_a_failing_step_is_told_with_its_status(browser, page_path):
+def test_a_failing_step_is_reported_with_its_status(browser, page_path):
     settled(browser, page_path, "#live&h=1e9&order=2&compare=step")
     assert browser.value("document.getElementById('live-ours-told').textContent") == ""
     click(browser, "step")

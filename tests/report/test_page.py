@@ -227,14 +227,14 @@ def test_viewer_shows_the_opening_of_a_run_whose_rows_make_no_line():
     assert "first part of the run" not in viewer({"a": near}, {"a": near}, {})
 
 
-def test_an_opening_that_is_all_of_the_run_is_not_said_to_be_its_first_part():
+def test_a_curve_of_the_whole_run_is_not_called_its_first_part():
     angles = np.linspace(0, 3000, 1000), np.linspace(0, 15, 1000)
     far, all_of_it = (trajectory(np.column_stack([np.cos(a), np.sin(a), a / 9])) for a in angles)
     assert viewer_data({"a": far}, {"a": all_of_it})["joined"]
     assert "first part of the run" not in viewer({"a": far}, {"a": all_of_it}, {})
 
 
-def test_the_picture_is_not_shown_beside_the_viewer_of_the_same_curve():
+def test_the_picture_is_omitted_if_the_viewer_has_the_same_curve():
     figures = {}
     for name in ("rigid_body", "kepler"):
         coordinates = compiled(name).system.coordinates

@@ -135,7 +135,7 @@ def test_failing_steps_raise(solver):
         propagator(solver, stride=0)
 
 
-def test_arguments_of_no_run_are_told_by_the_call_itself(solver):
+def test_wrong_arguments_are_errors_of_the_call_itself(solver):
     run = propagator(solver)
     with pytest.raises(TypeError, match="unknown parameter 'I7'"):
         run(X[0], {"I7": 2.0})

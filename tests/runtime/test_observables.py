@@ -162,7 +162,7 @@ def test_averages_are_over_the_rows_that_the_run_says(tmp_path, monkeypatch):
         ("blocks: 5", "blocks: 1", "blocks: 1 is not between 2 and 10000"),
     ],
 )
-def test_mistakes_are_told_with_their_place(old, new, message):
+def test_mistakes_are_reported_with_their_place(old, new, message):
     with pytest.raises(phigen.SpecError) as error:
         phigen.spec.loads(DRIVEN.replace(old, new), "driven.yaml")
     assert message in str(error.value)

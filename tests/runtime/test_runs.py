@@ -118,7 +118,7 @@ def test_arguments_take_the_place_of_settings():
         ({"seed": 1}, "seed"),
     ],
 )
-def test_wrong_settings_are_told(settings, message):
+def test_wrong_settings_are_refused(settings, message):
     solver = phigen.compile(phigen.spec.loads(DRIVEN), target="numpy")
     with pytest.raises((ValueError, TypeError), match=message.replace("?", r"\?")):
         solver.run(**settings)
@@ -148,7 +148,7 @@ def test_lattice_runs_at_its_sizes_and_at_others(target):
         solver.run(sizes=[4, 4])
 
 
-def test_a_start_that_does_not_fit_other_sizes_is_told():
+def test_a_start_that_does_not_fit_other_sizes_is_refused():
     listed = DISORDERED.replace("sizes: [12], initial: {q: sin(2*pi*i/N_i)", "sizes: [4], initial: {q: [1, 2, 3, 4]")
     solver = phigen.compile(phigen.spec.loads(listed), target="numpy")
     assert solver.run().x.shape[-1] == 4

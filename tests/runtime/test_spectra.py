@@ -51,7 +51,7 @@ def test_spin_waves_of_the_page_have_the_dispersion_of_linear_theory():
         assert peak == pytest.approx(0.2 + 2 * (1 - np.cos(q)), abs=0.6 * apart)
 
 
-def test_a_wave_is_where_it_is_said_to_be():
+def test_a_wave_has_its_wave_number_and_frequency():
     solver = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy")
     run = solver.integrate(near_the_ground_state(8, 0.1), 0.1, 64)
     t, r = run.t[:, None], np.arange(8.0)[None]
@@ -78,7 +78,7 @@ def test_correlations_are_those_of_the_definition(boundary):
         assert correlation[d] == pytest.approx(np.mean(products) - f.mean() * g.mean(), rel=1e-12, abs=1e-15)
 
 
-def test_what_has_no_spectrum_is_told():
+def test_spectra_that_are_not_defined_are_refused():
     run = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy").integrate(
         near_the_ground_state(6, 0.3), 0.1, 4
     )

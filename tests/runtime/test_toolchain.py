@@ -75,7 +75,7 @@ def test_a_compiler_that_is_named_and_does_not_work_is_refused_with_the_reason(k
         ("true", "does not report its version: --version printed nothing"),
     ],
 )
-def test_a_compiler_tells_its_version(version, reason, compiler, monkeypatch):
+def test_a_compiler_must_report_its_version(version, reason, compiler, monkeypatch):
     if "within" in reason:
         hasty(monkeypatch)
     monkeypatch.setenv("CC", str(compiler("exit 1", version)))
@@ -106,7 +106,7 @@ def test_without_a_name_the_first_that_works_is_taken(compiler, tmp_path, monkey
     assert toolchain.find().command == (str(tmp_path / "gcc"),)
 
 
-def test_without_any_that_works_numpy_is_chosen_and_the_reasons_told(compiler, tmp_path, monkeypatch):
+def test_without_a_working_compiler_numpy_is_chosen_with_the_reasons(compiler, tmp_path, monkeypatch):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(toolchain, "find_spec", lambda name: None)

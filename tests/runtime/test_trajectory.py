@@ -68,7 +68,7 @@ def test_pandas_has_the_columns_of_the_csv(trajectory):
 
 
 @pytest.mark.parametrize("package", ["xarray", "pandas"])
-def test_without_the_package_it_is_said_how_to_get_it(trajectory, package, monkeypatch):
+def test_without_the_package_the_error_says_how_to_install_it(trajectory, package, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(MissingPackageError, match=f"pip install {package}"):
         getattr(trajectory, f"to_{package}")()

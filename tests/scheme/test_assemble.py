@@ -46,7 +46,7 @@ def test_order_and_terms(order, terms, symmetric, expected):
     assert (plan.order, plan.terms) == expected
 
 
-def test_rounding_up_is_said():
+def test_rounding_up_of_the_order_is_reported():
     assert "order 3 was asked for" in plan_order(3, None, symmetric=True).note
     assert "S_2 = 0" in plan_order(None, 2, symmetric=True).note
     assert plan_order(4, None, symmetric=True) == Order(4, 3)

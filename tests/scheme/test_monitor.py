@@ -224,7 +224,7 @@ def test_in_single_precision_until_and_at_are_right_to_its_rounding(order):
     np.testing.assert_allclose(run.at(times), exact.at(times), rtol=0, atol=1e-5)
 
 
-def test_a_failure_tells_the_physical_time_of_the_last_good_state(kepler):
+def test_a_failure_reports_the_physical_time_of_the_last_good_state(kepler):
     with pytest.raises(StepError) as failure:
         kepler[1]["c"].integrate(START, 3.5, 6)
     reached = failure.value.trajectory.t[-1]
@@ -295,7 +295,7 @@ def test_positivity_is_proved_by_form_and_refuted_at_a_start():
         compile_proved(wrong)
 
 
-def test_without_a_monitor_nothing_is_said_of_it():
+def test_without_a_monitor_the_code_has_no_elapsed_time():
     text = "\n".join(line for line in KEPLER.splitlines() if not line.startswith("monitor"))
     for target in ("c", "numpy", "js"):
         for source in emit(compile_spec(spec.loads(text)).program, target, "phigen build").values():
@@ -312,7 +312,7 @@ def test_sympy_derives_the_same_with_a_monitor(forces):
     assert any(c.statement.name == GRADIENT for c in agreements)
 
 
-def test_events_are_told_the_physical_time():
+def test_events_receive_the_physical_time():
     solver = solver_of(compiled_text(BODY, 6), "c")
 
     def event(t, x):

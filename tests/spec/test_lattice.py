@@ -51,7 +51,7 @@ def test_axes_and_boundaries() -> None:
     assert loads(TODA.replace(", boundary: open", "")).lattice.boundary == ("periodic",)
 
 
-def test_brackets_of_one_site_and_of_neighbours_are_told_apart() -> None:
+def test_brackets_of_one_site_and_of_neighbours_are_distinguished() -> None:
     spec, half = loads(TODA), symbol("a") / 2
     assert spec.poisson == MatrixForm(((ZERO, half), (-half, ZERO)))
     assert spec.lattice.brackets == {("a", "b[i-1]"): -half}

@@ -71,7 +71,7 @@ def test_limit_is_an_error_of_its_own(title: str, tmp_path: Path) -> None:
     assert error.exit_code == 3
 
 
-def test_limits_beside_other_errors_have_the_code_of_those(tmp_path: Path) -> None:
+def test_a_limit_together_with_other_errors_has_exit_code_1(tmp_path: Path) -> None:
     error = refused(hamiltonian("x1**5000 + y1**5000"), tmp_path)
     assert len(error.diagnostics) == 3
     assert type(error) is SpecError

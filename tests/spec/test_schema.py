@@ -89,7 +89,7 @@ def test_every_key_is_described_for_editors() -> None:
     assert all(f.description for f in described_fields)
 
 
-def test_what_words_of_other_programs_are_said_to_mean_are_keys() -> None:
+def test_words_of_other_programs_are_explained_by_existing_keys() -> None:
     keys = {f.key for f in fields_below(SPEC)}
     assert {word: key for word, key in MEANT.items() if key not in keys} == {}
     assert {word for word, key in MEANT.items() if word == key} == set()

@@ -43,7 +43,7 @@ def test_no_name_of_a_spec_hides_a_header_that_others_include(compiler):
     assert [n for n in sorted(headers) if re.fullmatch(SPEC_NAME, n) and objection(n) is None] == []
 
 
-def test_no_name_of_a_spec_hides_a_module_of_python_or_what_is_imported_beside_it():
+def test_no_name_of_a_spec_hides_a_module_of_python_or_of_its_packages():
     modules = [*sys.stdlib_module_names, "numpy", "scipy", "sympy", "matplotlib", "phigen"]
     assert [n for n in modules if re.fullmatch(SPEC_NAME, n) and objection(n) is None] == []
 

@@ -55,7 +55,7 @@ def test_another_method_does_not_keep_it():
     assert backward.observed_powers(corrections, rk4, x, h)[1] < 5.5
 
 
-def test_what_is_conserved_exactly_tells_no_order():
+def test_exactly_conserved_quantities_have_no_order():
     corrections, method, x, h = subject("harmonic_oscillator")
     assert backward.observed_powers(corrections, method, x, h) == [np.inf] * 3
     with pytest.raises(backward.NotOfferedError, match="rounding"):

@@ -94,7 +94,7 @@ def test_closed_form_is_the_reference_where_there_is_one():
     assert with_form.has_casimirs
 
 
-def test_what_dop853_cannot_follow_is_said():
+def test_motions_that_dop853_cannot_follow_are_reported():
     def lost(h, steps, repeats):
         return None
 

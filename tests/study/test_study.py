@@ -88,7 +88,7 @@ def drift_of(energies, t):
     return summary.summarise("a", system, None, parameters, t, x).energy
 
 
-def test_drift_tells_growth_from_oscillation():
+def test_drift_distinguishes_growth_from_oscillation():
     t = np.arange(10001) / 100
     oscillation, growth = drift_of(1 + 1e-3 * np.sin(t), t), drift_of(1 + 1e-3 * t, t)
     assert oscillation.growth == pytest.approx(1, abs=0.1)

@@ -89,7 +89,7 @@ def test_modified_hamiltonian_is_constant_to_higher_order_for_each_correction():
     assert orders["modified H, 1 correction: order"] == pytest.approx(6, abs=0.2)
 
 
-def test_a_good_solver_passes_and_rk4_stands_beside_it():
+def test_a_good_solver_passes_and_is_compared_with_rk4():
     compilation = compilation_of()
     measured = verified(compilation, {t: solver_of(compilation, t) for t in ("c", "numpy")}, steps=2000)
     assert measured.failures == []
