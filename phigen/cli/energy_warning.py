@@ -32,12 +32,17 @@ def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
     """Return the warning about the energy error of a run of an ordinary system; "" if there is none.
 
     If forces act or H depends on the time, the error is that of the energy balance, H minus the work done. There is no
-    warning if the integral for the work is too inaccurate.
+    warning if the integral for the work is too inaccurate: if its estimated error is not small compared with the energy
+    error, or so large that the estimate itself means nothing.
     """
     energy = summary.energy
-    uncertain = summary.is_balance and not summary.off < energy.error / 2
+    uncertain = summary.is_balance and not summary.off < min(energy.error / 2, LARGE_ENERGY_ERROR)
     changes = energy.unit.moves and not summary.is_balance
-    return "" if uncertain or changes else energy_warning(spec, energy.error, energy.unit, h, order)
+    return (
+        ""
+        if (uncertain and math.isfinite(energy.error)) or changes
+        else energy_warning(spec, energy.error, energy.unit, h, order)
+    )
 
 
 def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -> str:

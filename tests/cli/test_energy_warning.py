@@ -49,6 +49,35 @@ def test_a_large_energy_error_is_a_warning_with_a_step_that_mends_it(phigen, wri
     assert "warning" not in phigen("run", path, "-t", "numpy", "-q").stderr
 
 
+FORCED = """phigen: 1
+name: forced
+coordinates: [q, p]
+time: t
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - cos(q) - q*cos(2*t)/2
+forces: {vector: {p: -p/10}}
+order: 4
+runs: {far: {initial: [-1.03, 0.3], start: 3.63, step: -0.1, steps: 50, at: [0.33, -1, -1.37]}}
+"""
+
+
+def test_an_integral_along_few_states_is_no_reason_to_distrust_them(phigen, write):
+    """The energy error is ten times the energy, and so is the error of the integral, but its estimate is smaller."""
+    path = write("forced.yaml", FORCED)
+    result = phigen("run", path, "-t", "numpy", "--json")
+    (errors,) = json.loads(result.stdout)["methods"]
+    assert errors["energy"]["error"] > 1
+    assert "do not trust" not in result.stderr
+    assert "too far apart" in phigen("run", path, "-t", "numpy").stdout
+
+
+def test_a_large_error_of_the_energy_balance_is_a_warning(phigen, write):
+    spec = ORBIT.replace("1/100)", "1/100) + q1*cos(t)/1000").replace("order: 4", "order: 4\ntime: t")
+    result = phigen("run", write("driven.yaml", spec.replace("STEP", "1.2")), "-t", "numpy")
+    assert "error of the energy balance" in result.stdout
+    assert re.search(r"warning: the energy error reaches .* of the energy at the start", result.stderr)
+
+
 @pytest.mark.slow  # it compiles the solver and RK4
 @pytest.mark.parametrize(("order", "warned"), [(2, True), (6, False)])
 def test_an_energy_error_that_rk4_does_not_make_at_equal_cost_is_a_warning(phigen, order, warned):
