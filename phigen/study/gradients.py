@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,9 @@ from phigen.symbolic.arrays import Floats
 #: Number of steps and stride of the runs. Rows are after 4, 8 and 11 steps: the reverse pass works in blocks of eight
 #: steps, so that one row lies inside a block, one at its end, and one after a shorter last stride.
 STEPS, STRIDE = 11, 4
+#: Number of times that the step of a run is halved if the run fails. The runs start from few sites of a lattice, or at
+#: the end of the user's run, where the step that suits the user's run may be too large.
+HALVINGS = 6
 #: Largest accepted difference between a gradient and the product of the transposed tangent maps, relative to their
 #: terms. Both are exact up to rounding.
 TRANSPOSED = 1e-12
@@ -61,11 +65,27 @@ class GradedRun:
         object.__setattr__(self, "bars", random_bars / self.units)
 
 
+def possible_step(run: Callable[[float], object], h: float) -> float:
+    """Return the largest of the step sizes h, h/2, h/4, … with which ``run`` succeeds; h if it fails with all of
+    them."""
+    for halving in range(HALVINGS + 1):
+        try:
+            run(h / 2.0**halving)
+        except StepError:
+            continue
+        return h / 2.0**halving
+    return h
+
+
 def of_solver(
     solver: Solver, x: Floats, units: Floats, h: float, parameters: Mapping[str, float], t0: float
 ) -> GradedRun:
-    """Return the run of a solver without lattice from ``x`` (DIM,) at the time ``t0``, with `STEPS` steps of size h."""
+    """Return the run of a solver without lattice from ``x`` (DIM,) at the time ``t0``, with `STEPS` steps.
+
+    Their size is h, or smaller if the run fails with h.
+    """
     begin = t0 if solver.interface.time else None
+    h = possible_step(lambda size: solver.integrate(x, size, STEPS, STRIDE, t0=begin, parameters=parameters), h)
 
     def carried(vectors: Floats) -> Floats:
         products, product = [], vectors.T
@@ -88,11 +108,13 @@ def of_solver(
 def of_lattice(
     solver: LatticeSolver, x: Floats, units: Floats, h: float, parameters: Mapping[str, Any], t0: float | None
 ) -> GradedRun:
-    """Return the run of a lattice from ``x`` (coordinates, *sizes), with `STEPS` steps of size h.
+    """Return the run of a lattice from ``x`` (coordinates, *sizes), with `STEPS` steps.
 
-    ``units`` are typical magnitudes of the numbers of ``x``, in one dimension.
+    Their size is h, or smaller if the run fails with h. ``units`` are typical magnitudes of the numbers of ``x``, in
+    one dimension.
     """
     arguments: dict[str, Any] = {"t0": t0}
+    h = possible_step(lambda size: solver.integrate(x, size, STEPS, STRIDE, parameters=parameters, **arguments), h)
 
     def carried(vectors: Floats) -> Floats:
         shaped = vectors.reshape(len(vectors), *x.shape)
@@ -121,23 +143,27 @@ def measured(
     ``free_level_runs`` include the dependence of e on initial state and parameters. ``place`` is added to the names of
     the checks.
     """
-    apart = _largest(fixed_level_runs, transposition_error)
-    reason = f"the gradient differs from the transpose of the tangent maps by {apart:.1e}"
+    apart, failure = _largest(fixed_level_runs, transposition_error)
+    reason = failure or f"the gradient differs from the transpose of the tangent maps by {apart:.1e}"
     yield f"gradient against tangent maps{place}", apart, TRANSPOSED, reason
-    slip = _largest(free_level_runs, difference_error)
-    yield f"gradient against differences{place}", slip, DIFFERENCES, f"the gradient is {slip:.1e} off"
+    slip, failure = _largest(free_level_runs, difference_error)
+    reason = failure or f"the gradient is {slip:.1e} off"
+    yield f"gradient against differences{place}", slip, DIFFERENCES, reason
 
 
-def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> float:
-    """Return the largest value of ``error`` for the runs; infinity if a run fails or a value is not finite."""
+def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> tuple[float, str]:
+    """Return the largest value of ``error`` for the runs; infinity if a run fails or a value is not finite.
+
+    The second result says that a run fails, and why; "" if none does.
+    """
     largest = 0.0
     for run in runs:
         try:
             value = error(run)
-        except StepError:
-            return math.inf
+        except StepError as failure:
+            return math.inf, f"the run of {STEPS} steps fails, with smaller steps too: {failure}"
         largest = max(largest, value if math.isfinite(value) else math.inf)
-    return largest
+    return largest, ""
 
 
 def transposition_error(run: GradedRun) -> float:
@@ -222,6 +248,7 @@ def members_error(
     ``states`` (members, DIM) are the initial states. The difference is relative to the largest entry of the gradients.
     """
     arguments: dict[str, Any] = {"t0": t0 if solver.interface.time else None, "parameters": parameters}
+    h = min((possible_step(partial(solver.integrate, x, steps=STEPS, **arguments), h) for x in states), key=abs)
     bars = _directions(states.shape[1], len(states)) / units
     try:
         together = solver.pullback(states, h, STEPS, bars, **arguments).x0_bar * units

@@ -1,6 +1,7 @@
 """The checks of gradients in `phigen verify`: each part of a gradient that is wrong makes a check fail."""
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from phigen import resources, spec
 from phigen.api import lattice_solver_of, solver_of
 from phigen.cli import group
 from phigen.compiler import compile_spec
+from phigen.errors import StepError
 from phigen.lattice.states import start_of
 from phigen.study import gradients, lattice_verification, verification
 from phigen.study.meanings import meaning_of
@@ -76,6 +78,38 @@ def checks(compilation, solver, run):
 @pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
 def test_right_gradients_pass(target, more):
     assert checked(SWING + more, target=target) == {TANGENTS: True, DIFFERENCES: True, MEMBERS: True}
+
+
+#: The motion q = 1/(5 − t) ends at t = 5, and the run at t = 4.
+EXPLODING = """phigen: 1
+name: t
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p*q**2
+order: 2
+runs: {end: {initial: [0.2, 0.3], step: 0.1, steps: 40}}
+"""
+
+
+def test_gradients_have_smaller_steps_where_those_of_the_run_fail():
+    solver = solver_of(compiled(EXPLODING, adjoint=True), "numpy")
+    end = solver.integrate(np.array([0.2, 0.3]), 0.1, 40, 40).x[-1]
+    with pytest.raises(StepError):
+        solver.integrate(end, 0.1, gradients.STEPS)
+    assert checked(EXPLODING) == {TANGENTS: True, DIFFERENCES: True, MEMBERS: True}
+
+
+def test_a_run_that_fails_with_all_steps_is_the_reason():
+    solver = solver_of(compiled(SWING, adjoint=True), "numpy")
+    run = gradients.of_solver(solver, np.array([0.4, 0.3]), np.ones(2), 0.1, {"g": 1.5, "m": 0.7}, 0.0)
+
+    def fail(bars):
+        raise StepError("t at step 7: NOT_CONVERGED", step=7, status="NOT_CONVERGED")
+
+    failing = [replace(run, pullback=fail)]
+    for _, value, _, reason in gradients.measured(failing, failing):
+        assert value == np.inf
+        assert reason == "the run of 11 steps fails, with smaller steps too: t at step 7: NOT_CONVERGED"
 
 
 def slightly(run, rows, x_bar, derivatives):
