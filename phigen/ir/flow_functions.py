@@ -84,8 +84,8 @@ class FlowFunctions:
         yield ir.Call(f"flow{part + 1}", (coefficients, *self.arguments))
 
     def corrector(self, schedule: Schedule) -> ir.Function:
-        """Return the function of the corrector: alternating flows of two parts, before the first step of a run and
-        after the last.
+        """Return the function of the corrector. It applies flows of two parts alternately, before the first step of a
+        run and after the last step.
         """
         (outer, first), *others = schedule.begin
         (_, last), *_ = schedule.end

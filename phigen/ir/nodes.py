@@ -78,7 +78,7 @@ class Tape:
 
 @dataclass(frozen=True)
 class RecordType:
-    """A record of the runtime, such as the solver or a row segment, by its name.
+    """A record of the runtime, such as the solver or a row segment. It is identified by its name.
 
     A parameter of this type is an address; a local variable is an address if ``address`` is set. A function changes
     only records that are ``mutable``.
@@ -93,7 +93,7 @@ ParameterType = Type | Pointer | Vector | Tape | RecordType
 
 
 class Storage(Enum):
-    """Kinds of arrays over the sites; the value of each kind is the name of these arrays in kernels."""
+    """Kinds of arrays over the sites. The value of a kind is the name that arrays of this kind have in kernels."""
 
     STATE = "x"  # fields, then parameters at sites, then increments of noise, then derived arrays
     VARIATION = "varied"
@@ -477,7 +477,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Discard:
-    """Statement that marks a parameter as unused, so that the compiler gives no warning."""
+    """Statement that marks a parameter as unused, so that a compiler does not warn about it."""
 
     name: str
 

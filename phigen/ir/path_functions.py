@@ -277,7 +277,7 @@ class _LaneFunctions:
     path: PathFunctions
 
     def follow(self, name: str, purpose: str, numbers: range) -> ir.Function:
-        """Return the function for the Taylor coefficient of order k ≥ 1 of the series with these numbers.
+        """Return the function that computes Taylor coefficients of order k ≥ 1, for the series in ``numbers``.
 
         It first adds the products of coefficients of orders j and k − j for 0 < j < k, then the remaining terms, which
         may contain coefficients of order k.

@@ -86,7 +86,9 @@ def _density(cell: Cell, name: str, *, single: bool) -> Expression:
 
 
 def _within(cell: Cell, density: Expression) -> Expression:
-    """Return the density with a weight for each additive term, which is 0 where the term reaches beyond an open end."""
+    """Return the density with each additive term multiplied by a weight. The weight is 0 where the term reaches beyond
+    an open end.
+    """
     return total(_present(cell, term) * term for term in cell.additive_terms(density))
 
 

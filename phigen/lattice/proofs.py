@@ -58,8 +58,8 @@ def tensor(cell: Cell) -> tuple[Statement, ...]:
 
 
 def casimirs(cell: Cell) -> Iterator[Statement]:
-    """Yield the statement π∇C = 0 for each Casimir C. The Casimir belongs to each site, or is a sum or product over
-    sites.
+    """Yield the statement π∇C = 0 for each Casimir C. C is a function of the values at one site, or a sum or product
+    over all sites.
     """
     for name, (density, kind) in cell.casimirs.items():
         title = f"{name} is a Casimir"

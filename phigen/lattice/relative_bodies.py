@@ -99,8 +99,8 @@ class LatticeBodies:
         return CellSplitting((self._motions(), self._remainder()), Colouring(1, (0,) * len(self.cell.axes)))
 
     def sites(self, flows: Sequence[CellFlow]) -> RelativeSites:
-        """Return the data of the bodies that runtimes need; ``flows`` are the flows of the parts of H in the order of a
-        step.
+        """Return the data that runtimes need about the bodies; ``flows`` are the flows of the parts of H in the order
+        of a step.
         """
         fields = self.cell.fields
         axes = tuple((fields.index(q), fields.index(v)) for q, v in self.axes)

@@ -194,7 +194,8 @@ class _FewBodies:
         return sums
 
     def shifts(self, flow: CellFlow) -> Iterator[tuple[str, Expression]]:
-        """Yield the differences between the rates in the flow of the remainder of H and the rates of its vector field.
+        """Yield residuals that are 0 if the flow of the remainder of H has the right rates: differences to the vector
+        field of the remainder.
 
         The remainder is the part of H without Kepler motions.
         """

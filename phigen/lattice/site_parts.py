@@ -54,7 +54,7 @@ Coordinate = tuple[str, int]
 
 @dataclass(frozen=True)
 class Summand:
-    """A term of H, at sites or, if ``bond`` is true, of a bond or a pair.
+    """A term of H. It belongs to a site or, if ``bond`` is true, to a bond or a pair.
 
     ``low`` and ``high`` are the smallest and the largest offset along each axis of the sites that the term reads.
     """

@@ -97,7 +97,7 @@ class _Reader:
         return Start(sizes, self._state(sizes), parameters, bonds, bool(self.lattice.graph))
 
     def _expect_in_bound(self, p: Parameter, values: Floats) -> None:
-        """Raise `SpecError` if values at sites or bonds are outside of the declared bound of a parameter."""
+        """Raise `SpecError` if values at sites or bonds are outside the declared bound of a parameter."""
         if values.size and p.refuses(float(np.min(values))):
             raise self._out_of_bound(p, values, f"the parameter is {p.bound} by declaration")
         if self.spec.coordinates_from and p.at == "sites":
@@ -140,8 +140,8 @@ class _Reader:
     def _sites(self, bonds: Bonds) -> int:
         """Return the number of sites of a run that does not state ``sizes``.
 
-        It is the largest length of a list in the initial state. Without lists, it is one more than the largest number
-        of a site in a bond; sites are counted from 0.
+        It is the largest length of a list in the initial state. If bonds end at sites with larger numbers, it is the
+        largest of these numbers plus 1, since sites are counted from 0.
         """
         lengths = [len(v.listed) for v in self.lattice_run.state.values() if v.listed]
         if not lengths and not len(bonds):

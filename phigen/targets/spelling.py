@@ -79,7 +79,9 @@ class Spelling:
         return self.scope[symbol]
 
     def substitute(self, declaration: ir.Declare) -> None:
-        """Print the value of each symbol that a declaration defines in place of this symbol."""
+        """Record the symbols that a declaration defines. From now on, their values are printed instead of the
+        symbols.
+        """
         for symbol, value in declaration.items:
             text, strength = self._spelt(value)
             self.scope.bind(symbol, text if strength else f"({text})")

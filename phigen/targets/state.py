@@ -31,7 +31,7 @@ class StateBlock:
     copied: tuple[str, ...] = ()
 
     def save(self) -> Iterator[str]:
-        """Yield the statements that copy the members which a step changes to local variables."""
+        """Yield statements that copy ``saved`` members to local variables before a step."""
         arrays = [f"{member}[{size}]" for member, size in self.saved if size]
         numbers = [f"{member} = s->{member}" for member, size in self.saved if not size]
         yield from [f"double {', '.join(arrays)};"] if arrays else []

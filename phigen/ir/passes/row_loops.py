@@ -100,9 +100,7 @@ def of_colour(
 
 
 def row_function(function: ir.Function, *parameters: str, body: Iterable[ir.Statement]) -> ir.Function:
-    """Return the function with the given parameters and body; parameters that the body does not read are marked as
-    unused.
-    """
+    """Return the function with the given parameters and body. Parameters that are never read are marked as unused."""
     return discard_unread(replace(function, parameters=parameters, body=tuple(body)))
 
 

@@ -152,7 +152,9 @@ class WholeArrays:
         return replace(functions[0], name=name, parameters=parameters, body=(*body, ir.Return(BAR)))
 
     def _transposed_sums(self, function: ir.Function, source: ir.Value) -> Iterator[ir.Statement]:
-        """Yield the call of the transpose of the sums over bonds or pairs that ``function`` reads."""
+        """Yield a call, if ``function`` reads sums over bonds or pairs. It turns cotangents of the sums into cotangents
+        of the state.
+        """
         for s in function.body:
             if isinstance(s, ir.GatherSums):
                 stores = [c for c in function.loop.stores if c.array.storage is Storage.SUM_COTANGENT]

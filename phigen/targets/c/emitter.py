@@ -35,9 +35,9 @@ from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
-#: Number of iterations over a block of steps that take as much time, divided by the number of steps in the block, as
-#: one evaluation for a single step. PASSES is for vectorised loops. PASSES_OF_CALLS is for loops that call library
-#: functions, and for paths: a single evaluation of a path needs no derivatives of the path.
+#: PASSES iterations over a block of steps take, for each step, as much time as one evaluation at a single point.
+#: PASSES_OF_CALLS is the same number for loops that call library functions, and for paths: a single evaluation of a
+#: path needs no derivatives of the path.
 PASSES, PASSES_OF_CALLS = 2, 1
 
 #: Number of attempts to solve a stage of an implicit step: first with the predictor, then without it.

@@ -116,7 +116,9 @@ def _exponentials(program: Program) -> list[str]:
 
 
 def near(program: Program, names: Iterable[str]) -> list[str]:
-    """Return the definitions of functions for loops over lanes, which are correct for small arguments only."""
+    """Return the definitions of functions for loops over lanes. These functions are correct for small arguments
+    only.
+    """
     listed = list(names)
     others = [f for f in listed if f not in (*ELLIPTIC, *REMAINDERS, *QUOTIENTS)]
     texts = [

@@ -197,7 +197,7 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
 
 
 def _body(program: Program, kernel: Kernel, form: Form, built: ir.Function) -> list[str]:
-    """Return the lines of the body of a function; they mark arguments that the function does not read as unused."""
+    """Return the lines of the body of a function. Arguments that are never read are marked as unused."""
     parameters = [*kernel.inputs, *(() if form.returning else (o.name for o in kernel.outputs))]
     parameters += [*["work"] * bool(form.workspace), *["distinct_coef"] * bool(form.alike), *["lane"] * form.single]
     if form.returning:

@@ -33,7 +33,7 @@ class Macros:
     """The macros of the runtime by name. They are expanded here, without a C preprocessor."""
 
     _known: dict[str, Macro] = field(default_factory=dict)
-    _heads: re.Pattern[str] | None = None  # pattern of empty macros at the begin of a line, made on first use
+    _heads: re.Pattern[str] | None = None  # pattern of empty macros at the beginning of a line
 
     def define(self, line: str) -> None:
         """Record the macro that a line defines; other lines are ignored."""

@@ -43,7 +43,7 @@ _KINDS = {kind.value: kind for kind in TokenKind}
 
 
 def tokens(text: str) -> Iterator[CToken]:
-    """Yield the tokens of a text, with one character of an operator in each token."""
+    """Yield the tokens of a text. Operators of several characters are divided into single characters."""
     for match in _TOKEN.finditer(text):
         yield CToken(_KINDS[match.lastgroup or ""], match[0])
 
@@ -56,7 +56,9 @@ _OPERATORS = {
 
 
 def lexemes(text: str) -> Iterator[CToken]:
-    """Yield the tokens of a text with whole operators, and with whole directives without their line end."""
+    """Yield the tokens of a text, in which each operator and each directive is one token. A directive does not include
+    the end of its line.
+    """
     directive, mark, fresh = "", "", True
     for token in tokens(text):
         if directive and token.kind is TokenKind.SPACE and "\n" in token.text and not directive.endswith("\\"):

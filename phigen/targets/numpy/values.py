@@ -14,7 +14,8 @@ _NOISE_ARGUMENTS = """ The random
     numbers are a function of seed, member (that of the first member, or an array) and the number of the step, from
     step0 on. Prescribed increments (steps, increments) or (steps, members, increments) replace them."""
 
-#: Sentences for docstrings in generated modules: on the gauge, on the energy level, and on steps of equal size in tau.
+#: Sentences for docstrings in generated modules: on the gauge, on the energy level, and on steps of equal size in tau,
+#: the time of a monitor.
 _OF_GAUGE = """gauge (one value for each Casimir in GAUGE)
     overrides the choice of the solver: the step is a Poisson map for each fixed gauge."""
 _OF_LEVEL = """gauge overrides e = -H(x0): the step

@@ -110,7 +110,7 @@ class RowLoops:
         loops.
 
         There is a form for small arguments and a form for all arguments, if one of the ``loops`` calls a function that
-        needs both. Without ``rows``, the data on loops over sites in SIMD lanes, there is a single form.
+        needs both. ``rows`` has the data on loops over sites in SIMD lanes; if it is None, there is a single form.
         """
         if rows is None:
             return {"": self.versions}
