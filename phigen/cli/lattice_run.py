@@ -13,6 +13,7 @@ from phigen.cli.arguments import FILMS
 from phigen.cli.console import Console, counted, heading, out, out_json, table
 from phigen.cli.existing import wrote
 from phigen.cli.experiment import expect_positive, setting_of
+from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.run_summary import counted_crossings, described_averages, described_spectrum, finite, print_averages
 from phigen.errors import StepError
 
@@ -175,6 +176,8 @@ def _integrated(
     finished = None if experiment.past else first
     if checkpoint and (refused := objection(checkpoint, finished, resume=resume, how="--resume")):
         raise click.UsageError(refused)
+    if resume and checkpoint and checkpoint.exists():
+        console.note(f"resuming from {checkpoint}")
     plan, recorded = experiment.plan(solver), run.record if run.records_numbers else ()
     try:
         if plan.transforms:
@@ -188,6 +191,11 @@ def _integrated(
             )
         except MismatchError as error:
             raise click.UsageError(str(error)) from None
+        except KeyboardInterrupt:
+            if checkpoint is None or not checkpoint.exists():
+                raise
+            message = f"interrupted; {checkpoint} keeps the run: repeat the command with --resume to continue"
+            raise InterruptedRunError(message) from None
         except StepError as error:
             if error.trajectory is None:  # not even the first step was possible
                 raise

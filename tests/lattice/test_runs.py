@@ -304,9 +304,13 @@ def test_an_interrupted_run_goes_on_to_the_same_files(cli, spec, monkeypatch, mo
     begin()
     with monkeypatch.context() as patched:
         patched.setattr(Checkpoint, "save", stopping)
-        assert cli(*command).exit_code == 130
+        halted = cli(*command)
+    assert halted.exit_code == 130
+    assert "repeat the command with --resume to continue" in " ".join(halted.stderr.split())
     assert "belongs to an interrupted run" in " ".join(cli(*command).stderr.split())
-    assert cli(*command, "--resume").exit_code == 0
+    resumed = cli(*command, "--resume")
+    assert resumed.exit_code == 0
+    assert "resuming from" in resumed.stderr
     with np.load(files[0]) as stored:
         assert len(stored["t"]) > 4
     assert [path.read_bytes() for path in files] == whole
